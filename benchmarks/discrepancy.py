@@ -19,13 +19,13 @@ from chladni.io.package_files import mesh_path
 from chladni.updating.hypothesis_fit import fitted
 from chladni.updating.preparation import prepare
 from chladni.updating.reduced_model import evaluate
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import question_of
 from timing import timed
 
 
 def row(path):
     """One line of the table."""
-    problem = prepare(question(load_case(path))).problem
+    problem = prepare(question_of(load_case(path))).problem
     model, base, x = problem.reduced.model, problem.base, problem.mean()
     weighed = problem.mass_measurement
     state = evaluate(model, base, x)

@@ -18,8 +18,8 @@ import time
 import numpy as np
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import count
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.points import MassEffect, strength
 from chladni.effects.suspension import Suspension
 from chladni.effects.thickness_distribution import ThicknessDistribution
@@ -43,7 +43,7 @@ def effects(reduced):
     spring = strength("k", "N/m", 5e3, 1.0, (0.0,))
     thin = ThicknessDistribution.on(reduced.groups, 0, 1)
     return [
-        *(ordinary(reduced.groups, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
+        *(calibration_parameter(reduced.groups, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
         MassEffect((mass,), "", grids=grids[:1], rows=one),
         Suspension((spring,), "", grids=grids[1:], rows=other, directions=np.eye(3)[2:]),
         thin,

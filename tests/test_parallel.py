@@ -8,11 +8,11 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import chladni
-from chladni import side_by_side as module
+from chladni import parallel as module
 from chladni.dynamics import eigen
 from chladni.errors import ModelError
 from chladni.io.package_files import mesh_path
-from chladni.parallel import cores, one_blas_thread, side_by_side, threads
+from chladni.parallel import cores, in_parallel, one_blas_thread, threads
 from chladni.sparse.lanczos import block_lanczos
 
 
@@ -24,7 +24,7 @@ def test_results_come_in_order_and_few_wait(at_once):
         begun.append(k)
         return k**2
 
-    for taken, square in enumerate(side_by_side(work, range(20), at_once)):
+    for taken, square in enumerate(in_parallel(work, range(20), at_once)):
         assert square == taken**2
         assert len(begun) <= taken + 1 + at_once
     assert sorted(begun) == list(range(20))
@@ -33,7 +33,7 @@ def test_results_come_in_order_and_few_wait(at_once):
 def test_two_are_at_work_at_the_same_time():
     """Each waits for the other: one after the other they would never end."""
     met = Barrier(2, timeout=30)
-    assert set(side_by_side(lambda k: met.wait(), range(2), 2)) == {0, 1}
+    assert set(in_parallel(lambda k: met.wait(), range(2), 2)) == {0, 1}
 
 
 def test_a_fault_is_raised_where_it_is_asked_for_and_the_rest_is_not_begun():
@@ -45,7 +45,7 @@ def test_a_fault_is_raised_where_it_is_asked_for_and_the_rest_is_not_begun():
             raise ModelError("the second")
         return k
 
-    done = side_by_side(work, range(50), 2)
+    done = in_parallel(work, range(50), 2)
     assert next(done) == 0
     with pytest.raises(ModelError, match="the second"):
         list(done)
@@ -54,7 +54,7 @@ def test_a_fault_is_raised_where_it_is_asked_for_and_the_rest_is_not_begun():
 
 def test_who_stops_asking_ends_the_rest():
     begun = []
-    done = side_by_side(lambda k: begun.append(k) or k, range(50), 2)
+    done = in_parallel(lambda k: begun.append(k) or k, range(50), 2)
     assert next(done) == 0
     done.close()
     assert len(begun) < 10
@@ -63,7 +63,7 @@ def test_who_stops_asking_ends_the_rest():
 def test_what_is_said_of_rounding_holds_in_threads():
     with warnings.catch_warnings(), np.errstate(divide="ignore"):
         warnings.simplefilter("error")
-        assert list(side_by_side(lambda x: np.log(x), np.zeros(4), 2)) == [-np.inf] * 4
+        assert list(in_parallel(lambda x: np.log(x), np.zeros(4), 2)) == [-np.inf] * 4
 
 
 def test_as_many_threads_as_the_user_allows(monkeypatch):

@@ -77,7 +77,7 @@ class CatalogueChoices:
         model = self.problem.reduced.model_for(candidate.effect, candidate.start)
         effects = [*self.problem.base, candidate.effect]
         state = evaluate(model, effects, np.concatenate([x, candidate.start]), False)
-        return tuple(d.over(model).residual(state, False)[0] for d in data)
+        return tuple(d.rebased(model).residual(state, False)[0] for d in data)
 
     def gain(self, chosen: Iterable[int]) -> float:
         """Gain of a set in -2 ln evidence over the null, less the price of each member.
@@ -103,7 +103,7 @@ class CatalogueChoices:
         if chosen not in self.fits:
             first, *rest = (self.candidates[k] for k in sorted(chosen))
             held = self.problem.holding([(c.effect, c.start) for c in rest])
-            begun = (held.mean(), taken(held, self.null, ("ordinary", "nuisance")))
+            begun = (held.mean(), taken(held, self.null, ("calibration", "nuisance")))
             tries = [held.fitted_with(first.effect, first.start, x) for x in begun]
             self.fits[chosen] = min(tries, key=lambda t: t.neg2_log_evidence)
         return self.fits[chosen]

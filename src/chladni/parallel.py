@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 A = TypeVar("A")
 B = TypeVar("B")
 
-MOST = 4  # at once: each has matrices of its own
+MOST_THREADS = 4  # at once: each has matrices of its own
 _ENTERED: list[threadpool_limits] = []  # one for each that asks for one thread of BLAS
 _LOCK = Lock()
 
@@ -55,11 +55,11 @@ def threads() -> int:
     That variable is where users and batch systems say how many cores a process may keep busy.
     """
     said = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
-    most = int(said) if said.isdecimal() and int(said) else MOST
-    return min(cores(), most, MOST)
+    most = int(said) if said.isdecimal() and int(said) else MOST_THREADS
+    return min(cores(), most, MOST_THREADS)
 
 
-def side_by_side(
+def in_parallel(
     work: Callable[[A], B], items: Iterable[A], at_once: int | None = None
 ) -> Iterator[B]:
     """``work`` of each item, in their order; no more than one result for each thread waits.

@@ -180,7 +180,7 @@ def tailgate_bench() -> Bench:
     sheets = tuple(p.name for p in deck.parts if isinstance(p.section, ShellSection))
 
     def spots(at: np.ndarray) -> Spots:
-        shell = ShellSurface.whole(deck).feet(m.points[at]).shell
+        shell = ShellSurface.whole(deck).closest_points(m.points[at]).shell
         is_grid = np.isin(m.ids[at], deck.ids)
         return Spots(
             tuple(m.labels[int(k)] for k in at),

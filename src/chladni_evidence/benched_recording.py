@@ -26,8 +26,8 @@ from chladni.model.assembly import Assembly
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import Bench
-from .mesh_transfer import Footing, Spots, still_there
 from .hidden import Hidden
+from .mesh_transfer import MeshTransfer, Spots, still_there
 from .response_of_article import seen
 
 Recorder = Literal["independent noise", "stepped-sine", "burst-random"]
@@ -113,7 +113,7 @@ def _article(
     )  # fmt: skip
 
 
-def _along(modes: ArticleModes, foot: Footing, way: np.ndarray) -> np.ndarray:
+def _along(modes: ArticleModes, foot: MeshTransfer, way: np.ndarray) -> np.ndarray:
     """Shapes (k, r) of places along one direction."""
     return seen(modes, foot, np.tile(way, (len(foot.rows), 1)))
 

@@ -13,7 +13,7 @@ from .mesh_transfer import Spots, nearest_rows, rows_of_part
 from .response_of_article import Coupling, Law
 
 FACING = 0.85  # cosine between normals of one face
-LEAST = 12  # points of a patch
+LEAST_POINTS = 12  # points of a patch
 
 Spoil = Callable[[np.ndarray], np.ndarray]  # recorded values (n_f, n_out, n_in) made worse
 
@@ -142,4 +142,4 @@ def around(site: Site, row: int, radius: float) -> np.ndarray:
     rows = rows[np.abs(n[rows] @ n[row]) > FACING]
     d = np.linalg.norm(a.points[rows] - a.points[row], axis=1)
     order = np.argsort(d, kind="stable")
-    return np.asarray(rows[order[: max(LEAST, int((d <= radius).sum()))]])
+    return np.asarray(rows[order[: max(LEAST_POINTS, int((d <= radius).sum()))]])

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from chladni.effects.membrane_prestress import critical_force, prestressed, tensors
 from chladni.effects.calibration_parameters import scaled as sheet_scaled
 from chladni.effects.calibration_parameters import value
+from chladni.effects.membrane_prestress import critical_force, prestressed, tensors
 from chladni.errors import ModelError
 from chladni.geometry.facets import cell_areas, cell_normals, unit
 from chladni.model.assembly import Assembly
 from chladni.model.ground_springs import with_ground_bushes
 from chladni.model.properties import Isotropic, Orthotropic, Part, ShellSection
 
-from .mesh_transfer import nearest_rows
 from .hidden import Hidden, Site, near_outputs, with_lumps
+from .mesh_transfer import nearest_rows
 from .part_scatter import scaled
 from .response_of_article import Coupling
 

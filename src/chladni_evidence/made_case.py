@@ -33,11 +33,11 @@ from .benched_recording import (
     can_be_benched,
     true_places,
 )
-from .mesh_transfer import Spots, still_there
 from .held_kinds import HELD
 from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
 from .joint_kinds import JOINTS
+from .mesh_transfer import Spots, still_there
 from .outside_kinds import OUTSIDE
 from .package_kinds import package_kinds
 from .pair_kinds import members, together
@@ -161,7 +161,7 @@ def made_case(
     truth = {
         "effect": kind, "seed": seed, "structure": bench.name, "mesh": mesh,
         "solver": solver, **({} if tested is None else {"recorded_by": recorder}),
-        **known, **_ordinary(bench.deck, hidden.article),
+        **known, **_calibration_parameters(bench.deck, hidden.article),
         "moved_by_scatter_decades": scatter, "moved_by_effect_decades": effect,
         "scales": scales, "frequency_hz": modes.frequency[modes.frequency < 1.5 * bench.held[1]],
         "drive": bench.drive.labels[0], "mass_kg": weight,
@@ -170,7 +170,7 @@ def made_case(
     return MadeCase(bench, frf, weight * (1 + LIGHT * noise.normal()), truth, tested)
 
 
-def _ordinary(deck: Assembly, article: Assembly) -> dict[str, Any]:
+def _calibration_parameters(deck: Assembly, article: Assembly) -> dict[str, Any]:
     """E, rho, t [SI] and wall [of the deck's] of sheets and tubes, and the mass of each part.
 
     The wall is given by the ratio of the areas.

@@ -45,14 +45,14 @@ class Spots:
 
 
 @dataclass(frozen=True, eq=False)
-class Footing:
+class MeshTransfer:
     """Motion of places as a weighted mean of points: rows (k, 3) int, weights (k, 3)."""
 
     rows: np.ndarray
     weights: np.ndarray
 
 
-def footing(assembly: Assembly, spots: Spots) -> Footing:
+def mesh_transfer(assembly: Assembly, spots: Spots) -> MeshTransfer:
     """The spots as weighted means of points of this mesh."""
     rows = np.zeros((len(spots), 3), dtype=np.int64)
     weights = np.zeros((len(spots), 3))
@@ -60,15 +60,15 @@ def footing(assembly: Assembly, spots: Spots) -> Footing:
         mine = np.array([p == name for p in spots.parts])
         p = assembly.part(name)
         if (assembly.shells.part == p).any():
-            feet = ShellSurface.of(assembly, name).feet(spots.points[mine])
+            feet = ShellSurface.of(assembly, name).closest_points(spots.points[mine])
             rows[mine], weights[mine] = feet.nodes, feet.weight
         else:
             rows[mine] = nearest_rows(assembly, p, spots.points[mine])[:, None]
             weights[mine] = [1.0, 0.0, 0.0]
-    return Footing(rows, weights)
+    return MeshTransfer(rows, weights)
 
 
-def still_there(article: Assembly, whole: Assembly, spots: Spots) -> Footing:
+def still_there(article: Assembly, whole: Assembly, spots: Spots) -> MeshTransfer:
     """The spots on an article, at the same points as before an effect was hidden in it.
 
     A hidden effect may make new parts out of a sheet.  A sensor on such a part is not on the
@@ -82,7 +82,7 @@ def still_there(article: Assembly, whole: Assembly, spots: Spots) -> Footing:
     n = len(whole.points)
     if len(article.points) < n or not np.array_equal(article.points[:n], whole.points):
         raise ModelError("what is hidden in an article has moved its points")
-    return footing(whole, spots)
+    return mesh_transfer(whole, spots)
 
 
 def rows_of_part(assembly: Assembly, p: int) -> np.ndarray:

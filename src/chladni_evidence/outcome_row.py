@@ -31,7 +31,7 @@ KIN = (  # effects that change the same operator: the right family, if not the r
     {"local-resonator", "suspension", "extra-support", "compliant-support", "shaker-restraint"},
     {"sensor-fault", "chain-delay", "duplicated-pair"},
 )  # fmt: skip
-NEAR = {"tailgate": 0.150}  # largest distance of a right place [m]; else ``CLOSE``
+NEAR_PLACE = {"tailgate": 0.150}  # largest distance of a right place [m]; else ``CLOSE``
 CLOSE = 0.060
 DRAWN_IN = 1.645 / 1.960  # intervals are written for 95 %, and scored for 90 %
 VETO = re.compile(
@@ -52,7 +52,7 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     d, kind = answer.result, truth["effect"]
     truth = {**truth, "effect": catalogued(kind)}
     name, vetoed, place = called(d), _vetoed(d), _place(d, truth)
-    reach = NEAR.get(truth["structure"], CLOSE)
+    reach = NEAR_PLACE.get(truth["structure"], CLOSE)
     return {
         "structure": truth["structure"],
         "seed": truth["seed"],
@@ -170,7 +170,7 @@ def _covered(d: Row, truth: Row) -> dict[str, list[int]]:
     """Numbers of 90 % intervals that hold the truth, and of all, for E, rho, t, wall, effect."""
     count = {name: [0, 0] for name in (*QUANTITIES, "effect")}
     of_effect = (("effect", entry, true) for entry, true in _named(d, truth))
-    for name, entry, true in (*_ordinary(d, truth), *of_effect):
+    for name, entry, true in (*_calibration_parameters(d, truth), *of_effect):
         count[name][0] += int(_holds(entry, true))
         count[name][1] += 1
     return count
@@ -189,7 +189,7 @@ def _holds(entry: Row, true: float) -> bool:
     return bool(low <= true <= high)
 
 
-def _ordinary(d: Row, truth: Row) -> Iterator[tuple[str, Row, float]]:
+def _calibration_parameters(d: Row, truth: Row) -> Iterator[tuple[str, Row, float]]:
     """Name (E, rho, t or wall), calibrated entry and truth; parts together have a mean truth.
 
     The mean is of logarithms, weighted with the parts' mass.
@@ -228,7 +228,11 @@ def _figures(d: Row, truth: Row) -> Row:
     """Errors of an answer: mass, E, rho and t (mean |ln|), held-out Q and its floor."""
     off: Row = {"mass": _mass_off(d, truth)}
     for name in ("E", "rho", "t"):
-        each = [abs(np.log(e["value"] / x)) for q, e, x in _ordinary(d, truth) if q == name]
+        each = [
+            abs(np.log(e["value"] / x))
+            for q, e, x in _calibration_parameters(d, truth)
+            if q == name
+        ]
         off[name] = float(np.mean(each)) if each else None
     held = (d.get("fit") or {}).get("held_out") or {}
     after = held.get("Q_with_effect")

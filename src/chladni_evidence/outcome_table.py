@@ -21,7 +21,9 @@ FIGURES = {  # figures compared with plain calibration: text and factor
 
 def tables(rows: Sequence[Row]) -> str:
     """All tables of a score."""
-    return "\n\n".join([table(rows), confusion(rows), overall(rows), beside(rows)])
+    return "\n\n".join(
+        [table(rows), confusion(rows), overall(rows), calibration_against_diagnosis(rows)]
+    )
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -112,7 +114,7 @@ def _costs(rows: Sequence[Row]) -> Iterator[str]:
         yield f"seconds: median {np.median(t):.0f}, most {max(t):.0f}; most {max(g):.1f} GB"
 
 
-def beside(rows: Sequence[Row]) -> str:
+def calibration_against_diagnosis(rows: Sequence[Row]) -> str:
     """Plain calibration and the diagnosis on the same cases with effects: medians."""
     both = [
         (r["beside"]["calibration"], r["beside"]["diagnosis"])

@@ -50,7 +50,7 @@ def recorded_case(folder: Path) -> RecordedCase:
     with one_blas_thread():
         made = searched(with_natural_frequencies(load_case(folder)), True, lambda text, share: None)
         known = replace(begun(made.prepared, made.found), whole=True)
-        given = made.prepared, made.found, made.renew
+        given = made.prepared, made.found, made.refine
         found, known = decided_by(RULES, *given, known)
         for f in fields(DecisionRules):
             _, known = decided_by(RULES.without(f.name), *given, known)

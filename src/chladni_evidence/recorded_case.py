@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from chladni.decision.hypothesis_table import (
+    AlternativeRow,
     CalibratedDeck,
     HypothesisTable,
     Left,
-    Rival,
     Row,
     SetRow,
     Votes,
@@ -108,6 +108,8 @@ def _row(given: Json) -> Row:
 
 
 def _set(given: Json) -> SetRow:
-    rivals = tuple(tuple(Rival(**r) for r in rivals) for rivals in given["rivals"])
+    alternatives = tuple(
+        tuple(AlternativeRow(**r) for r in alternatives) for alternatives in given["alternatives"]
+    )
     kept = {k: tuple(given[k]) for k in ("members", "gains")}
-    return SetRow(**{**given, **kept, "rivals": rivals})
+    return SetRow(**{**given, **kept, "alternatives": alternatives})

@@ -17,11 +17,11 @@ from chladni.errors import ModelError
 from chladni.updating.deciding import Measured
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.discrepancy import learned
+from chladni.updating.frequency_dependent_stiffness import Dissipated
 from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.likelihood import Responses
-from chladni.updating.map_fit import MassMeasurement, beside, constants
+from chladni.updating.map_fit import MassMeasurement, constants, prior_residuals
 from chladni.updating.reduced_model import State, evaluate
-from chladni.updating.frequency_dependent_stiffness import Dissipated
 from chladni.updating.sensor_errors import SensorErrors, Side
 
 Arrays = dict[str, np.ndarray]
@@ -92,7 +92,7 @@ def _row(hypothesis: HypothesisFit, data: Responses, mass: MassMeasurement | Non
     shape = (*data.use.shape, data.values.shape[2])
     half = len(J) // 2
     each = (J[:half] + 1j * J[half:]).T.reshape(-1, *shape) * sd
-    r0, J0 = beside(fit.effects, mass, fit.x, state)
+    r0, J0 = prior_residuals(fit.effects, mass, fit.x, state)
     return RecordedRow(
         plain.deviation(state), each.astype(np.complex64), r0, J0, constants(fit.effects),
         None if hypothesis.effect in fit.effects else bare,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .article_modes import ArticleModes
-from .mesh_transfer import Footing
+from .mesh_transfer import MeshTransfer
 
 LINES_AT_ONCE = 64
 Law = Callable[[np.ndarray], np.ndarray]  # complex (n_f,) of s (n_f,) [rad/s]
@@ -28,7 +28,7 @@ class Coupling:
     stiffness: Callable[[np.ndarray], np.ndarray]
 
 
-def seen(modes: ArticleModes, foot: Footing, directions: np.ndarray) -> np.ndarray:
+def seen(modes: ArticleModes, foot: MeshTransfer, directions: np.ndarray) -> np.ndarray:
     """Mode shapes (k, r) at places along directions."""
     motion = np.einsum("kc,kcir->kir", foot.weights, modes.at(foot.rows))
     return np.einsum("kir,ki->kr", motion, directions)

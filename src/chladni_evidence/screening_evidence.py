@@ -24,7 +24,7 @@ from chladni.updating.channel_screening import against_model
 
 from .article_modes import ArticleModes, article_modes
 from .bench_of_structure import Bench, form_bench, glue_candidates, panel_bench
-from .mesh_transfer import Footing, Spots, footing
+from .mesh_transfer import MeshTransfer, Spots, mesh_transfer
 from .part_scatter import scattered
 from .response_of_article import accelerance, seen
 
@@ -45,15 +45,15 @@ class Sound:
     modes: ArticleModes
     phi_in: np.ndarray
     zeta: np.ndarray
-    foot: Footing
+    foot: MeshTransfer
     model: Modelled
     outputs: Spots
     elsewhere: np.ndarray  # (k, r) shapes at other places, along the direction of the sheet
     places: np.ndarray  # (k, 3) [m], of these
 
-    def foot_of(self, i: int) -> Footing:
+    def foot_of(self, i: int) -> MeshTransfer:
         """Footing of one output."""
-        return Footing(self.foot.rows[[i]], self.foot.weights[[i]])
+        return MeshTransfer(self.foot.rows[[i]], self.foot.weights[[i]])
 
     def measured(self, values: np.ndarray, rng: np.random.Generator) -> FRF:
         """Noiseless accelerances as the front end records them, with noise."""
@@ -79,9 +79,9 @@ def sound(structure: str, seed: int, long: bool = False) -> Sound:
     spots = bench.outputs
     if rng.integers(2):  # the drive point is measured, too
         spots = _joined(bench.outputs, bench.drive)
-    out, drive = footing(article, spots), footing(article, bench.drive)
+    out, drive = mesh_transfer(article, spots), mesh_transfer(article, bench.drive)
     free = _places(bench, spots, rng)
-    other = footing(article, free)
+    other = mesh_transfer(article, free)
     rows = np.concatenate([out.rows.ravel(), other.rows.ravel()])
     modes = article_modes(article, rows, drive.rows.ravel(), float(lines[-1]))
     phi_o, phi_i = seen(modes, out, spots.directions), seen(modes, drive, bench.drive.directions)

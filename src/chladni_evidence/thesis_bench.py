@@ -30,8 +30,8 @@ from chladni.bench.sine_sweep import swept
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
-from chladni.progress import Progress, silent
 from chladni.parallel import one_blas_thread
+from chladni.progress import Progress, silent
 from chladni.workflows.benched_article import benched, true_places
 from chladni.workflows.virtual_test import ABOVE_BAND
 from chladni_specimens.tailgate.design import TailgateDesign

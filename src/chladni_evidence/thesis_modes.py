@@ -15,7 +15,10 @@ from chladni.workflows.identify import firm
 
 BAND = (10.0, 195.0)  # [Hz], section 5.1
 CORDS = (23.0, 27.5)  # [Hz] excluded, section 5.1.1
-NEAR, CORD_DAMPING = 0.01, 0.014  # a cord's pole: this near to its resonance and damped by more
+NEAR_CORD, CORD_DAMPING = (
+    0.01,
+    0.014,
+)  # a cord's pole: this near to its resonance and damped by more
 SAME = 0.9  # MAC of a pole with a stronger one in whose bandwidth it lies: the same mode twice
 
 
@@ -64,7 +67,7 @@ def article_identified(recording: BenchRecording, rings: np.ndarray) -> ArticleI
     use = used_lines(frf.frequency)
     found = identify(frf, BAND, use=use)
     struck = ghosts(found, stabilisation(frf, found, use)) | ~firm(found) | doubled(found)
-    near = np.abs(found.frequency[:, None] / rings - 1).min(axis=1) < NEAR
+    near = np.abs(found.frequency[:, None] / rings - 1).min(axis=1) < NEAR_CORD
     of_cord = near & (found.damping > CORD_DAMPING)
     inside, f = found.inside, found.frequency
     return ArticleIdentified(

@@ -25,7 +25,7 @@ from chladni.io.tables.write_tables import write_npz
 from chladni.units import UNITS
 from chladni.updating.preparation import prepare
 from chladni.workflows.case_model import model_frf
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import question_of
 
 from .test_case import deck
 
@@ -216,7 +216,7 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
     (folder / "sensors.csv").write_text(sensors)
     try:
         case = load_case(folder)
-        ready = prepare(question(case))
+        ready = prepare(question_of(case))
     except ChladniError as error:
         return f"refused: {error}"
     problem, mark = ready.problem, hashlib.sha256()
@@ -227,7 +227,7 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
             if isinstance(array, np.ndarray):
                 mark.update(np.ascontiguousarray(array).tobytes())
     for effect in problem.base:
-        if effect.kind == "ordinary" or effect.name == "gain":
+        if effect.kind == "calibration" or effect.name == "gain":
             mark.update(effect_bytes(effect))
     known = (problem.mass_measurement, problem.setup.hangers, problem.setup.sensors)
     mark.update(repr(known).encode())

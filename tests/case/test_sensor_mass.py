@@ -24,7 +24,7 @@ from chladni.workflows.calibrate import calibrate
 from chladni.workflows.case_model import model_frf
 from chladni.workflows.frf import frf, placed_layout
 from chladni.workflows.loaded_model import as_model
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import question_of
 from chladni.workflows.virtual_test import BenchSettings, virtual_test
 
 from .test_case import deck
@@ -108,7 +108,7 @@ def test_a_bench_that_the_case_is_put_on_weighs_them_as_the_case_does(folder: Pa
 
 def test_they_lower_the_frequencies_the_model_is_compared_by(folder: Path) -> None:
     case = load_case(folder)
-    reduced = prepare(question(case)).problem.reduced
+    reduced = prepare(question_of(case)).problem.reduced
     due = normal_modes(structure(case.tested(case.assembly)).system, 12).frequency[6:]
     bare = normal_modes(structure(case.assembly).system, 12).frequency[6:]
     assert_allclose(reduced.frequency[6:12], due, rtol=1e-6)
@@ -137,5 +137,5 @@ def test_calibration_leaves_an_article_that_is_right_as_it_is(folder: Path) -> N
 def test_rows_no_recording_has_are_named_and_weigh_nothing(folder: Path) -> None:
     (folder / "sensors.csv").write_text(SENSORS + "30:+Z,30,,,,+Z,output,0.5\n")
     case = load_case(folder)
-    assert sum(m for _, m in case.carried) == pytest.approx(0.09)
+    assert sum(m for _, m in case.sensor_masses) == pytest.approx(0.09)
     assert any("30:+Z" in note and "no recording" in note for note in case.notes)

@@ -18,7 +18,7 @@ from chladni.io.formed_files import read_formed
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS
 from chladni.workflows.diagnosis_pipeline import _deck
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import box, folded_panel, plate
 from chladni_specimens.tailgate.design import TailgateDesign
 
@@ -388,7 +388,7 @@ def test_answer_stands_where_no_card_holds_the_change(case, tmp_path):
     shells = opened.assembly.shells
     thickness = shells.thickness * np.where(np.arange(len(shells)) == 3, 0.9, 1.0)[:, None]
     final = replace(opened.assembly, shells=replace(shells, thickness=thickness))
-    deck, notes = _deck(opened, question(opened), modelled(opened.assembly, 100.0), final)
+    deck, notes = _deck(opened, question_of(opened), modelled(opened.assembly, 100.0), final)
     assert deck.changes is None
     assert deck.model.assembly is final
     assert len(notes) == 1

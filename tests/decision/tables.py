@@ -12,7 +12,7 @@ from chladni.decision.hypothesis_table import (
     SetRow,
     Votes,
     after,
-    renewed,
+    refined,
 )
 from chladni.decision.reasons import Decision
 
@@ -36,21 +36,21 @@ def table(*rows, null=None, then=None, sets=(), after_lead=1.0, **more):
     for r in every:
         changed = (then or {}).get(r.key, {})
         held[r.key] = r
-        held[renewed(r.key)] = replace(r, key=renewed(r.key), **changed)
+        held[refined(r.key)] = replace(r, key=refined(r.key), **changed)
     for made, votes, _ in sets:
         for k, v in enumerate(votes):
             held[made.member(k)] = Row(made.member(k), (made.members[k],), 0.0, votes=v)
     for r in rows:
-        for lead in (singles[0], renewed(singles[0])):
-            key = after(renewed(r.key), lead)
+        for lead in (singles[0], refined(singles[0])):
+            key = after(refined(r.key), lead)
             held[key] = Row(key, r.names, 0.0, p_damping=after_lead)
     given = {"decks": DECKS, "families": 20, **more}
     return HypothesisTable(held, singles, tuple(made for made, _, _ in sets), **given)
 
 
-def together(key, gains, due, votes=(FOR, FOR), ahead=1e3, rivals=((), ()), **more):
+def together(key, gains, due, votes=(FOR, FOR), ahead=1e3, alternatives=((), ()), **more):
     """A set of two effects: as the decision reads it, votes of its members, its row."""
-    made = SetRow(key, ("crack", "point-mass"), gains, due, ahead, rivals)
+    made = SetRow(key, ("crack", "point-mass"), gains, due, ahead, alternatives)
     return made, votes, replace(row("crack and point-mass", 1e3, **more), key=key)
 
 

@@ -10,15 +10,15 @@ from chladni.decision.decide import RULES, decide
 from chladni.decision.decision_rules import TIED, DecisionRules, gain_due
 from chladni.decision.hypothesis_table import (
     NULL,
+    AlternativeRow,
     Ask,
     CalibratedDeck,
     HypothesisTable,
     Left,
-    Rival,
     Row,
     Votes,
     Wanted,
-    renewed,
+    refined,
 )
 from chladni.decision.reasons import ALONE, BEYOND, Decision, Reason
 from chladni.decision.tied import leading, tied
@@ -248,8 +248,11 @@ def test_a_set_that_pays_in_part_is_asked_where_the_leader_leaves_too_much():
 
 
 def test_what_may_stand_in_the_place_of_one_is_one_of_several():
-    rivals = ((), (Rival("adhesive-stiffness", 4.0, "E of 300 MPa is that of no sealant"),))
-    made = table(*SINGLES, sets=[together("set 0", PAID, TWO, rivals=rivals)])
+    alternatives = (
+        (),
+        (AlternativeRow("adhesive-stiffness", 4.0, "E of 300 MPa is that of no sealant"),),
+    )
+    made = table(*SINGLES, sets=[together("set 0", PAID, TWO, alternatives=alternatives)])
     assert decision(made).one_of == ("point-mass", "adhesive-stiffness")
 
 
@@ -338,7 +341,7 @@ def test_what_relieves_strained_joints_is_one_of_both():
 
 
 @pytest.mark.parametrize(
-    ("found", "written", "plain", "leaning", "deck"),
+    ("found", "written", "plain", "implausible", "deck"),
     [
         ((0.9, 1.0), (0.9, 1.0), (0.9, 0.9), False, "FOUND"),
         ((0.9, 1.1), (0.9, 0.9), (0.9, 0.9), False, "WRITTEN"),
@@ -349,10 +352,10 @@ def test_what_relieves_strained_joints_is_one_of_both():
     ],
 )
 def test_numbers_of_a_calibration_serve_no_worse_than_the_deck(
-    found, written, plain, leaning, deck
+    found, written, plain, implausible, deck
 ):
     each = dict(zip(CalibratedDeck, (found, written, plain, (1.0, 1.0)), strict=True))
-    answer = decision(table(decks=each, nominal=100.0, leaning=leaning))
+    answer = decision(table(decks=each, nominal=100.0, implausible=implausible))
     assert answer.deck is CalibratedDeck[deck]
     assert answer.verdict == (LITTLE if deck == "GIVEN" else "calibration only")
 
@@ -392,12 +395,12 @@ def test_it_asks_for_one_fit_by_name_and_never_for_more_than_it_needs():
         known = known.having(
             {
                 Ask.TEST: replace(known.rows[wanted.key], p=due.p),
-                Ask.RENEWAL: replace(bare, key=renewed("crack")),
+                Ask.RENEWAL: replace(bare, key=refined("crack")),
                 Ask.VOTES: replace(known.rows.get(wanted.key, due), votes=due.votes),
                 Ask.LEFT: replace(known.rows.get(wanted.key, due), left=due.left),
             }[wanted.ask]
         )
-    again = renewed("crack")
+    again = refined("crack")
     due = [(Ask.TEST, "crack"), (Ask.RENEWAL, "crack"), (Ask.VOTES, again), (Ask.LEFT, again)]
     assert asked == due
     assert wanted.named
@@ -425,7 +428,7 @@ def test_every_table_has_a_verdict_with_its_reason(rows, enough):
     assert found.named == (found.verdict in (NAMED, "measurement fault"))
     if found.named:
         lead = made.rows[found.order[0]]
-        assert made.gain(lead) + lead.heard().news > found.due
+        assert made.gain(lead) + lead.held_out_votes().news > found.due
         assert enough
         assert lead.fits(RULES)
     else:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from chladni.effects import point_mass
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.point_mass import SHARE, TRIED
 from chladni.effects.search_context import SearchContext
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
@@ -18,7 +18,7 @@ from chladni_specimens.plates import plate
 def where():
     reduced = reduced_problem(plate(0.4, 0.3, 16, 12, 1.5e-3), 250.0)
     setup = Setup((), (), float(reduced.groups.weight.sum()), 200.0)
-    return Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    return EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
 
 
 def proposed(where, more):

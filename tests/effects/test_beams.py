@@ -8,15 +8,15 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import Basis
+from chladni.effects.calibration_parameters import calibration_parameter, defaults, random_field
 from chladni.effects.effect import WIDER
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.user_parameters import freed, with_factor
 from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.calibration_parameters import defaults, ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.registry import families
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.effects.suspension import suspension
+from chladni.effects.user_parameters import user_parameter, with_factor
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Beams
@@ -45,7 +45,7 @@ def reduced():
 @pytest.fixture(scope="module")
 def where(reduced):
     setup = Setup((), (8, 12), mass_properties(reduced.structure.assembly)[0], TOP)
-    return Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    return EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
 
 
 def full(assembly, count):
@@ -64,7 +64,7 @@ def test_the_groups_have_all_that_the_beams_have(reduced):
 
 @pytest.mark.parametrize("quantity", ["E", "rho", "wall"])
 def test_a_factor_on_a_part_is_exact(reduced, quantity):
-    effect, x = ordinary(reduced.groups, quantity, [1]), np.array([0.3])
+    effect, x = calibration_parameter(reduced.groups, quantity, [1]), np.array([0.3])
     written = structure(effect.apply(frame(), x)).system
     q = np.random.default_rng(0).normal(size=(len(written.dofs), 3))
     K, M = products(reduced.model, [effect], x, q)
@@ -76,7 +76,7 @@ def test_a_factor_on_a_part_is_exact(reduced, quantity):
 
 def test_what_a_user_frees_of_beams_is_what_the_study_writes(reduced):
     free = FreeParameter("w", "wall", positions=(0, 1))
-    effect = freed(reduced.groups, free)
+    effect = user_parameter(reduced.groups, free)
     one, two = effect.apply(frame(), np.array([0.2])), with_factor(frame(), free, np.exp(0.2))
     assert one.parts == two.parts
     assert one.parts[0].section.J == pytest.approx(np.exp(0.2) * frame().parts[0].section.J)
@@ -92,14 +92,14 @@ def test_tubes_have_a_wall_and_solid_or_open_sections_have_none(reduced):
     assert not bar.tube
     assert not channel.tube
     with pytest.raises(TypeError, match="no t"):
-        ordinary(reduced.groups, "t", [0])
+        calibration_parameter(reduced.groups, "t", [0])
 
 
 def test_non_structural_mass_stays_when_rho_changes():
     heavy = tuple(replace(p, section=replace(p.section, nonstructural=0.5)) for p in frame().parts)
     made = frame().with_parts(heavy)
     reduced = reduced_problem(made, TOP)
-    effect, x = ordinary(reduced.groups, "rho", [0, 1]), np.array([-0.5])
+    effect, x = calibration_parameter(reduced.groups, "rho", [0, 1]), np.array([-0.5])
     due = mass_properties(effect.apply(made, x))[0]
     assert_allclose(evaluate(reduced.model, [effect], x).weight, due, rtol=1e-9)
     assert due > mass_properties(frame())[0] * np.exp(-0.5) + 1.0

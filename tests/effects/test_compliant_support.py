@@ -11,8 +11,8 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects import compliant_support
 from chladni.effects.compliant_support import on_springs
 from chladni.effects.discretisation import mesh_errors
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.sensor_mass import sensor_mass
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.base_motion import base_motion
@@ -47,7 +47,7 @@ def where(problem, sensors=()):
     setup = Setup(sensors, (), mass_properties(problem.structure.assembly)[0], TOP)
     shapes = problem.shapes
     f = problem.frequency[: shapes.shape[1]]
-    return Surroundings(problem.groups, problem.grids, problem.candidates, setup, f, shapes)
+    return EffectContext(problem.groups, problem.grids, problem.candidates, setup, f, shapes)
 
 
 class Context:
@@ -59,13 +59,13 @@ class Context:
         self.where = where(problem)
 
     def scores(self, effect, starts):
-        return np.full((1, len(starts)), -effect.way.frame[0][2])
+        return np.full((1, len(starts)), -effect.direction.frame[0][2])
 
 
 def proposed(problem):
     """Of each clamp what bends across the strip, from x = 0 on."""
     every = [c.effect for c in compliant_support.candidates(Context(problem))]
-    return sorted((e for e in every if e.way.frame[0][2] > 0.9), key=lambda e: e.point)
+    return sorted((e for e in every if e.direction.frame[0][2] > 0.9), key=lambda e: e.point)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def bending(k_over_EI):
 def test_a_root_that_turns_is_a_beam_on_a_torsional_spring(problem, clamp):
     """k from almost rigid to almost a hinge (Gorman 1975, ch. 1)."""
     assert [p.name for p in clamp.parameters] == ["K", "K_rot"]
-    assert_allclose(clamp.way.motions(), np.eye(6)[[2, 4]])
+    assert_allclose(clamp.direction.motions(), np.eye(6)[[2, 4]])
     EI = E * B * T**3 / 12
     for ratio in (1e4, 10.0, 1.0, 1e-2):
         k = ratio * EI / L
@@ -278,5 +278,5 @@ def test_what_follows_a_clamp_has_no_mesh_error():
     for x in (np.array([-6.0, -6.0]), np.array([-2.0, -2.0])):
         model = built.model_for(effect, x)
         lam = evaluate(model, [over, effect], np.r_[1.0, x], False).lam[:3]
-        due = full(on_springs(fine, clamp, effect.way, effect.springs(x)), 3)
+        due = full(on_springs(fine, clamp, effect.direction, effect.springs(x)), 3)
         assert_allclose(np.sqrt(lam) / (2 * np.pi), due, rtol=3e-3)

@@ -12,24 +12,24 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects import discretisation as mesh
 from chladni.effects import registry
 from chladni.effects import sensor_fault as sensors
+from chladni.effects.calibration_parameters import calibration_parameter, channel_gain, random_field
 from chladni.effects.crack import LineFinder, crack
 from chladni.effects.effect import Effect, Parameter
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.element_groups import element_groups
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.fold_bending import FoldBending
-from chladni.effects.user_parameters import freed
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.mass_patch import MassPatch
 from chladni.effects.membrane_prestress import prestress
 from chladni.effects.model_families import model_families
-from chladni.effects.calibration_parameters import channel_gain, ordinary, random_field
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
 from chladni.effects.stiffness_patch import StiffnessPatch
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.effects.suspension import suspension
 from chladni.effects.thickness_distribution import ThicknessDistribution
+from chladni.effects.user_parameters import user_parameter
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import solved
 from chladni.geometry.refine import refined
@@ -46,7 +46,7 @@ NAMES = ("family",
     "E", "rho", "t", "scatter", "gain", "orthotropic-material", "point-mass", "extra-support",
     "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
     "joint-footprint",
-    "freed", "local-resonator", "stiffness-patch", "mass-patch", "crack",
+    "user_parameter", "local-resonator", "stiffness-patch", "mass-patch", "crack",
     "membrane-prestress", "fold-bending",
 )  # fmt: skip
 
@@ -71,7 +71,7 @@ def cases(reduced):
     groups = reduced.groups
     corners = (1, 7, 57, 63)
     setup = Setup(tuple(((g, 1.0),) for g in corners), (7, 63), float(groups.weight.sum()), TOP)
-    where = Surroundings(groups, reduced.grids, reduced.candidates, setup)
+    where = EffectContext(groups, reduced.grids, reduced.candidates, setup)
     k = reduced.grids.position(25)
     line = LineFinder.of(reduced.structure.assembly).drawn(np.array([20]), (1.7,))[0]
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05, 0.3])
@@ -83,9 +83,9 @@ def cases(reduced):
     n = len(waves.parameters)
     means = np.array([p.mean for p in ortho.parameters])
     found = {
-        "E": (ordinary(groups, "E", [0]), [0.07], [0]),
-        "rho": (ordinary(groups, "rho", [0]), [-0.05], [0]),
-        "t": (ordinary(groups, "t", [0]), [0.04], [0]),
+        "E": (calibration_parameter(groups, "E", [0]), [0.07], [0]),
+        "rho": (calibration_parameter(groups, "rho", [0]), [-0.05], [0]),
+        "t": (calibration_parameter(groups, "t", [0]), [0.04], [0]),
         "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
         "gain": (channel_gain(CHANNELS, 0.5), [0.3], [0]),
         "orthotropic-material": (ortho, [0.18, -0.22, 0.1, means[3] + 0.1], means),
@@ -121,7 +121,7 @@ def cases(reduced):
     )
     found["family"] = (model_families(reduced.structure)[0], [0.3], [0])
     number = FreeParameter("E", "E", ("sheet",), 0.1, 0.8, 1.3, positions=(0,))
-    found["freed"] = (freed(groups, number), [0.2], [0])
+    found["user_parameter"] = (user_parameter(groups, number), [0.2], [0])
     return {
         name: Case(
             e, np.array(x, float), np.array(idle, float), reduced.model_for(e, np.array(x, float))

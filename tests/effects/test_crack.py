@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse.csgraph import connected_components
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.crack import (
-    LEAST,
+    LEAST_LEFT,
     WORTH,
     LineFinder,
     _at_rest,
@@ -18,7 +19,6 @@ from chladni.effects.crack import (
     left,
 )
 from chladni.effects.element_groups import element_groups
-from chladni.effects.calibration_parameters import ordinary
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
 from chladni.updating.likelihood import Responses
@@ -175,7 +175,7 @@ def test_a_sheet_too_coarse_for_a_line_has_none():
 
 def test_something_is_always_left():
     x = np.linspace(-50, 50, 11)
-    assert all(LEAST <= left(v) <= 1 for v in x)
+    assert all(LEAST_LEFT <= left(v) <= 1 for v in x)
     assert left(-40.0) == pytest.approx(1, abs=1e-15)
 
 
@@ -191,10 +191,12 @@ def scanned():
     true = lines[7]
     effect = crack(reduced.groups, true, 1)
     x = np.array([-4.0])
-    empty = Responses(np.ones((60, 4, 1), complex), s, outputs, inputs, use).over(reduced.model)
+    empty = Responses(np.ones((60, 4, 1), complex), s, outputs, inputs, use).rebased(reduced.model)
     with_it = evaluate(reduced.model, [effect], x, False)
-    data = Responses(empty.model(with_it), s, outputs, inputs, use).over(reduced.model)
-    base = baseline(reduced.model, [ordinary(reduced.groups, "E", [0])], data, None, np.zeros(1))
+    data = Responses(empty.model(with_it), s, outputs, inputs, use).rebased(reduced.model)
+    base = baseline(
+        reduced.model, [calibration_parameter(reduced.groups, "E", [0])], data, None, np.zeros(1)
+    )
     return reduced, data, base, lines, true, 1 - left(x[0])
 
 

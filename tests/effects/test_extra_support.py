@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import WIDER
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.assemble import structure
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
@@ -24,7 +24,7 @@ def reduced():
 @pytest.fixture(scope="module")
 def where(reduced):
     setup = Setup((), (), float(reduced.groups.weight.sum()), 200.0)
-    return Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    return EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
 
 
 @pytest.fixture(scope="module")

@@ -11,16 +11,16 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects import registry
+from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.effect import Effect
+from chladni.effects.effect_context import Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.family import Article
 from chladni.effects.identified_damping import IdentifiedDamping
 from chladni.effects.joints import beads, stiffness
 from chladni.effects.model_families import model_families
-from chladni.effects.calibration_parameters import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.rigid_ties import on_firm_springs
-from chladni.effects.effect_context import Setup
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.geometry.sampling import farthest_point_sample
@@ -64,7 +64,7 @@ class Ground:
 def updating_context(reduced, data, setup, sensors):
     """A search with E free, and its null."""
     base = (
-        ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01),
+        calibration_parameter(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01),
         *(e for e in model_families(reduced.structure) if "shear" not in e.text),
     )  # fmt: skip
     labels = tuple(f"{g}:+Z" for g in sensors)
@@ -79,8 +79,10 @@ def recorded(reduced, sensors):
     s = 2 * np.pi * np.linspace(30, TOP, 50) * (0.05 + 1j)
     use = np.ones((50, len(sensors)), bool)
     empty = Responses(np.ones((50, len(sensors), 1), complex), s, rows, rows[[4]], use)
-    data = empty.over(reduced.model)
-    stiffer = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.04]))
+    data = empty.rebased(reduced.model)
+    stiffer = evaluate(
+        reduced.model, [calibration_parameter(reduced.groups, "E", [0])], np.array([0.04])
+    )
     gains = np.where(np.arange(len(sensors)) == 2, 0.5, 1.0)[:, None]
     return replace(data, values=data.model(stiffer) * gains)
 

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.joints import (
     MOST_RUN,
     Connection,
@@ -19,7 +20,6 @@ from chladni.effects.joints import (
     without_joint,
 )
 from chladni.effects.model_families import joint_families
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.weld_compliance import WeldCompliance, of_one, proposed
 from chladni.effects.weld_missing import WeldMissing
 from chladni.fem.assemble import structure
@@ -84,13 +84,15 @@ def data(seam, ground, welds):
     empty = Responses(np.ones((25, 6, 1), complex), s, rows, rows[[0]], use)
     gone = without_joint(seam, joined([welds[k].joint for k in GONE]))
     values = s[:, None, None] ** 2 * receptances(gone, empty)
-    return replace(empty, values=values).over(ground.model)
+    return replace(empty, values=values).rebased(ground.model)
 
 
 @pytest.fixture(scope="module")
 def context(ground, welds, data):
     """What a search offers, on this recording."""
-    base = baseline(ground.model, [ordinary(ground.groups, "E", [0])], data, None, np.zeros(1))
+    base = baseline(
+        ground.model, [calibration_parameter(ground.groups, "E", [0])], data, None, np.zeros(1)
+    )
     made = SimpleNamespace(
         problem=SimpleNamespace(reduced=ground), baselines=(base, base),
         loosened=tuple(welds), loosened_rows=loosened_rows(ground),
@@ -167,7 +169,7 @@ def test_the_scan_of_a_run_becomes_the_full_solve(seam, ground, welds, data):
         (run,) = together(problem, [[welds[k].joint for k in GONE]])
         run = run if R is None else replace(run, R=R)
         state = evaluate(problem.model, [], np.zeros(0), False)
-        H = loosened_receptance(state, problem, data.over(problem.model), run, left)[0]
+        H = loosened_receptance(state, problem, data.rebased(problem.model), run, left)[0]
         return np.linalg.norm(H - due)
 
     apart = block_diag(*(welds[k].R for k in GONE))

@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Parameter
 from chladni.effects.element_groups import element_groups
 from chladni.effects.fold_bending import FoldBending, fold_bending
-from chladni.effects.calibration_parameters import ordinary
 from chladni.fem.assemble import structure
 from chladni.geometry.folds import share_at_folds
 from chladni.updating.reduced_model import evaluate, reduce
@@ -63,7 +63,7 @@ def test_of_a_flat_plate_the_factor_goes_with_the_square_of_frequencies():
     model = reduce(groups, normal_modes(groups.structure.system, band=400.0).shapes)
     bent = FoldBending((Parameter("k", "-", 0.0, 1.0),), "all", share=np.ones(len(groups)))
     nominal, states = evaluate(model, [], np.zeros(0), False), []
-    for effect in (bent, ordinary(groups, "E", [0])):
+    for effect in (bent, calibration_parameter(groups, "E", [0])):
         states.append(evaluate(model, [effect], np.array([0.2]), False))
     flexible = nominal.lam > 1.0
     ratio = states[0].lam[flexible] / nominal.lam[flexible]

@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.adhesive_stiffness import SEALANT, beads_of
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.contact_stiffness import close_places
 from chladni.effects.joints import alone, beads, fasteners, with_factor_on, without_joint
 from chladni.effects.model_families import joint_families
-from chladni.effects.calibration_parameters import ordinary
-from chladni.effects.weld_compliance import MOST, NONE_LEFT, SOUND, WeldCompliance, of_one
+from chladni.effects.weld_compliance import MOST_LN_LEFT, NONE_LEFT, SOUND, WeldCompliance, of_one
 from chladni.effects.weld_missing import WeldMissing
 from chladni.fem.assemble import structure
 from chladni.updating.fastener_scan import (
@@ -115,7 +115,7 @@ def test_names_follow_what_is_carried(found, families):
     assert effect.becomes(np.array([NONE_LEFT - 0.1, 0.0])) == "weld-missing"
     assert effect.becomes(np.array([NONE_LEFT + 0.1, 0.0])) == ""
     left = [effect.left(x)[0] for x in (-2.0, 0.0, 30.0, SOUND)]
-    assert_allclose(left, one.share.min() * np.exp([-2.0, 0.0, MOST, 0.0]) ** [1, 1, 1, 0]
+    assert_allclose(left, one.share.min() * np.exp([-2.0, 0.0, MOST_LN_LEFT, 0.0]) ** [1, 1, 1, 0]
                     * np.array([1, 1, 1, 1 / one.share.min()]), rtol=1e-6)  # fmt: skip
 
 
@@ -143,8 +143,10 @@ def scanned(deck, reduced, found):
     d = 1 / ((2 * np.pi * modes.frequency) ** 2 + s[:, None] ** 2)
     H = s[:, None, None] ** 2 * np.einsum("or,fr,ir->foi", phi, d, phi[[0]])
     ground = reduced_problem(deck, TOP, rows)
-    data = Responses(H, s, rows, rows[[0]], use).over(ground.model)
-    base = baseline(ground.model, [ordinary(ground.groups, "E", [0])], data, None, np.zeros(1))
+    data = Responses(H, s, rows, rows[[0]], use).rebased(ground.model)
+    base = baseline(
+        ground.model, [calibration_parameter(ground.groups, "E", [0])], data, None, np.zeros(1)
+    )
     return ground, data, base
 
 
@@ -161,7 +163,7 @@ def test_the_scan_becomes_the_full_solve(deck, found, scanned):
     for reach in (2.5, 5.0):
         ground = reduced_problem(deck, TOP, data.outputs, reach=reach)
         lines = replace(data, s=s, use=data.use[: len(s)], values=data.values[: len(s)])
-        over[reach] = ground, lines.over(ground.model), singles(loosened_rows(ground))
+        over[reach] = ground, lines.rebased(ground.model), singles(loosened_rows(ground))
 
     def solved(system):
         K, M = system.K.toarray(), system.M.toarray()

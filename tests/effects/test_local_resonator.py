@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.point_mass import PointMass
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import LIMIT, accuracy
 from chladni.updating.likelihood import Responses
@@ -26,7 +26,7 @@ def reduced():
 @pytest.fixture(scope="module")
 def where(reduced):
     setup = Setup((), (), float(reduced.groups.weight.sum()), TOP)
-    return Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    return EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_it_answers_with_its_dynamic_stiffness_at_every_frequency(reduced, lump,
     rows = reduced.grids.rows[[0, 5, 40]]
     use = np.ones((40, 3), bool)
     data = Responses(np.ones((40, 3, 1), complex), s, rows, rows[[2]], use, "receptance")
-    data = data.over(model)
+    data = data.rebased(model)
     plain = evaluate(model, [], x[:0], False)
     (tangent,) = [t for t in lump.terms(x) if t.own is None]  # carried along the sheet
     b_t = model.rows(tangent.rows, keep=False) @ plain.phi
@@ -88,7 +88,7 @@ def errors(times):
     deck = plate(0.4, 0.3, 8 * times, 6 * times, 1.5e-3)
     reduced = reduced_problem(deck, TOP)
     setup = Setup((), (), float(reduced.groups.weight.sum()), TOP)
-    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
     k = int(np.argmin(np.linalg.norm(where.grids.point - [0.25, 0.1, 0], axis=1)))
     lump = LocalResonator.near(where, k)
     x = at(lump, 0.03, 110.0)
@@ -112,6 +112,6 @@ def test_what_the_basis_lacks_is_found_with_the_lump_on_it(reduced, lump):
     """Without its static response the estimate sees the error, and mends it."""
     x = at(lump, 0.1, 150.0)
     poor = accuracy(reduced, reduced.model, [lump], x, TOP)
-    mended = accuracy(reduced, poor.renewed(reduced.model), [lump], x, TOP)
+    mended = accuracy(reduced, poor.refined(reduced.model), [lump], x, TOP)
     assert poor.worst > LIMIT
     assert mended.worst < poor.worst / 4

@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.joints import fasteners
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.over_constraint import RIGID, over_constraint
 from chladni.effects.rigid_ties import on_firm_springs, rigid_ties
 from chladni.fem.assemble import structure
@@ -117,7 +117,7 @@ def test_firm_springs_change_nothing_and_are_no_fasteners_of_the_deck(plates, re
 @pytest.mark.parametrize("x", [-3.0, 0.0, 3.0])
 def test_positive_whatever_the_sheets_are_made_of(reduced, effect, x):
     """Half and twice the modulus of both sheets: what is let loose is the spring's alone."""
-    softer = ordinary(reduced.groups, "E", [0, 1])
+    softer = calibration_parameter(reduced.groups, "E", [0, 1])
     model = reduced.model_for(effect, np.array([x]))
     for e in (-0.7, 0.7):
         lam = evaluate(model, [softer, effect], np.array([e, x]), False).lam

@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.search_context import best_starts
-from chladni.effects.shaker_restraint import MOST, shaker_restraint
-from chladni.effects.effect_context import Setup, Surroundings
+from chladni.effects.shaker_restraint import MOST_DRIVES, shaker_restraint
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.point_masses import with_masses
@@ -40,7 +40,7 @@ def setup(problem, drives):
 
 
 def where(problem, drives):
-    return Surroundings(problem.groups, problem.grids, problem.candidates, setup(problem, drives))
+    return EffectContext(problem.groups, problem.grids, problem.candidates, setup(problem, drives))
 
 
 @pytest.fixture(scope="module")
@@ -91,12 +91,12 @@ def test_a_gauge_alone_is_a_mass_at_the_drive_point_that_is_not_weighed(problem,
 
 
 def test_only_where_it_is_driven_and_by_few_enough_to_be_shakers(problem):
-    grids = problem.grids.grids[:: len(problem.grids) // (MOST + 1)].tolist()
+    grids = problem.grids.grids[:: len(problem.grids) // (MOST_DRIVES + 1)].tolist()
     drives = tuple(((((int(g), 1.0),), UP)) for g in grids)
-    some = shaker_restraint(where(problem, drives[:MOST]))
-    assert [e.grids for e in some] == [(g,) for g in grids[:MOST]]
-    assert all(e.trials_factor == MOST for e in some)
-    assert shaker_restraint(where(problem, drives[: MOST + 1])) == []
+    some = shaker_restraint(where(problem, drives[:MOST_DRIVES]))
+    assert [e.grids for e in some] == [(g,) for g in grids[:MOST_DRIVES]]
+    assert all(e.trials_factor == MOST_DRIVES for e in some)
+    assert shaker_restraint(where(problem, drives[: MOST_DRIVES + 1])) == []
     assert shaker_restraint(where(problem, ())) == []
 
 
@@ -119,10 +119,10 @@ def test_a_support_elsewhere_is_none_of_its_doing(problem, restraint):
     empty = Responses(np.ones((60, 6, 1), complex), s, rows, rows[[5]], np.ones((60, 6), bool))
     model = problem.model_for(support, x)
     truth = evaluate(model, [support], x)
-    data = replace(empty, values=empty.over(model).model(truth))
-    base = (ordinary(problem.groups, "E", [0]),)
+    data = replace(empty, values=empty.rebased(model).model(truth))
+    base = (calibration_parameter(problem.groups, "E", [0]),)
     asked = UpdatingProblem(
-        problem, data.over(problem.model), None, base, (), setup(problem, on.setup.drives)
+        problem, data.rebased(problem.model), None, base, (), setup(problem, on.setup.drives)
     )
     start = np.zeros(1)
     plain = asked.fitted_with(Effect(), np.zeros(0), start)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.mass_patch import MassPatch, spread_mass
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.property_bands import BANDS, levels
 from chladni.effects.stiffness_patch import StiffnessPatch, lost
 from chladni.fem.energy import mass_properties
@@ -26,13 +26,19 @@ def lam(reduced, effect, x):
 
 
 def test_a_patch_as_large_as_the_sheet_is_its_modulus(reduced):
-    patch, E = StiffnessPatch.on(reduced.groups, 0, 1), ordinary(reduced.groups, "E", [0])
+    patch, E = (
+        StiffnessPatch.on(reduced.groups, 0, 1),
+        calibration_parameter(reduced.groups, "E", [0]),
+    )
     got, due = lam(reduced, patch, [0.3, WIDE, 0, 0, 0]), lam(reduced, E, [np.log(1 - lost(0.3))])
     assert_allclose(got[6:], due[6:], rtol=1e-6)
 
 
 def test_a_mass_as_large_as_the_sheet_is_its_density(reduced):
-    patch, rho = MassPatch.on(reduced.groups, 0, 1), ordinary(reduced.groups, "rho", [0])
+    patch, rho = (
+        MassPatch.on(reduced.groups, 0, 1),
+        calibration_parameter(reduced.groups, "rho", [0]),
+    )
     m = patch.parameters[0].value(0.5)
     due = lam(reduced, rho, [np.log1p(m / reduced.groups.weight.sum())])
     assert_allclose(lam(reduced, patch, [0.5, WIDE, 0, 0, 0])[6:], due[6:], rtol=1e-6)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.user_parameters import defaults_of_solids, freed
 from chladni.effects.points import with_masses, with_springs
+from chladni.effects.user_parameters import defaults_of_solids, user_parameter
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Beams, Bushes, Solids
@@ -70,7 +70,7 @@ def reduced():
 @pytest.mark.parametrize("name", KINDS)
 def test_linear_numbers_are_exact(reduced, name):
     """K(x) q, M(x) q and the weight are those of the structure written with e^x."""
-    effect = freed(reduced.groups, FreeParameter(name, sd=0.3, **KINDS[name]))
+    effect = user_parameter(reduced.groups, FreeParameter(name, sd=0.3, **KINDS[name]))
     x = np.array([0.4])
     q = np.random.default_rng(0).normal(size=(len(reduced.model.basis), 2))
     made = effect.apply(jointed(), x)
@@ -88,7 +88,7 @@ def test_linear_numbers_are_exact(reduced, name):
 @pytest.mark.parametrize("part", [0, 1])
 def test_what_is_left_out_of_poissons_ratio_is_of_third_order(reduced, part):
     """Halving the change makes the error of K(nu) q eight times smaller."""
-    effect = freed(reduced.groups, FreeParameter("nu", "nu", positions=(part,)))
+    effect = user_parameter(reduced.groups, FreeParameter("nu", "nu", positions=(part,)))
     q = np.random.default_rng(1).normal(size=(len(reduced.model.basis), 2))
 
     def error(x):
@@ -103,7 +103,9 @@ def test_what_is_left_out_of_poissons_ratio_is_of_third_order(reduced, part):
 
 def test_bounds_are_never_passed_and_do_not_bend_the_deck(reduced):
     """y' = 1 at the deck's value, y within (ln low, ln high) wherever x is."""
-    effect = freed(reduced.groups, FreeParameter("E", "E", low=0.8, high=1.1, positions=(0,)))
+    effect = user_parameter(
+        reduced.groups, FreeParameter("E", "E", low=0.8, high=1.1, positions=(0,))
+    )
     assert effect.y(np.zeros(1)) == (np.zeros(1), 1.0)
     E = STEEL.E
     for x, bound in ((9.0, 1.1), (-9.0, 0.8)):
@@ -116,14 +118,14 @@ def test_bounds_are_never_passed_and_do_not_bend_the_deck(reduced):
 
 
 def test_one_value_is_given_as_it_is_and_several_as_a_factor(reduced):
-    one = freed(reduced.groups, FreeParameter("E", "E", positions=(1,)))
-    both = freed(reduced.groups, FreeParameter("E", "E", positions=(0, 1)))
+    one = user_parameter(reduced.groups, FreeParameter("E", "E", positions=(1,)))
+    both = user_parameter(reduced.groups, FreeParameter("E", "E", positions=(0, 1)))
     assert (one.parameters[0].scale, one.parameters[0].unit) == (GLUE.E, "Pa")
     assert (both.parameters[0].scale, both.parameters[0].unit) == (1.0, "of the deck's")
 
 
 def test_pickles(reduced):
-    effect = freed(reduced.groups, FreeParameter("K", "K", springs=(0,), bushes=(0,)))
+    effect = user_parameter(reduced.groups, FreeParameter("K", "K", springs=(0,), bushes=(0,)))
     again = pickle.loads(pickle.dumps(effect))
     made = again.apply(jointed(), np.array([0.5]))
     assert_allclose(made.bushes.stiffness, np.exp(0.5) * jointed().bushes.stiffness)

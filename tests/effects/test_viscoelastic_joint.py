@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.adhesive_stiffness import beads_of
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Parameter
 from chladni.effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
 from chladni.effects.joints import fasteners, with_factor_on
 from chladni.effects.model_families import joint_families
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.viscoelastic_joint import (
     LEVEL_SD,
     LOSS,
@@ -29,10 +29,10 @@ from chladni.geometry.sampling import farthest_point_sample, nearest_points
 from chladni.model.assembly import Bushes
 from chladni.updating.accuracy import products
 from chladni.updating.damping_scatter import ModalDamping
-from chladni.updating.likelihood import Responses, along
-from chladni.updating.map_fit import beside, constants
-from chladni.updating.reduced_model import evaluate
 from chladni.updating.frequency_dependent_stiffness import Dissipated
+from chladni.updating.likelihood import Responses, along
+from chladni.updating.map_fit import constants, prior_residuals
+from chladni.updating.reduced_model import evaluate
 
 FLEXIBLE = slice(6, 12)
 USUAL = 0.01
@@ -99,7 +99,7 @@ def test_damping_is_half_the_loss_factor_times_the_slope_of_the_eigenvalue(masti
 def test_what_is_lost_has_exact_slopes(mastic, reduced):
     """Of E of the sheets, and of all three numbers, by differences of fourth order."""
     effect, model = mastic
-    both = [ordinary(reduced.groups, "E", [0]), effect]
+    both = [calibration_parameter(reduced.groups, "E", [0]), effect]
     x = np.array([0.05, *X])
 
     def ratio(x):
@@ -115,9 +115,9 @@ def test_residuals_of_damping_have_exact_slopes(mastic):
     effect, model = mastic
 
     def residual(x):
-        return beside([effect], None, x, evaluate(model, [effect], x, False))[0]
+        return prior_residuals([effect], None, x, evaluate(model, [effect], x, False))[0]
 
-    _, J = beside([effect], None, X, evaluate(model, [effect], X))
+    _, J = prior_residuals([effect], None, X, evaluate(model, [effect], X))
     assert J.shape == (3 + 6, 3)
     for k, e in enumerate(1e-4 * np.eye(3)):
         due = (residual(X + e) - residual(X - e)) / 2e-4
@@ -172,9 +172,12 @@ def test_even_damping_speaks_against_it_and_damping_that_follows_for_it(mastic):
     f, lost = hertz(state.lam[FLEXIBLE]), state.dissipated.ratio[FLEXIBLE]
 
     def gain(ratio):
-        heard = IdentifiedDamping(f, ratio, np.full(6, 0.02))
-        told, x = replace(effect, damping=heard), np.array([*X[:2], np.log(USUAL / heard.usual)])
-        r0, J0 = beside([told], None, x, evaluate(model, [told], x))
+        held_out_votes = IdentifiedDamping(f, ratio, np.full(6, 0.02))
+        told, x = (
+            replace(effect, damping=held_out_votes),
+            np.array([*X[:2], np.log(USUAL / held_out_votes.usual)]),
+        )
+        r0, J0 = prior_residuals([told], None, x, evaluate(model, [told], x))
         A = J0.T @ J0
         return -(float(r0[3:] @ r0[3:]) + constants([told]) + float(np.linalg.slogdet(A)[1]))
 
@@ -203,10 +206,10 @@ def test_what_it_explains_of_the_damping_is_even_beside_it(mastic):
     effect, model = mastic
     state = evaluate(model, [effect], X, False)
     f, lost = hertz(state.lam[FLEXIBLE]), state.dissipated.ratio[FLEXIBLE]
-    heard = ModalDamping(f, USUAL + lost, np.full(6, 0.02))
-    assert_allclose(np.ptp(np.log(heard.beyond(state).ratio)), 0, atol=0.05)
+    held_out_votes = ModalDamping(f, USUAL + lost, np.full(6, 0.02))
+    assert_allclose(np.ptp(np.log(held_out_votes.beyond(state).ratio)), 0, atol=0.05)
     plain = evaluate(model, [], np.zeros(0), False)
-    assert heard.beyond(plain) is heard
+    assert held_out_votes.beyond(plain) is held_out_votes
 
 
 def test_a_mode_is_paired_with_the_nearest_and_two_that_are_one_share_it():
@@ -220,7 +223,7 @@ def test_responses_see_it_with_slopes_of_second_order(mastic, reduced):
     rows = reduced.grids.rows[[0, 9, 20]]
     s = 2 * np.pi * np.linspace(40, 280, 20) * (0.05 + 1j)
     data = Responses(np.ones((20, 3, 1), complex), s, rows, rows[[1]], np.ones((20, 3), bool))
-    data = data.over(model)
+    data = data.rebased(model)
     flat = replace(effect, band=(effect.reference,) * 2)  # the loss moves no mode
     state = evaluate(model, [flat], X)
     data = replace(data, values=data.model(state))

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.frf import FRF
-from chladni.ema.identification import identify
 from chladni.ema.coincident_poles import peak_notes, peaks, twins_joined
+from chladni.ema.identification import identify
 
 F, ZETA = np.array([40.0, 60.0, 90.0]), 0.01
 SHAPES = np.array([[1.0, 1.0, 0.3], [0.5, -1.0, 0.9], [0.2, 0.4, -1.0], [1.0, 0.3, 0.5]])

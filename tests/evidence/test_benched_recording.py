@@ -51,7 +51,9 @@ def test_a_case_of_the_bench_is_what_a_lab_hands_over(made, tmp_path):
     assert case.frfs[0].coherence is not None
     assert case.frfs[0].variance is not None
     n = len(case.outputs.labels)
-    assert sum(kg for _, kg in case.carried) == pytest.approx(0.005 * n + 0.4 * 0.023, rel=0.3)
+    assert sum(kg for _, kg in case.sensor_masses) == pytest.approx(
+        0.005 * n + 0.4 * 0.023, rel=0.3
+    )
     assert "point-mass" not in (tmp_path / "case" / "case.toml").read_text()
 
 

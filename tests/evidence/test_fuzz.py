@@ -6,7 +6,7 @@ import pytest
 
 import chladni_evidence.fuzz as fuzzing
 from chladni_evidence.__main__ import main
-from chladni_evidence.fuzz import DUE, fuzz, verdict_models
+from chladni_evidence.fuzz import DUE, fuzz, outcome
 from chladni_evidence.fuzz_input import FuzzInput
 from chladni_evidence.fuzz_inputs import KINDS, fuzz_inputs
 

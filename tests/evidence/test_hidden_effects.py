@@ -11,7 +11,6 @@ from chladni.fem.energy import mass_properties
 from chladni.model.ground_springs import with_ground_bushes
 from chladni_evidence.article_modes import article_modes
 from chladni_evidence.bench_of_structure import panel_bench
-from chladni_evidence.mesh_transfer import Spots, footing, still_there
 from chladni_evidence.held_kinds import HELD
 from chladni_evidence.hidden import Hidden, Site, with_lumps
 from chladni_evidence.hidden_kinds import (
@@ -25,6 +24,7 @@ from chladni_evidence.hidden_kinds import (
     thinning,
 )
 from chladni_evidence.joint_kinds import hem, hem_stretch, viscoelastic
+from chladni_evidence.mesh_transfer import Spots, mesh_transfer, still_there
 from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
 from chladni_evidence.pair_kinds import APART, HEMS, HIDDEN, PAIRS, catalogued, together
 from chladni_evidence.part_scatter import WELDS, scattered
@@ -137,7 +137,7 @@ def test_a_rotor_does_no_work_and_breaks_reciprocity(site):
     D = hidden.couplings[0].stiffness(s)[0]
     np.testing.assert_allclose(D, D.conj().T)
     assert np.abs(D - D.T).max() > 0
-    foot = footing(site.article, site.outputs)
+    foot = mesh_transfer(site.article, site.outputs)
     rows = np.concatenate([foot.rows.ravel(), hidden.couplings[0].rows])
     modes = article_modes(site.article, rows, rows, TOP)
     phi = seen(modes, foot, site.outputs.directions)

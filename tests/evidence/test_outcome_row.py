@@ -7,7 +7,13 @@ from chladni.decision.reasons import Reason
 from chladni.updating.decision_in_words import REFUSED
 from chladni_evidence.blind_diagnosis import Answer
 from chladni_evidence.outcome_row import line, row
-from chladni_evidence.outcome_table import beside, confusion, overall, table, tables
+from chladni_evidence.outcome_table import (
+    calibration_against_diagnosis,
+    confusion,
+    overall,
+    table,
+    tables,
+)
 
 TRUTH = {
     "effect": "point-mass", "structure": "tailgate", "seed": 600, "mesh": "16 mm",
@@ -195,11 +201,14 @@ def test_plain_calibration_stands_beside():
     assert (one["E"], other["E"]) == (pytest.approx(0.1), pytest.approx(0.01))
     assert (one["mass"], other["mass"]) == (pytest.approx(0.1), pytest.approx(0.01))
     assert (one["Q"], other["Q"], one["t"]) == (0.5, 0.2, None)
-    lines = {text[:28].strip(): text[28:].split() for text in beside([r, r]).splitlines()}
+    lines = {
+        text[:28].strip(): text[28:].split()
+        for text in calibration_against_diagnosis([r, r]).splitlines()
+    }
     assert lines["E off, %"] == ["10", "1", "2"]
     assert lines["held-out Q"] == ["0.5", "0.2", "2"]
     assert "t off, %" not in lines
-    assert "not asked" in beside([row(said(0.0), truth)])
+    assert "not asked" in calibration_against_diagnosis([row(said(0.0), truth)])
 
 
 def test_what_an_answer_leaves_open_is_no_crash():

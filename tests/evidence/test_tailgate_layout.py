@@ -80,7 +80,7 @@ def test_the_modes_of_the_real_hem_are_told_apart(robust, plain, size):
     worst = []
     for planned in (robust, plain):
         at = planned.mounts.points[planned.layout]
-        located = ShellSurface.whole(article).feet(at)
+        located = ShellSurface.whole(article).closest_points(at)
         assert located.distance.max() < 1e-3
         rows = rows_at(built, located, planned.mounts.directions[planned.layout])
         worst.append(float(alike(rows @ modal.shapes)))

@@ -22,7 +22,7 @@ def test_rows_carry_any_rigid_motion(built):
     rng = np.random.default_rng(2)
     where = np.column_stack([rng.uniform(0, [0.4, 0.3], (20, 2)), np.zeros(20)])
     directions = rng.normal(size=(20, 3))
-    rows = rows_at(built, ShellSurface.whole(PLATE).feet(where), directions)
+    rows = rows_at(built, ShellSurface.whole(PLATE).closest_points(where), directions)
     a, omega = rng.normal(size=(2, 3))
     motion = np.hstack([a + np.cross(omega, PLATE.points), np.tile(omega, (63, 1))]).ravel()
     q = built.T.T @ motion  # T is a selection of dofs here

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.element_groups import element_groups
 from chladni.effects.effect_context import element_grids
+from chladni.effects.element_groups import element_groups
 from chladni.fem.assemble import structure
 from chladni.geometry.facets import cell_areas, point_normals, tangents, vector_areas
 from chladni.geometry.grid_normals import grid_normals, normals_at

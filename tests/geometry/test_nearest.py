@@ -28,7 +28,7 @@ def test_weights_reproduce_the_foot_of_the_perpendicular(x, y, z):
     """
     points = PLATE.points @ ROTATION.T
     where = np.array([[x, y, z]]) @ ROTATION.T
-    found = ShellSurface.over("plate", points, PLATE.shells.nodes).feet(where)
+    found = ShellSurface.over("plate", points, PLATE.shells.nodes).closest_points(where)
     assert_allclose(found.weight.sum(axis=1), 1)
     assert found.weight.min() >= 0
     foot = np.einsum("kc,kci->ki", found.weight, points[found.nodes])
@@ -42,7 +42,7 @@ def test_weights_reproduce_the_foot_of_the_perpendicular(x, y, z):
 
 def test_middle_of_a_shell_is_in_that_shell():
     middle = PLATE.points[PLATE.shells.nodes].mean(axis=1) + np.array([1e-3, 2e-3, 0])
-    found = ShellSurface.whole(PLATE).feet(middle)
+    found = ShellSurface.whole(PLATE).closest_points(middle)
     assert found.shell.tolist() == list(range(len(PLATE.shells)))
 
 
@@ -52,21 +52,21 @@ def test_many_places_are_looked_at_some_at_a_time(monkeypatch, facing):
     places = np.random.default_rng(3).uniform(0, 0.4, (50, 3))
     normal = places / np.linalg.norm(places, axis=1, keepdims=True) if facing else None
     surface = ShellSurface.whole(PLATE)
-    whole = vars(surface.feet(places, normal))
+    whole = vars(surface.closest_points(places, normal))
     monkeypatch.setattr(nearest, "AT_ONCE", 7)
-    for name, part in vars(surface.feet(places, normal)).items():
+    for name, part in vars(surface.closest_points(places, normal)).items():
         assert_allclose(part, whole[name], rtol=0, atol=0)
 
 
 def test_corner_has_all_the_weight():
-    found = ShellSurface.whole(PLATE).feet(PLATE.points)
+    found = ShellSurface.whole(PLATE).closest_points(PLATE.points)
     at = found.weight.argmax(axis=1)
     assert_allclose(found.weight.max(axis=1), 1)
     assert found.nodes[np.arange(len(at)), at].tolist() == list(range(len(PLATE.points)))
 
 
 def test_beside_the_plate_the_distance_is_to_the_edge():
-    found = ShellSurface.whole(PLATE).feet(np.array([[0.21, -0.02, 0.0]]))
+    found = ShellSurface.whole(PLATE).closest_points(np.array([[0.21, -0.02, 0.0]]))
     assert_allclose(found.distance, 0.02)
 
 
@@ -95,7 +95,7 @@ def test_it_is_the_nearest_of_all_whatever_was_tried_first(seed, near):
     rng = np.random.default_rng(seed)
     points, cells = _mixed(rng)
     places = rng.uniform(-4, 4, (40, 3))
-    found = ShellSurface.over("mixed", points, cells).feet(places, near=near)
+    found = ShellSurface.over("mixed", points, cells).closest_points(places, near=near)
     corners, least = points[_halves(cells)], np.full(len(places), np.inf)
     for triangle in corners:
         copies = np.repeat(triangle[None], len(places), axis=0)
@@ -114,5 +114,5 @@ def test_it_is_vtk_s_nearest_point_on_a_tailgate():
     places = np.vstack([by + rng.normal(0, 0.01, by.shape), rng.uniform(-1, 2, (500, 3))])
     vtk = pyvista.PolyData.from_regular_faces(points, _halves(cells))
     _, closest = vtk.find_closest_cell(places, return_closest_point=True)
-    found = ShellSurface.whole(assembly).feet(places)
+    found = ShellSurface.whole(assembly).closest_points(places)
     assert_allclose(found.distance, np.linalg.norm(closest - places, axis=1), atol=1e-9)

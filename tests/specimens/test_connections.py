@@ -184,7 +184,7 @@ def test_nearest_shell_is_not_the_nearest_centre():
     x = np.r_[0.0, np.linspace(0.5, 0.6, 21)]
     points, quads = grid(x, np.array([0.0, 0.004]))
     surface = ShellSurface.over("s", np.column_stack([points, 0 * points[:, 0]]), quads)
-    feet = surface.feet(np.array([(0.48, 0.002, 0.001)]))
+    feet = surface.closest_points(np.array([(0.48, 0.002, 0.001)]))
     assert feet.shell[0] == 0
     assert feet.distance[0] == pytest.approx(0.001)
 

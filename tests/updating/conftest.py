@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.effects.calibration_parameters import ordinary
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
@@ -26,6 +26,8 @@ def responses(reduced):
     s = 2 * np.pi * np.linspace(25, TOP, 40) * (0.03 + 1j)
     use = np.ones((40, 4), bool)
     use[5:9, 1] = False
-    empty = Responses(np.ones((40, 4, 2), complex), s, outputs, inputs, use).over(reduced.model)
-    stiffer = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.04]))
+    empty = Responses(np.ones((40, 4, 2), complex), s, outputs, inputs, use).rebased(reduced.model)
+    stiffer = evaluate(
+        reduced.model, [calibration_parameter(reduced.groups, "E", [0])], np.array([0.04])
+    )
     return replace(empty, values=empty.model(stiffer))

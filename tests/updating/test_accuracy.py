@@ -5,11 +5,11 @@ import pytest
 import scipy.linalg as sl
 from numpy.testing import assert_allclose
 
+from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy, products
@@ -32,13 +32,13 @@ def changes(reduced):
     groups = reduced.groups
     sensors = tuple(reduced.candidates.grids[[3, 9]].tolist())
     setup = Setup(tuple(((int(g), 1.0),) for g in sensors), (), float(groups.weight.sum()), TOP)
-    where = Surroundings(groups, reduced.grids, reduced.candidates, setup)
+    where = EffectContext(groups, reduced.grids, reduced.candidates, setup)
     k = reduced.grids.position(int(reduced.candidates.grids[5]))
     start = np.array([0.5, np.log(0.15), 0.1, 0.0, 0.2])
     return {
-        "thickness": (ordinary(groups, "t", [0]), np.array([0.2])),
-        "thinner": (ordinary(groups, "t", [1]), np.array([-0.2])),
-        "stiffer": (ordinary(groups, "E", [0]), np.array([0.5])),
+        "thickness": (calibration_parameter(groups, "t", [0]), np.array([0.2])),
+        "thinner": (calibration_parameter(groups, "t", [1]), np.array([-0.2])),
+        "stiffer": (calibration_parameter(groups, "E", [0]), np.array([0.5])),
         "thinning": (ThicknessDistribution.on(groups, 0, 1), start),
         "mass": (PointMass.near(where, k), np.array([1.0, 0.2, 0.1])),
         "masses": (sensor_mass(where)[0], np.array([0.5])),
@@ -84,7 +84,7 @@ def test_estimate_lies_between_four_fifths_of_the_error_and_the_error(reduced, c
 def test_renewed_basis_leaves_a_fraction_of_the_error(reduced, changes, name):
     effect, x = changes[name]
     before = accuracy(reduced, reduced.model, [effect], x, TOP)
-    model = before.renewed(reduced.model)
+    model = before.refined(reduced.model)
     after = accuracy(reduced, model, [effect], x, TOP)
     n = len(before.error)
     assert after.worst < 0.2 * before.worst

@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import binom, kstest
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect
-from chladni.effects.calibration_parameters import ordinary
 from chladni.updating.adequacy import _drawn, _Linear, adequacy, at_least, of_poles, ranked
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
 from chladni.updating.likelihood import Poles
-from chladni.updating.map_fit import MassMeasurement, beside
+from chladni.updating.map_fit import MassMeasurement, prior_residuals
 from chladni.updating.reduced_model import State, evaluate
 
 SCALES = MassMeasurement(1.413, 1.4e-3)
@@ -23,7 +23,10 @@ def seen(reduced, responses):
     """A plate seen with 8 % damping, and E and rho free."""
     s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
     empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
-    effects = [ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "rho", [0])]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        calibration_parameter(reduced.groups, "rho", [0]),
+    ]
     return empty, effects
 
 
@@ -38,7 +41,7 @@ def test_draws_of_the_model_itself_have_uniform_p(reduced, seen):
     state = evaluate(reduced.model, effects, np.zeros(2))
     data = replace(data, values=data.model(state)).allowing_errors(state)
     _, J = data.scaled(state, True)
-    r0, J0 = beside(effects, SCALES, np.zeros(2), state)
+    r0, J0 = prior_residuals(effects, SCALES, np.zeros(2), state)
     model, rng = _Linear(data.error, data.known, J, J0, data.use, 2), np.random.default_rng(1)
     sd = np.array([e.parameters[0].sd for e in effects])
     drawn = np.array([_drawn(model, sd, len(r0), rng) for _ in range(600)])

@@ -80,7 +80,7 @@ RUBS = "1 of 5 modes are damped by 2.0%"
 def test_mesh_error_is_not_made_the_reason_of_what_it_does_not_explain(gain, passes, said):
     """What calibration leaves, 40 times what the recording is known to, where nothing is named."""
     data = SimpleNamespace(Q=lambda state, use: 0.04)
-    score = SimpleNamespace(use=None, over=lambda model: data)
+    score = SimpleNamespace(use=None, rebased=lambda model: data)
     prepared = SimpleNamespace(score=score, identified=None)
     fit = SimpleNamespace(state=None)
     null = SimpleNamespace(neg2_log_evidence=0.0, data=None, model=None, fit=fit)

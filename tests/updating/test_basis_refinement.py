@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect
-from chladni.effects.calibration_parameters import ordinary
 from chladni.errors import ModelError
 from chladni.updating import basis_refinement
 from chladni.updating.accuracy import Accuracy
@@ -25,15 +25,15 @@ def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effec
     """Not by name or class: the effect says so itself."""
     found = Accuracy(np.array([10.0]), np.array([0.0]), np.zeros((3, 1)))
     remade = SimpleNamespace(structure="remade")
-    monkeypatch.setattr(renewal, "_accuracy", lambda problem, hypothesis: found)
-    monkeypatch.setattr(renewal, "_on_new_structure", lambda *given: (None, remade))
+    monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: found)
+    monkeypatch.setattr(basis_refinement, "_on_new_structure", lambda *given: (None, remade))
     prepared = SimpleNamespace(problem=SimpleNamespace())
     begun = SimpleNamespace(effects=(Effect(), effect), structure="deck")
-    assert renewal.renewed(None, prepared, begun).hypothesis.structure == structure
+    assert basis_refinement.refined(None, prepared, begun).hypothesis.structure == structure
 
 
 def a_hypothesis():
-    data = SimpleNamespace(over=lambda model: model)
+    data = SimpleNamespace(rebased=lambda model: model)
     fit = SimpleNamespace(effects=(), x=np.zeros(0), data=data)
     return HypothesisFit(Effect(), fit, "narrow")
 
@@ -42,11 +42,11 @@ def a_hypothesis():
 def test_is_fitted_again_only_beyond_the_limit(monkeypatch, error, model):
     """0.05 % is the limit: under it the hypothesis stays, above it a wider basis carries it."""
     found = Accuracy(np.array([10.0]), np.array([error]), np.zeros((3, 1)))
-    monkeypatch.setattr(renewal, "_accuracy", lambda problem, hypothesis: found)
-    monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
-    monkeypatch.setattr(renewal, "fitted", lambda *given: a_hypothesis().fit)
+    monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: found)
+    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
+    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: a_hypothesis().fit)
     prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
-    done = renewal.renewed(None, prepared, a_hypothesis())
+    done = basis_refinement.refined(None, prepared, a_hypothesis())
     assert done.hypothesis.model == model
     assert f"{error:.2%}" in done.note
     assert bool(done.distrust) == (model == "wide")
@@ -56,17 +56,17 @@ def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(monkeypatc
     """They are not fitted again; their state is that of the wider model."""
     errors = iter([2e-3, 2e-4])
     monkeypatch.setattr(
-        renewal, "_accuracy",
+        basis_refinement, "_accuracy",
         lambda *given: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
     )  # fmt: skip
-    monkeypatch.setattr(renewal, "fitted", lambda *given: pytest.fail("fitted again"))
-    E = ordinary(reduced.groups, "E", [0])
+    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: pytest.fail("fitted again"))
+    E = calibration_parameter(reduced.groups, "E", [0])
     fits = fit(reduced.model, [E], Still(), None, np.array([0.1]), max_steps=0)
     wide = reduced.model.with_components()
-    monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: wide)
+    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: wide)
     prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
     begun = HypothesisFit(Effect(), fits, reduced.model)
-    done = renewal.renewed(None, prepared, begun, held=True).hypothesis
+    done = basis_refinement.refined(None, prepared, begun, held=True).hypothesis
     assert done.model is wide
     assert done.fit.x == pytest.approx([0.1])
     assert done.fit.state is not fits.state
@@ -76,7 +76,7 @@ def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(monkeypatc
 class Still:
     """Data that say nothing."""
 
-    def over(self, model):
+    def rebased(self, model):
         return self
 
     def residual(self, state, gradient):
@@ -88,14 +88,14 @@ def test_is_widened_until_it_serves(monkeypatch):
     errors = iter([2e-2, 2e-3, 2e-4])
     fits = []
     monkeypatch.setattr(
-        renewal, "_accuracy",
+        basis_refinement, "_accuracy",
         lambda *given: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
     )  # fmt: skip
-    monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
+    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
     kept = a_hypothesis().fit
-    monkeypatch.setattr(renewal, "fitted", lambda *given: fits.append(given) or kept)
+    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: fits.append(given) or kept)
     prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
-    done = renewal.renewed(None, prepared, a_hypothesis())
+    done = basis_refinement.refined(None, prepared, a_hypothesis())
     assert len(fits) == 2
     assert done.worst == 2e-4
     assert done.distrust == ()
@@ -104,15 +104,15 @@ def test_is_widened_until_it_serves(monkeypatch):
 def test_a_basis_that_bears_the_fit_no_longer_is_said_and_not_trusted(monkeypatch):
     """What the narrow basis could not feel may be negative stiffness: no crash, no trust."""
     found = Accuracy(np.array([10.0]), np.array([2e-2]), np.zeros((3, 1)))
-    monkeypatch.setattr(renewal, "_accuracy", lambda *given: found)
-    monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
+    monkeypatch.setattr(basis_refinement, "_accuracy", lambda *given: found)
+    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
 
     def refuse(*given):
         raise ModelError("an effect left negative stiffness")
 
-    monkeypatch.setattr(renewal, "fitted", refuse)
+    monkeypatch.setattr(basis_refinement, "fitted", refuse)
     prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
-    done = renewal.renewed(None, prepared, a_hypothesis())
+    done = basis_refinement.refined(None, prepared, a_hypothesis())
     assert done.hypothesis.model == "narrow"
     assert "negative stiffness" in done.note
     assert done.distrust

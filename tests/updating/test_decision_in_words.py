@@ -8,7 +8,7 @@ import pytest
 from tests.decision.tables import FOR, decision, row, table, together
 
 from chladni.decision.decision_rules import gain_due
-from chladni.decision.hypothesis_table import NULL, CalibratedDeck, Left, Rival, Votes
+from chladni.decision.hypothesis_table import NULL, AlternativeRow, CalibratedDeck, Left, Votes
 from chladni.updating.adequacy import FitTest
 from chladni.updating.deciding import Measured
 from chladni.updating.decision_in_words import UNEXPLAINED, DecisionWords
@@ -18,7 +18,12 @@ WORSE, MORE = Left((1.0, 0.1), (1.0, 2.0)), Left((1.0, 0.7), (1.0, 0.7))
 PAIR = together("set 0", (2 * DUE, 0.8 * DUE), DUE)
 PAID = together("set 1", (2 * DUE, 2 * DUE), DUE)
 BAD = together("set 1", (2 * DUE, 2 * DUE), DUE, (FOR, Votes(-2 * DUE)))
-TIES = together("set 1", (2 * DUE, 2 * DUE), DUE, rivals=((), (Rival("hem-contact", 4.0, "odd"),)))
+TIES = together(
+    "set 1",
+    (2 * DUE, 2 * DUE),
+    DUE,
+    alternatives=((), (AlternativeRow("hem-contact", 4.0, "odd"),)),
+)
 WORN = {"decks": dict.fromkeys(CalibratedDeck, (1.1, 1.1)) | {CalibratedDeck.GIVEN: (1.0, 1.0)}}
 
 
@@ -35,9 +40,11 @@ def words(made):
     for k, r in made.rows.items():
         p = r.p_damping if r.p is None else r.p
         tests[k] = FitTest((p or 0.0) >= 0.01, p or 0.0, f"what {k} leaves", "near 7 Hz")
-    renewals = {k: SimpleNamespace(note=f"{k} is renewed") for k in made.rows}
+    refinements = {k: SimpleNamespace(note=f"{k} is renewed") for k in made.rows}
     fits = {k: fit_of(r.names[0] if r.names else "", k) for k, r in made.rows.items()}
-    known = Measured(made, fits, tests, renewals=renewals, failed={"crack": "it is no structure"})
+    known = Measured(
+        made, fits, tests, refinements=refinements, failed={"crack": "it is no structure"}
+    )
     asked = SimpleNamespace(too_little="2 modes cannot bear a name")
     return DecisionWords(asked, found, known), found
 

@@ -26,30 +26,30 @@ def dofs(*grids):
 
 
 @pytest.fixture(scope="module")
-def asked():
+def question():
     mass = MADE.parts[0].section.membrane.rho * 0.3 * 0.22 * 1e-3
     weighed = MassMeasurement(mass, 0.002 * mass)
     return Question(MADE, dofs(*SENSORS), dofs(2), band=(20.0, 170.0), mass_measurement=weighed)
 
 
 @pytest.fixture(scope="module")
-def found(asked):
-    return detectable(asked)
+def found(question):
+    return detectable(question)
 
 
 def filled(values):
     return np.where(np.isfinite(values), values, np.inf)
 
 
-def test_noise_hides(asked, found):
-    noisy = detectable(asked, 0.3)
+def test_noise_hides(question, found):
+    noisy = detectable(question, 0.3)
     for name in ("mass", "softer", "thinner"):
         assert (filled(getattr(noisy, name)) >= filled(getattr(found, name)) * 0.999).all(), name
     assert np.median(filled(noisy.mass)) > 1.2 * np.median(filled(found.mass))
 
 
-def test_sensors_find(asked, found):
-    few = detectable(replace(asked, outputs=dofs(*SENSORS[:2])))
+def test_sensors_find(question, found):
+    few = detectable(replace(question, outputs=dofs(*SENSORS[:2])))
     for name in ("mass", "softer", "thinner"):
         assert np.median(filled(getattr(few, name))) > np.median(filled(getattr(found, name))), name
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import ordinary
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.ema.recording_noise import EqualisedError
 from chladni.updating import discrepancy as dis
 from chladni.updating.discrepancy import columns, discrepancy, form, learned
 from chladni.updating.hypothesis_fit import fitted
-from chladni.updating.map_fit import MassMeasurement, beside, fit
+from chladni.updating.map_fit import MassMeasurement, fit, prior_residuals
 from chladni.updating.reduced_model import evaluate
 
 
@@ -20,7 +20,10 @@ def softer(reduced, responses):
     """The recording, at 8 % damping, seen from a model that is nearly right."""
     s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
     empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
-    effects = [ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "rho", [0])]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        calibration_parameter(reduced.groups, "rho", [0]),
+    ]
     truth = evaluate(reduced.model, effects, np.array([0.01, 0.005]))
     return replace(empty, values=empty.model(truth)), effects
 
@@ -83,7 +86,7 @@ def test_low_rank_covariance_is_the_dense_one(softer, state, about, most, monkey
     W = columns(data, state, about)
     if most < W.shape[1]:
         W = W[:, np.argsort(-(W**2).sum(axis=0))[:most]]
-    monkeypatch.setattr(dis, "MOST", most)
+    monkeypatch.setattr(dis, "MOST_PAIRS", most)
     error = discrepancy(data, state).with_delta(0.02)
     C = np.eye(len(W)) + 0.02**2 * W @ W.T
     r = np.random.default_rng(3).normal(size=(len(W), 2))
@@ -103,7 +106,7 @@ def test_no_error_at_all_is_the_plain_likelihood(reduced, softer, state):
 def test_evidence_is_the_sum_over_sizes_of_the_dense_one(reduced, softer, state):
     data, effects = softer
     error = discrepancy(data, state)
-    (r, J), (r0, J0) = data.scaled(state, True), beside(effects, None, np.zeros(2), state)
+    (r, J), (r0, J0) = data.scaled(state, True), prior_residuals(effects, None, np.zeros(2), state)
     U, s, S = error.U, error.s, []
     prior = dis.FORMULATIONS
     for delta in prior.grid:
@@ -173,7 +176,7 @@ def test_errors_that_spread_from_a_state_are_the_same_however_often_they_spread(
     """So the evidence of one hypothesis does not depend on the way by which it was reached."""
     own = np.random.default_rng(6).normal(size=(6, *responses.values.shape)) + 0j
     data = replace(responses, identified=EqualisedError(own, own[:1], np.abs(own[0])))
-    effect = ordinary(reduced.groups, "E", [0])
+    effect = calibration_parameter(reduced.groups, "E", [0])
     near, far = (evaluate(reduced.model, [effect], np.array([x]), False) for x in (0.0, 0.3))
     once = data.allowing_errors(near, 1e-3)
     again = data.allowing_errors(far, 1e-3).allowing_errors(near, 1e-3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import ordinary
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.updating.held_out_evidence import held_out_evidence, predictive
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
@@ -40,7 +40,7 @@ def fit_of(reduced, data, effects, x):
 @pytest.fixture(scope="module")
 def faulty(reduced, seen):
     """A level of one channel 20 % high, on every line."""
-    E = ordinary(reduced.groups, "E", [0])
+    E = calibration_parameter(reduced.groups, "E", [0])
     H = seen.model(evaluate(reduced.model, [E], np.array([0.02])))
     H[:, 2] *= 1.2
     data = replace(seen, values=H)
@@ -77,10 +77,10 @@ def test_a_fault_is_heard_on_the_lines_held_out(faulty):
     data, null, fault = faulty
     unseen = np.zeros_like(data.use)
     unseen[HELD] = True
-    heard = held_out_evidence(search_of(data), unseen, null, fault)
-    assert heard.held_out > 10
-    assert heard.lines > 10
-    assert heard.sensors is None
+    held_out_votes = held_out_evidence(search_of(data), unseen, null, fault)
+    assert held_out_votes.held_out > 10
+    assert held_out_votes.lines > 10
+    assert held_out_votes.sensors is None
 
 
 def test_data_that_cannot_feel_it_do_not_speak_against_it(faulty):
@@ -93,21 +93,21 @@ def test_data_that_cannot_feel_it_do_not_speak_against_it(faulty):
 
 def test_what_does_nothing_changes_no_prediction(faulty):
     data, null, _ = faulty
-    heard = held_out_evidence(search_of(data), ~data.use, null, null)
-    assert_allclose(list(heard.votes.values()), 0.0, atol=1e-9)
+    held_out_votes = held_out_evidence(search_of(data), ~data.use, null, null)
+    assert_allclose(list(held_out_votes.votes.values()), 0.0, atol=1e-9)
 
 
 def test_nothing_held_out_is_not_asked(faulty):
     data, null, fault = faulty
-    heard = held_out_evidence(search_of(data), np.zeros_like(data.use), null, fault)
-    assert heard.held_out is None
-    assert "the data held out" not in heard.votes
+    held_out_votes = held_out_evidence(search_of(data), np.zeros_like(data.use), null, fault)
+    assert held_out_votes.held_out is None
+    assert "the data held out" not in held_out_votes.votes
 
 
 def test_an_effect_that_is_none_is_not_borne_out(reduced, faulty):
     """A fault of another channel predicts lines and held-out data no better."""
     data, null, _ = faulty
-    E = ordinary(reduced.groups, "E", [0])
+    E = calibration_parameter(reduced.groups, "E", [0])
     wrong = fit_of(reduced, data, [E, sensor_fault("a", 0, 4, 1, 0.0)], [0.0, 0.0])
-    heard = held_out_evidence(search_of(data), ~data.use, null, wrong)
-    assert heard.lines < 5
+    held_out_votes = held_out_evidence(search_of(data), ~data.use, null, wrong)
+    assert held_out_votes.lines < 5

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni.effects.calibration_parameters import PartScale
 from chladni.effects.effect import Parameter
 from chladni.effects.model_families import ADHESIVE, ModelFamily
-from chladni.effects.calibration_parameters import PartScale
 from chladni.updating.implausible_values import FAR, in_doubt, strained
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from chladni.effects.calibration_parameters import calibration_parameter, channel_gain
 from chladni.effects.effect import WIDER, Effect
-from chladni.effects.calibration_parameters import channel_gain, ordinary
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.point_mass import PointMass
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.joint_fit import informed, joint_fit, of_the_object, with_priors
 from chladni.updating.map_fit import MassMeasurement, fit
@@ -20,7 +20,7 @@ WEIGHED = MassMeasurement(1.413, 0.002)
 
 def base(reduced):
     """Effects as each state makes them: alike, never the same objects."""
-    return [ordinary(reduced.groups, q, [0]) for q in ("E", "rho")]
+    return [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho")]
 
 
 def measured(reduced, responses, effects, x, lines):
@@ -62,7 +62,7 @@ def test_information_adds_and_the_prior_counts_once(alone):
 
 def test_an_effect_is_of_its_state(reduced, responses):
     """A mass in one state and another elsewhere in the second; E comes from both."""
-    where = Surroundings(
+    where = EffectContext(
         reduced.groups, reduced.grids, reduced.candidates, Setup((), (), 1.41, 200.0)
     )
     truth = ((20, -0.5), (41, 0.3))
@@ -84,7 +84,7 @@ def test_an_effect_is_of_its_state(reduced, responses):
 
 
 def test_a_gain_is_of_the_test_and_not_of_the_object(reduced):
-    assert of_the_object(ordinary(reduced.groups, "E", [0]))
+    assert of_the_object(calibration_parameter(reduced.groups, "E", [0]))
     assert not of_the_object(channel_gain(4, 0.5))
 
 

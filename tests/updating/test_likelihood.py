@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from chladni.effects.calibration_parameters import calibration_parameter, channel_gain
 from chladni.effects.discretisation import mesh_errors
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.calibration_parameters import channel_gain, ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.modelled import solved
 from chladni.updating.hypothesis_fit import over_scales
 from chladni.updating.likelihood import Poles
@@ -21,10 +21,11 @@ from chladni.updating.reduced_model import evaluate
 @pytest.fixture(scope="module")
 def effects(reduced):
     setup = Setup((((1, 1.0),), ((63, 1.0),)), (7,), 1.41, 200.0)
-    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
     spot = reduced.grids.position(26)
     return [
-        ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "t", [0]),
+        calibration_parameter(reduced.groups, "E", [0]),
+        calibration_parameter(reduced.groups, "t", [0]),
         PointMass.near(where, spot), ExtraSupport.near(where, spot + 12),
         channel_gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
     ]  # fmt: skip
@@ -35,7 +36,9 @@ X = np.array([0.03, -0.02, 0.2, 0.1, -0.2, -1.0, -0.1, 0.3, 0.2, -0.1, 0.15, -0.
 
 @pytest.fixture(scope="module")
 def poles(reduced):
-    state = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.004]), False)
+    state = evaluate(
+        reduced.model, [calibration_parameter(reduced.groups, "E", [0])], np.array([0.004]), False
+    )
     f = np.sqrt(state.lam[6:11]) / (2 * np.pi)
     every = np.ones(5, bool)
     return Poles(f, np.full(5, 1e-3), every, np.ones(5), (20.0, 1.01 * f[-1]))
@@ -86,12 +89,12 @@ def test_slopes_of_other_quantities(reduced, responses, quantity, effects):
 
 
 def test_slopes_of_poles(reduced, poles):
-    pair = [ordinary(reduced.groups, q, [0]) for q in ("E", "rho")]
+    pair = [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho")]
     check_slopes(poles, reduced.model, pair, np.array([0.002, -0.001]))
 
 
 def test_nothing_is_left_at_the_truth(reduced, responses, poles):
-    stiffer = [ordinary(reduced.groups, "E", [0])]
+    stiffer = [calibration_parameter(reduced.groups, "E", [0])]
     r, _ = responses.residual(evaluate(reduced.model, stiffer, np.array([0.04])), True)
     assert_allclose(r, 0, atol=1e-8)
     assert len(r) == 2 * 2 * responses.use.sum()
@@ -100,14 +103,14 @@ def test_nothing_is_left_at_the_truth(reduced, responses, poles):
 
 
 def test_a_gain_is_its_logarithm_on_every_line(reduced, responses):
-    stiffer, level = ordinary(reduced.groups, "E", [0]), channel_gain(4, 0.5)
+    stiffer, level = calibration_parameter(reduced.groups, "E", [0]), channel_gain(4, 0.5)
     state = evaluate(reduced.model, [stiffer, level], np.array([0.04, np.log(2.0)]))
     assert_allclose(responses.deviation(state), np.log10(2.0), atol=1e-9)
 
 
 def test_a_reversed_channel_is_half_a_turn_on_that_channel(reduced, responses):
     wrong = sensor_fault("x", 2, 4, -1, 0.0)
-    stiffer = ordinary(reduced.groups, "E", [0])
+    stiffer = calibration_parameter(reduced.groups, "E", [0])
     state = evaluate(reduced.model, [stiffer, wrong], np.array([0.04, 0.0]))
     turn = np.abs(responses.deviation(state).imag) * np.log(10)
     assert_allclose(turn[:, 2], np.pi, atol=1e-8)
@@ -116,7 +119,7 @@ def test_a_reversed_channel_is_half_a_turn_on_that_channel(reduced, responses):
 
 def test_stiffness_scales_every_frequency_by_its_root(reduced, poles):
     """ln f = ln E / 2, seen through the pairing."""
-    stiffer = [ordinary(reduced.groups, "E", [0])]
+    stiffer = [calibration_parameter(reduced.groups, "E", [0])]
     state = evaluate(reduced.model, stiffer, np.array([0.004 + 0.01]))
     delta, test, model = poles.deviation(state)
     assert test.tolist() == [0, 1, 2, 3, 4]

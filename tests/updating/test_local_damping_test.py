@@ -7,9 +7,9 @@ import pytest
 from scipy.stats import kstest
 
 from chladni.effects.crack import LineFinder, crack
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.effect_context import Setup, Surroundings
-from chladni.updating.adequacy import LEAST, FitTest
+from chladni.updating.adequacy import LEAST_P, FitTest
 from chladni.updating.damping_scatter import LOG_SD, SCATTER, ModalDamping
 from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.local_damping_test import heard_of_damping, shifted
@@ -40,7 +40,7 @@ def deep(reduced):
 def supported(reduced):
     """A spring to ground, as if fitted."""
     setup = Setup((), (), float(reduced.groups.weight.sum()), 400.0)
-    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
     effect = ExtraSupport.near(where, 5)
     x = np.zeros(5)
     model = reduced.model_for(effect, x)
@@ -128,4 +128,4 @@ def test_p_is_uniform_where_damping_scatters_as_believed():
         ratio = 0.005 * np.exp(sd * rng.normal(size=12))
         p.append(damping(np.linspace(30, 300, 12), ratio).following(share)[0])
     assert kstest(p, "uniform").statistic < 1.63 / np.sqrt(300)  # 1 %
-    assert LEAST < 0.05
+    assert LEAST_P < 0.05

@@ -41,7 +41,7 @@ class Offsets:
         r = (state.offset.real - self.y) / NOISE
         return r, state.doffset.real / NOISE[:, None] if gradient else np.zeros((len(r), 0))
 
-    def over(self, model):
+    def rebased(self, model):
         return self
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from chladni.effects.calibration_parameters import ordinary
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.updating.hypothesis_fit import fitted
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
@@ -59,7 +59,10 @@ def test_a_grown_model_holds_its_new_vectors_alone(cells):
 
 
 def test_a_fit_that_is_kept_has_let_go_of_slopes(reduced, responses):
-    effects = [ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "t", [0])]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        calibration_parameter(reduced.groups, "t", [0]),
+    ]
     data = responses.allowing_errors(evaluate(reduced.model, effects, np.zeros(2), False))
     found = fitted(reduced.model, effects, data, None, np.zeros(2), 2)
     m = len(found.state.lam)

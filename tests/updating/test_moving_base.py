@@ -8,13 +8,13 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.testing import assert_allclose
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect, MatrixTerm, Parameter, count
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.points import AtPoints, MassEffect
-from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import LIMIT
 from chladni.updating.likelihood import Responses
@@ -55,7 +55,7 @@ def data(reduced):
     values = np.ones((len(S), 4, 2), complex)
     carried = np.broadcast_to(AXES[:, 2], (4, 2))
     made = Responses(values, S, rows, idle, use, "transmissibility", direct=carried)
-    return made.over(reduced.model)
+    return made.rebased(reduced.model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +108,26 @@ def test_of_a_changed_structure(clamped, reduced, data):
     heavy = MassEffect((Parameter("m", "kg", 0.0, 1.0, mass),), rows=b, grids=(place,))
     held = reduced.structure.rows(np.array([[23, 3]]))
     spring = AtPoints((Parameter("k", "N/m", 0.0, 1.0, stiff),), rows=held)
-    rho = ordinary(reduced.groups, "rho", [0])
+    rho = calibration_parameter(reduced.groups, "rho", [0])
     model = reduced.with_attachments(sp.csr_array(sp.vstack([b, held])))
     x = np.array([0.1, 0.0, 0.0])
     state = evaluate(model, [rho, spring, heavy], x, False)
     article = heavy.apply(rho.apply(clamped, x[:1]), x[2:])
     loose = structure(replace(clamped, supports=np.zeros((0, 2), int)))
     exact = moved_supports(article, AXES[1], [(loose.rows(np.array([[23, 3]])), stiff)])
-    T = data.over(model).model(state)[:, :, 1]
+    T = data.rebased(model).model(state)[:, :, 1]
     assert np.abs(T - exact).max() < CLOSE * np.abs(exact).max()
 
 
 def test_slopes(reduced, data):
     """Of what changes mass the load of the base moves as well; of a moving mass, with its place."""
-    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, Setup((), (), 1.2, TOP))
+    where = EffectContext(
+        reduced.groups, reduced.grids, reduced.candidates, Setup((), (), 1.2, TOP)
+    )
     inside = np.flatnonzero((reduced.grids.point[:, 0] > 0.2) & (reduced.grids.point[:, 0] < 0.35))
     density = MatrixScale((Parameter("M", "kg", 0.0, 0.3),), operator=reduced.structure.system.M)
     effects = [
-        *(ordinary(reduced.groups, q, [0]) for q in ("E", "rho", "t")), density,
+        *(calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho", "t")), density,
         PointMass.near(where, int(inside[3])), ExtraSupport.near(where, int(inside[-2])),
         LocalResonator.near(where, int(inside[5])),
     ]  # fmt: skip
@@ -146,13 +148,15 @@ def test_slopes(reduced, data):
 
 def test_the_base_carries_a_lump_on_a_spring_as_the_mass_it_is(reduced, data):
     """Tuned far above the band it answers as a point mass, to (f / f_lump)² over the damping."""
-    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, Setup((), (), 1.2, TOP))
+    where = EffectContext(
+        reduced.groups, reduced.grids, reduced.candidates, Setup((), (), 1.2, TOP)
+    )
     k = int(np.argmax(reduced.grids.point[:, 0]))
     lump, mass = LocalResonator.near(where, k), PointMass.near(where, k)
     model, m, high = reduced.model_for(mass, np.zeros(3)), 0.06, 60.0
     ln = [np.log(m / e.parameters[0].scale) for e in (lump, mass)]
     x = np.array([ln[0], 0.1, -0.1, np.log(high * TOP / lump.parameters[3].scale)])
-    seen = data.over(model)
+    seen = data.rebased(model)
     got, due = (
         seen.model(evaluate(model, [e], v, False))
         for e, v in ((lump, x), (mass, np.array([ln[1], 0.1, -0.1])))
@@ -165,9 +169,11 @@ def test_the_base_carries_a_lump_on_a_spring_as_the_mass_it_is(reduced, data):
 def test_low_rank_reanalysis_is_the_evaluation(reduced, data, matrix):
     places = reduced.candidates.only(np.arange(5, 55, 11))
     strengths = np.array([0.004, 0.05]) if matrix == "M" else np.array([50.0, 4e3])
-    stiffer = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.04]))
+    stiffer = evaluate(
+        reduced.model, [calibration_parameter(reduced.groups, "E", [0])], np.array([0.04])
+    )
     seen = replace(data, values=data.model(stiffer))
-    rho = ordinary(reduced.groups, "rho", [0])
+    rho = calibration_parameter(reduced.groups, "rho", [0])
     weighed = MassMeasurement(1.2, 0.01)
     base = baseline(reduced.model, [rho], seen, weighed, np.array([0.03]))
     rest = np.zeros(len(places))

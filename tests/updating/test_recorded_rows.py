@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect
-from chladni.effects.calibration_parameters import ordinary
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
 from chladni.updating.reduced_model import evaluate
 from chladni_evidence.recorded_rows import packed, rows_kept, unpacked
@@ -15,7 +15,7 @@ from chladni_evidence.recorded_rows import packed, rows_kept, unpacked
 
 @pytest.fixture
 def null(reduced, responses):
-    data, E = responses.over(reduced.model), [ordinary(reduced.groups, "E", [0])]
+    data, E = responses.rebased(reduced.model), [calibration_parameter(reduced.groups, "E", [0])]
     data = data.allowing_errors(evaluate(reduced.model, E, np.zeros(1), False))
     return HypothesisFit(Effect(), fitted(reduced.model, E, data, None, np.zeros(1)), reduced.model)
 

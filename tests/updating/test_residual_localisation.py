@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect, FieldChange, Parameter
-from chladni.effects.calibration_parameters import ordinary
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
-from chladni.updating.residual_localisation import left_where
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
+from chladni.updating.residual_localisation import residual_localisation
 
 SCALES = MassMeasurement(1.413, 1.4e-3)
 HALF_WAVE = 0.5 * np.sqrt(1.8 * 1.5e-3 * 5200 / 200)  # [m] of steel at 200 Hz: no map is sharper
@@ -39,11 +39,14 @@ def answered(reduced, responses, recorded):
     s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
     data = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
     values = data.model(evaluate(reduced.model, *recorded, False))
-    effects = [ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "rho", [0])]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        calibration_parameter(reduced.groups, "rho", [0]),
+    ]
     base = evaluate(reduced.model, effects, np.zeros(2))
     data = replace(data, values=values).allowing_errors(base, 1e-3)
     fit = fitted(reduced.model, effects, data, SCALES, np.zeros(2))
-    return left_where(HypothesisFit(Effect(), fit, reduced.model), SCALES)
+    return residual_localisation(HypothesisFit(Effect(), fit, reduced.model), SCALES)
 
 
 @pytest.mark.parametrize(("kind", "amount"), [(Local, -0.4), (Local, 0.3), (Heavy, 0.3)])
@@ -57,7 +60,7 @@ def test_it_is_highest_where_the_article_differs(reduced, responses, kind, amoun
 
 
 def test_where_nothing_is_left_nothing_gains(reduced, responses):
-    effect = ordinary(reduced.groups, "E", [0])
+    effect = calibration_parameter(reduced.groups, "E", [0])
     found = answered(reduced, responses, ([effect], np.array([0.02])))
     assert found.best < 3
 
@@ -65,14 +68,17 @@ def test_where_nothing_is_left_nothing_gains(reduced, responses):
 def test_few_noisy_lines_are_blind(reduced, responses):
     """With noise a hundred times the signal no place is known: there is no map."""
     data = replace(responses, noise=np.full(responses.values.shape, 30.0))
-    effects = [ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "rho", [0])]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        calibration_parameter(reduced.groups, "rho", [0]),
+    ]
     base = evaluate(reduced.model, effects, np.zeros(2))
     data = replace(data, values=data.model(base)).allowing_errors(base)
     fit = fitted(reduced.model, effects, data, SCALES, np.zeros(2))
-    assert left_where(HypothesisFit(Effect(), fit, reduced.model), None) is None
+    assert residual_localisation(HypothesisFit(Effect(), fit, reduced.model), None) is None
 
 
 def test_frequencies_alone_have_no_map(reduced, responses):
-    effects = [ordinary(reduced.groups, "E", [0])]
+    effects = [calibration_parameter(reduced.groups, "E", [0])]
     fit = fitted(reduced.model, effects, responses, SCALES, np.zeros(1))
-    assert left_where(HypothesisFit(Effect(), fit, reduced.model), SCALES) is None
+    assert residual_localisation(HypothesisFit(Effect(), fit, reduced.model), SCALES) is None

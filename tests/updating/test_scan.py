@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Parameter, PointTerm
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.points import AtPoints
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
@@ -50,7 +50,7 @@ class Lump(Weight):
 
 @pytest.fixture(scope="module")
 def base(reduced, responses):
-    effects = [ordinary(reduced.groups, q, [0]) for q in ("E", "rho")]
+    effects = [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho")]
     return baseline(reduced.model, effects, responses, WEIGHED, np.array([0.02, -0.03]))
 
 
@@ -64,7 +64,7 @@ def directly(base, model, data, places, k, matrix, strength):
 def residuals(base, model, data, effect):
     """Residuals of the base and an effect of one strength, as a column."""
     state = evaluate(model, [*base.effects, effect], np.append(base.x, 0.0), False)
-    r, _ = data.over(model).residual(state, False)
+    r, _ = data.rebased(model).residual(state, False)
     return replace(base, state=state).with_mass(r[:, None], 0.0)
 
 
@@ -132,7 +132,7 @@ def test_score_has_the_base_profiled_out(base):
 
 def test_slopes_of_all_groups_together_are_the_slope_of_t(reduced, responses, base):
     slopes = field_slopes(base, reduced.model, responses, "t")
-    whole = ordinary(reduced.groups, "t", [0])
+    whole = calibration_parameter(reduced.groups, "t", [0])
     state = evaluate(reduced.model, [*base.effects, whole], np.append(base.x, 0.0))
     _, J = responses.residual(state, True)
     expected = np.append(J[:, -1], state.dweight[-1] / WEIGHED.sd)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import ordinary
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.ema.setup import SensorAccuracy
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.updating.likelihood import Responses
@@ -44,7 +44,7 @@ def made():
 
 @pytest.fixture(scope="module")
 def state(made):
-    return evaluate(made.model, [ordinary(made.groups, "E", [0])], np.zeros(1))
+    return evaluate(made.model, [calibration_parameter(made.groups, "E", [0])], np.zeros(1))
 
 
 def recorded(made, state, use=None):
@@ -57,7 +57,7 @@ def recorded(made, state, use=None):
     empty = Responses(
         np.ones(shape, complex), S, OUTPUTS.rows(built), INPUTS.rows(built), use,
         noise=np.full(shape, 0.002), sensors=sensor_errors(OUTPUTS, INPUTS, built, USUAL),
-    ).over(made.model)  # fmt: skip
+    ).rebased(made.model)  # fmt: skip
     return replace(empty, values=empty.model(state))
 
 

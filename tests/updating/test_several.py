@@ -9,15 +9,15 @@ import pytest
 
 from chladni import parallel
 from chladni.effects import point_mass, sensor_mass
+from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.effect import Effect
+from chladni.effects.effect_context import Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.mass_patch import MassPatch
-from chladni.effects.calibration_parameters import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.search_context import Candidate
 from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
-from chladni.effects.effect_context import Setup
 from chladni.fem.energy import mass_properties
 from chladni.updating import candidates as scanned
 from chladni.updating import diagnosis as diagnosing
@@ -54,7 +54,10 @@ def problem_of(reduced, hidden, mass=0.0):
     """The plate, seen at six sensors, with effects hidden in it: [(effect, x)]."""
     rows = reduced.grids.rows[[reduced.grids.position(g) for g in SENSORS]]
     s = 2 * np.pi * np.linspace(25, TOP, LINES) * (0.08 + 1j)
-    base = (ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01))
+    base = (
+        calibration_parameter(reduced.groups, "E", [0]),
+        random_field(reduced.groups, "t", 0.01),
+    )
     shares = tuple(((g, 1.0),) for g in SENSORS)
     setup = Setup(
         shares, (SENSORS[1], SENSORS[3]), mass_properties(reduced.structure.assembly)[0], TOP
@@ -65,7 +68,9 @@ def problem_of(reduced, hidden, mass=0.0):
     empty = Responses(ones, s, rows, rows[[4]], use)
     weighed = MassMeasurement(setup.weight + mass, 1e-3 * setup.weight)
     labels = tuple(f"{g}:+Z" for g in SENSORS)
-    problem = UpdatingProblem(reduced, empty.over(reduced.model), weighed, base, (), setup, labels)
+    problem = UpdatingProblem(
+        reduced, empty.rebased(reduced.model), weighed, base, (), setup, labels
+    )
     hidden = [(of(problem.where), x) for of, x in hidden]
     article = problem.holding(hidden)
     state = evaluate(article.reduced.model, article.base, article.mean(), False)
@@ -123,7 +128,7 @@ def found(two):
 
 
 def test_candidates_side_by_side_end_where_they_end_one_after_the_other(two, found, monkeypatch):
-    monkeypatch.setattr(side_by_side, "threads", lambda: 3)
+    monkeypatch.setattr(parallel, "threads", lambda: 3)
     for one, other in zip(singles_of(two), found[0], strict=True):
         assert one.effects[0].text == other.effects[0].text
         np.testing.assert_allclose(one.fit.x, other.fit.x, rtol=1e-9, atol=1e-12)
@@ -181,9 +186,9 @@ def test_each_is_borne_by_lines_that_no_fit_saw(two, found):
     """Asked beside the other, of what was held out and of folds of what was fitted."""
     both = found[1].sets[-1]
     for without in both.without:
-        heard = held_out_evidence(two, ~two.data.use, without, both.own, both.about)
-        assert min(heard.votes.values()) > 0
-        assert len(heard.votes) == 3
+        held_out_votes = held_out_evidence(two, ~two.data.use, without, both.own, both.about)
+        assert min(held_out_votes.votes.values()) > 0
+        assert len(held_out_votes.votes) == 3
 
 
 def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):
@@ -208,18 +213,18 @@ def test_a_set_that_is_known_is_not_searched_again(monkeypatch, reduced, two, fo
     monkeypatch.setattr(type(both.own.fit), "of", lambda fit, e: np.zeros(3))
     assert _same(two, both.own, both.own)
     assert not _same(two, both.own, away)
-    assert not _same(two, both.own, replace(both.own, beside=()))
+    assert not _same(two, both.own, replace(both.own, found_before=()))
 
 
 def test_a_rival_has_a_basis_of_its_own_again(two, found):
     """A diagnosis keeps what was found of it, not the vectors that its place added to the basis."""
     lead = found[0][0]
-    rival = on_common_basis(two, lead)
+    alternative = on_common_basis(two, lead)
     with pytest.raises(ValueError, match="mismatch"):
-        rival.data.scaled(rival.fit.state, False)
+        alternative.data.scaled(alternative.fit.state, False)
     null = null_of(two)
     asked = SimpleNamespace(problem=two)
-    again = on_its_own_basis(asked, SimpleNamespace(null=null), rival)
+    again = on_its_own_basis(asked, SimpleNamespace(null=null), alternative)
     assert again.data.scaled(again.fit.state, False)[0].size
     gains = [null.neg2_log_evidence - t.neg2_log_evidence for t in (again, lead)]
     assert gains[0] == pytest.approx(gains[1], rel=0.02)
@@ -257,7 +262,7 @@ def test_what_does_not_pay_goes(two, found):
     """A third that stands beside the two and does nothing is dropped."""
     both = found[1].sets[-1]
     held = two.holding([(e, both.own.fit.of(e)) for e in both.own.effects])
-    held = replace(held, data=both.own.data.over(held.reduced.model))
+    held = replace(held, data=both.own.data.rebased(held.reduced.model))
     idle = masses_of_sensors(two.where)[0]
     three = held.fitted_with(idle, np.array([-6.0]), held.mean())
     left = _paying(two, _More(three, {}, {}, both.about), both.due, 1.0)

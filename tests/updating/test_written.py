@@ -8,10 +8,10 @@ import pytest
 import scipy.sparse as sp
 
 from chladni.decision.hypothesis_table import NULL, HypothesisTable
+from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.model_families import ADHESIVE, ModelFamily
-from chladni.effects.calibration_parameters import ordinary, random_field
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.thickness_distribution import ThicknessDistribution
@@ -23,7 +23,7 @@ from chladni.updating.deciding import decided
 from chladni.updating.decision_in_words import concluded
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.hypothesis_fit import HypothesisFit
-from chladni.updating.implausible_values import leaning
+from chladni.updating.implausible_values import implausible_values
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.reduced_model import evaluate
@@ -36,9 +36,13 @@ from chladni.updating.written_hypothesis import as_foretold, as_found, as_writte
 @pytest.fixture(scope="module")
 def hypothesis(reduced, responses):
     effect = ThicknessDistribution.on(reduced.groups, 0, 1)
-    effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05), effect]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        random_field(reduced.groups, "t", 0.05),
+        effect,
+    ]
     start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
-    data = responses.over(reduced.model)
+    data = responses.rebased(reduced.model)
     return HypothesisFit(effect, fit(reduced.model, effects, data, None, start), reduced.model)
 
 
@@ -139,7 +143,7 @@ def test_what_the_mesh_hides_is_made_up_for_and_still_known(learned, unseen, red
     model = reduced.model_for(over, np.array([4.0]))
     state = evaluate(model, effects, x, False)
     own = replace(
-        learned.fit, effects=effects, x=x, state=state, data=learned.data.over(model),
+        learned.fit, effects=effects, x=x, state=state, data=learned.data.rebased(model),
         covariance=np.eye(len(x)),
     )  # fmt: skip
     found = HypothesisFit(effect, own, model)
@@ -179,9 +183,12 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
 
 def test_calibration_alone_is_written_without_scatter(reduced, responses):
     """What the null has beside E stays out of the deck, and E is fitted anew."""
-    effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05)]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        random_field(reduced.groups, "t", 0.05),
+    ]
     start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
-    fitted = fit(reduced.model, effects, responses.over(reduced.model), None, start)
+    fitted = fit(reduced.model, effects, responses.rebased(reduced.model), None, start)
     deck = as_written(HypothesisFit(Effect(), fitted, reduced.model), None)
     assert [e.name for e in deck.fit.effects] == ["part-scale"]
     assert deck.fit.x[0] == pytest.approx(0.04, abs=2e-3)
@@ -189,9 +196,12 @@ def test_calibration_alone_is_written_without_scatter(reduced, responses):
 
 def test_numbers_as_they_were_found_are_those_of_the_null(reduced, responses):
     """The scatter beside them is gone; values and what is known of them stay."""
-    effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05)]
+    effects = [
+        calibration_parameter(reduced.groups, "E", [0]),
+        random_field(reduced.groups, "t", 0.05),
+    ]
     start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
-    fitted = fit(reduced.model, effects, responses.over(reduced.model), None, start)
+    fitted = fit(reduced.model, effects, responses.rebased(reduced.model), None, start)
     found = as_found(HypothesisFit(Effect(), fitted, reduced.model))
     assert found.fit.effects == (effects[0],)
     assert found.fit.of(effects[0]) == fitted.of(effects[0])
@@ -212,7 +222,7 @@ def calibration(base, data, found, changed=0.0):
     null = replace(row_of_null(found.null), p=0.5)
     table = HypothesisTable(
         {NULL: null}, nominal=null.neg2_log_evidence + changed,
-        leaning=bool(leaning(found.plain.fit)), families=20,
+        implausible=bool(implausible_values(found.plain.fit)), families=20,
     )  # fmt: skip
     n = sum(len(e.parameters) for e in base)
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(n))
@@ -224,7 +234,10 @@ def calibration(base, data, found, changed=0.0):
 @pytest.mark.parametrize(("x", "verdict"), [(1.6, "calibration only"), (1.4, "nothing missing")])
 def test_a_deck_whose_joints_are_strained_is_calibrated(reduced, responses, x, verdict):
     """The joints explain what E, rho and t would add nothing to: they are what is written."""
-    data, base = responses.over(reduced.model), (ordinary(reduced.groups, "E", [0]), glued(reduced))
+    data, base = (
+        responses.rebased(reduced.model),
+        (calibration_parameter(reduced.groups, "E", [0]), glued(reduced)),
+    )
 
     def at(x):
         found = fit(reduced.model, base, data, None, np.array([0.0, x]), max_steps=0)
@@ -240,10 +253,10 @@ def test_a_deck_whose_joints_are_strained_is_calibrated(reduced, responses, x, v
 
 def test_joints_that_took_more_than_they_scatter_are_numbers_of_the_deck(responses, reduced):
     """Beyond 3 sd: calibrated beside E; within, a nuisance that no deck holds."""
-    E, adhesive = ordinary(reduced.groups, "E", [0]), glued(reduced)
+    E, adhesive = calibration_parameter(reduced.groups, "E", [0]), glued(reduced)
     for x, kept in ((1.6, ["E", "k"]), (1.4, ["E"])):
         at = np.array([0.02, x])
-        data = responses.over(reduced.model)
+        data = responses.rebased(reduced.model)
         begun = fit(reduced.model, [E, adhesive], data, None, at, max_steps=0)
         found = as_found(HypothesisFit(Effect(), begun, reduced.model)).fit
         assert [p.name for e in found.effects for p in e.parameters] == kept
@@ -254,7 +267,10 @@ def test_joints_that_took_more_than_they_scatter_are_numbers_of_the_deck(respons
 
 def prudent(monkeypatch, reduced, responses, E, plain):
     """Calibration as it is answered with, E of the null and of plain calibration given."""
-    data, base = responses.over(reduced.model), (ordinary(reduced.groups, "E", [0]),)
+    data, base = (
+        responses.rebased(reduced.model),
+        (calibration_parameter(reduced.groups, "E", [0]),),
+    )
 
     def at(x):
         found = fit(reduced.model, base, data, None, np.array([x]), max_steps=0)
@@ -288,8 +304,8 @@ def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, res
 
     Nor where no fit of them could even be begun.
     """
-    data = responses.over(reduced.model)
-    base = (ordinary(reduced.groups, "E", [0]),)
+    data = responses.rebased(reduced.model)
+    base = (calibration_parameter(reduced.groups, "E", [0]),)
     found = fit(reduced.model, base, data, None, np.array([0.04]), max_steps=0)
     plain = HypothesisFit(Effect(), found, reduced.model)
     none = HypothesisFit(Effect(), replace(found, x=np.array([np.inf])), reduced.model)
@@ -323,7 +339,7 @@ def test_what_makes_another_material_is_written_before_what_divides_a_part(reduc
     def written(*order):
         fit = SimpleNamespace(effects=order, of=lambda e: x[id(e)])
         named = HypothesisFit(order[0], fit, None, tuple(order[1:]))
-        return outcome.applied(reduced.structure.assembly, named)
+        return verdict_models.applied(reduced.structure.assembly, named)
 
     one, other = written(sheet, patch), written(patch, sheet)
     assert len(one.parts) == len(other.parts) > 1

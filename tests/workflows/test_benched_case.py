@@ -102,8 +102,8 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
     (case / "case.toml").write_text("\n".join(lines))
     before = chladni.load_case(case)
     made = bench(case, tmp_path / "o", "--band", "12:120")
-    renewed = {(s, k) for s, all in RENEWED.items() for k in all}
-    assert {w for w in before.given if w not in renewed} <= set(made.given)
+    refined = {(s, k) for s, all in RENEWED.items() for k in all}
+    assert {w for w in before.given if w not in refined} <= set(made.given)
     for name in ("damping", "band", "held_sensors", "held_band", "parameters", "gain_known"):
         assert getattr(made, name) == getattr(before, name), name
     assert made.setup.accuracy == before.setup.accuracy

@@ -186,7 +186,7 @@ def test_one_wrong_direction_is_named_with_its_line(sound):
 def test_sensors_that_are_heavy_in_earnest_are_no_mistake(sound, tmp_path):
     """A sensor of a sixth of the plate, on the article as in the model."""
     grid, kg = 24, 0.03
-    heavy = replace(sound, carried=((grid, kg),))
+    heavy = replace(sound, sensor_masses=((grid, kg),))
     write_assembly(with_masses(sound.assembly, (grid,), kg), tmp_path / "article.bdf")
     article = chladni.load_model(tmp_path / "article.bdf", "SI")
     frf = chladni.frf(article, list(sound.outputs.labels), ["2:+Z"], sound.frfs[0].frequency)

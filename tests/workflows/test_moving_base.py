@@ -17,7 +17,7 @@ from chladni.io.tables.write_tables import write_npz
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.updating.preparation import prepare
 from chladni.updating.written_scores import seen, written_Q
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import plate
 
 SENSORS = [(0.09, 0.05), (0.12, 0.2), (0.15, 0.1), (0.18, 0.025), (0.21, 0.15), (0.24, 0.0),
@@ -118,7 +118,7 @@ def test_the_reference_of_a_table_has_a_node_of_its_own(heavy, tmp_path):
     (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,base,input\n")
     case = chladni.load_case(tmp_path)
     assert case.inputs.base.tolist() == [True]
-    named, plain = (prepare(question(c)) for c in (case, heavy))
+    named, plain = (prepare(question_of(c)) for c in (case, heavy))
     assert_allclose(named.problem.data.values, plain.problem.data.values)
     (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,bas,input\n")
     with pytest.raises(FileError, match=r"s.csv, line 2: .*bas"):
@@ -127,10 +127,10 @@ def test_the_reference_of_a_table_has_a_node_of_its_own(heavy, tmp_path):
 
 def test_what_is_compared_is_the_full_structures_transmissibility(heavy):
     """Q of the deck by Ritz vectors, and the responses drawn, are of one structure."""
-    asked = question(heavy)
+    asked = question_of(heavy)
     ready = prepare(asked)
     data, state = seen(asked, ready.score, ready.nominal, ready.problem.setup.f_max)
-    drawn = ready.problem.data.over(ready.problem.reduced.model)
+    drawn = ready.problem.data.rebased(ready.problem.reduced.model)
     assert data.quantity == "transmissibility"
     still = replace(data, s=2j * np.pi * np.array([1e-3]), values=np.ones((1, len(SENSORS), 1)))
     assert_allclose(still.model(state), 1.0, atol=1e-6)  # the base carries everything along
@@ -149,7 +149,7 @@ def test_the_page_and_the_deck(heavy, diagnosed, tmp_path):
     (out / "plate.bdf").write_text((out / told["files"]["deck"]).read_text())
     (out / "table.npz").write_bytes((heavy.path.parent / "table.npz").read_bytes())
     (out / "case.toml").write_text(heavy.path.read_text())
-    asked = question(chladni.load_case(out))
+    asked = question_of(chladni.load_case(out))
     ready = prepare(asked)
     (Q,) = written_Q(asked, ready, ready.nominal, (ready.score.use,))
     assert pytest.approx(told["fit"]["Q_with_effect"], rel=1e-6) == Q

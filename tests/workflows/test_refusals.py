@@ -72,8 +72,8 @@ def test_nothing_weighed_nothing_refused(without_mass):
 def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(case, tmp_path, monkeypatch):
     """Whatever is added to the basis, it stays 1 % off: all is on disk, and the exit says so."""
     off = Accuracy(np.ones(1), np.array([0.01]), np.zeros((1, 0)))
-    monkeypatch.setattr(Accuracy, "renewed", lambda self, model: model)
-    monkeypatch.setattr(renewal, "_accuracy", lambda problem, hypothesis: off)
+    monkeypatch.setattr(Accuracy, "refined", lambda self, model: model)
+    monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: off)
     done = call("calibrate", case.path.parent, "--out", tmp_path / "out")
     assert done.exit_code == 3, (done.output, done.exception)
     assert "1.00% off" in done.stderr

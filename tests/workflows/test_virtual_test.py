@@ -63,7 +63,7 @@ def test_the_case_that_is_left_can_be_read(folder, case):
     assert made.setup.hangers == case.setup.hangers
     assert made.band == (15.0, 120.0)  # of the case's, what the test covered
     assert made.held_band is None
-    assert sum(kg for _, kg in made.carried) == pytest.approx(20 * 0.005 + 0.4 * 0.023)
+    assert sum(kg for _, kg in made.sensor_masses) == pytest.approx(20 * 0.005 + 0.4 * 0.023)
     np.testing.assert_allclose(made.assembly.points, case.assembly.points, atol=1e-9)
 
 

@@ -17,7 +17,7 @@ from chladni.updating.accuracy import LIMIT
 from chladni.updating.preparation import ZETA_Q, prepare
 from chladni.updating.written_scores import noise_Q, seen, written_Q
 from chladni.workflows.diagnosis_pipeline import _article_mass
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import plate
 
 LN10 = np.log(10.0)
@@ -34,7 +34,7 @@ def test_a_deck_put_back_has_the_Q_that_was_promised(
     again = tmp_path / "again"
     shutil.copytree(folder, again)
     shutil.copy(tmp_path / "run" / deck, again / "plate.bdf")
-    asked = question(chladni.load_case(again))
+    asked = question_of(chladni.load_case(again))
     prepared = prepare(asked)
     now = written_Q(asked, prepared, prepared.nominal, (prepared.score.use, prepared.held))
     due = diagnosed.agreement
@@ -55,7 +55,7 @@ def test_Q_is_that_of_the_full_matrices(case):
     Frequencies may be ``LIMIT`` off and a slope of log10 H is 1/(ζ ln 10) at most, so the two
     differ by less than LIMIT/(ζ ln 10) decades on a line.
     """
-    asked = question(case)
+    asked = question_of(case)
     prepared = prepare(asked)
     data, state = seen(asked, prepared.score, prepared.nominal, prepared.problem.setup.f_max)
     system = prepared.nominal.structure.system
@@ -81,7 +81,7 @@ def test_every_structure_is_solved_once(diagnosis):
 
 def test_an_unknown_gain_is_no_hidden_parameter(case):
     """Twice the recording: with the gain unknown, Q of the deck is what it was."""
-    asked = replace(question(case), gain_known=False)
+    asked = replace(question_of(case), gain_known=False)
     twice = replace(asked, frf=replace(asked.frf, values=2 * asked.frf.values))
     found = []
     for q in (asked, twice):
@@ -108,7 +108,7 @@ def test_an_updated_deck_is_weighed_without_the_sensors_that_were_found():
     )
     given, made = (SimpleNamespace(assembly=a) for a in (deck, heavier))
     found = SimpleNamespace(fit=SimpleNamespace(effects=effects, of=lambda e: np.ones(1)))
-    asked, kg = SimpleNamespace(carried=()), mass_properties(deck)[0]
+    asked, kg = SimpleNamespace(sensor_masses=()), mass_properties(deck)[0]
     for final in (given, made):
         stages = SimpleNamespace(nominal=given, final=SimpleNamespace(model=final))
         assert _article_mass(asked, stages, found) == pytest.approx(kg)

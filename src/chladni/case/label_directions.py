@@ -55,5 +55,5 @@ def surface_normals(made: Assembly, dofs: MeasuredDofs) -> np.ndarray:
     out = np.zeros((len(dofs.labels), 3))
     real = np.flatnonzero(~dofs.base)
     if len(made.shells) and len(real):
-        out[real] = ShellSurface.whole(made).feet(dofs.points[real]).normal
+        out[real] = ShellSurface.whole(made).closest_points(dofs.points[real]).normal
     return out

@@ -22,7 +22,7 @@ from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
-from ..model.point_masses import with_masses
+from ..model.point_masses import with_mass_pairs
 from ..units import HERTZ, UNITS, Units
 from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
@@ -30,7 +30,8 @@ from .mended_recordings import mended, read_as, record_length, with_frf
 from .recording_groups import described, refuse_copies, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
-from .sensor_places import ROLES, carried, carried_said, grid_row, labels, places, unrecorded
+from .sensor_places import ROLES, grid_row, labels, places, sensor_masses, unrecorded
+from .sensor_places import weight_of_sensors as weight
 from .toml_sections import KeyFile, TomlSection, read_keys
 
 OUTSIDE = "[model] outside: files of the case may lie outside of its folder"  # as a note
@@ -59,7 +60,7 @@ class Case:
     notes : tuple of str      what was read otherwise than it stands there
     given : (section, key)    every word the file holds
     keys : KeyFile            the same with what they say
-    carried : (grid, kg)      sensors of known mass: on the article while it was measured
+    sensor_masses : (grid, kg) pairs of known mass: on the article while it was measured
     """
 
     path: Path
@@ -81,7 +82,7 @@ class Case:
     notes: tuple[str, ...] = field(default=())
     given: tuple[tuple[str, str], ...] = ()
     keys: KeyFile = field(default_factory=lambda: KeyFile(Path(), {}))
-    carried: tuple[tuple[int, float], ...] = ()
+    sensor_masses: tuple[tuple[int, float], ...] = ()
 
     @property
     def frfs(self) -> tuple[FRF, ...]:
@@ -92,20 +93,14 @@ class Case:
 
     def tested(self, assembly: Assembly) -> Assembly:
         """An article with the sensors of known mass on it, as it was measured."""
-        if not self.carried:
-            return assembly
-        grids, m = zip(*self.carried, strict=True)
-        return with_masses(assembly, grids, np.array(m))
+        return with_mass_pairs(assembly, self.sensor_masses)
 
     def said(self, command: str) -> list[str]:
         """Notes of what was read and how, and of what this command makes no use of."""
         out = [*self.notes, *unread(self.given, command)]
-        if self.carried and command in key("sensors.csv", "mass").used:
-            said = carried_said(self.assembly, self.outputs, self.inputs, "sensors.csv")
-            out.append(
-                f"{said}, at {len(self.carried)} grids, before anything is asked; the weighed mass "
-                "and the deck that is written are without them."
-            )
+        if self.sensor_masses and command in key("sensors.csv", "mass").used:
+            said = weight(self.assembly, self.outputs, self.inputs, "sensors.csv")
+            out.append(f"{said}, at {len(self.sensor_masses)} grids; the weighed mass is without.")
         return out
 
     def lines(self, frequency: np.ndarray) -> np.ndarray:
@@ -183,7 +178,7 @@ def load_case(path: str | Path) -> Case:
         notes=tuple(notes),
         given=keys.given(),
         keys=keys,
-        carried=carried(made, outputs, inputs),
+        sensor_masses=sensor_masses(made, outputs, inputs),
     )
 
 

@@ -44,7 +44,7 @@ class Key:
 
 
 FIELDS = ("E", "rho", "nu", "t", "wall", "E1", "E2", "G12", "nu12", "K", "M")
-ALIASES = {  # effects that are an ordinary number by another name
+ALIASES = {  # effects that are a calibration parameter by another name
     "global-stiffness": "E",
     "part-stiffness": "E",
     "global-density": "rho",

@@ -108,7 +108,7 @@ def _off_said(made: Assembly, role: Role, given: list[np.ndarray]) -> list[str]:
     if not given:
         return []
     if len(made.shells):
-        off = float(ShellSurface.whole(made).feet(np.array(given)).distance.max())
+        off = float(ShellSurface.whole(made).closest_points(np.array(given)).distance.max())
     else:
         off = max(float(np.linalg.norm(made.points - x, axis=1).min()) for x in given)
     if off <= 1e-6 * float(np.linalg.norm(np.ptp(made.points, axis=0))):
@@ -167,7 +167,7 @@ def unrecorded(setup: TestSetup, outputs: MeasuredDofs, inputs: MeasuredDofs) ->
     return [f"{len(rows)} rows of the table of sensors are in no recording: {', '.join(rows[:6])}"]
 
 
-def carried(made: Assembly, *places: MeasuredDofs) -> tuple[tuple[int, float], ...]:
+def sensor_masses(made: Assembly, *places: MeasuredDofs) -> tuple[tuple[int, float], ...]:
     """(grid, kg) of the devices of known mass; rows of one place and role are one device.
 
     On a shell the mass hangs on the corners by their weights.
@@ -183,9 +183,11 @@ def carried(made: Assembly, *places: MeasuredDofs) -> tuple[tuple[int, float], .
     return tuple(sorted(out.items()))
 
 
-def carried_said(made: Assembly, outputs: MeasuredDofs, inputs: MeasuredDofs, table: str) -> str:
-    """What the devices of known mass weigh: the sensors, and what sits where it is driven."""
-    grams = [1e3 * sum(m for _, m in carried(made, at)) for at in (outputs, inputs)]
+def weight_of_sensors(
+    made: Assembly, outputs: MeasuredDofs, inputs: MeasuredDofs, table: str
+) -> str:
+    """State the mass of the sensors and of the devices at the drive points, in words."""
+    grams = [1e3 * sum(m for _, m in sensor_masses(made, at)) for at in (outputs, inputs)]
     named = ("sensors of {:.3g} g in all", "{:.3g} g where it is driven")
     said = [text.format(g) for text, g in zip(named, grams, strict=True) if g]
     return f"The model carries {' and '.join(said)} ({table})"
@@ -224,7 +226,7 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
             int(made.ids[row]),
         )
     else:
-        found = ShellSurface.whole(made).feet(place)
+        found = ShellSurface.whole(made).closest_points(place)
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
     if away > _FAR * size:
         raise LabelError(

@@ -18,7 +18,7 @@ from ..output import write_text
 from ..planning import PlanSettings, plan, sensors_csv
 from ..progress import Progress, within
 from ..report.result_json import to_json
-from ..workflows.loaded_model import beside, is_case, load_deck
+from ..workflows.loaded_model import is_case, load_deck, similar_names
 from ..workflows.virtual_test import BenchSettings, virtual_test
 from .run import Allow, DeckOrCase, Out, Units, limits, started
 
@@ -165,7 +165,7 @@ def _case(
         on_table = driven.startswith("base:")
         hangers = "" if on_table else f"hangers = {[int(h) for h in made.hangers]}\n"
     elif not sensors.is_file():
-        raise FileError(f"no file {sensors}{beside(sensors)}")
+        raise FileError(f"no file {sensors}{similar_names(sensors)}")
     elif driven:
         write_text(table, with_input(sensors, driven))
     else:  # as it is: what is wrong in it is told where it is read

@@ -1,4 +1,4 @@
-"""``chladni calibrate``: ordinary parameters alone, no new physics."""
+"""``chladni calibrate``: calibration parameters alone, no new physics."""
 
 from ..workflows.calibrate import calibrate
 from .run import CaseFolder, Out, diagnosed

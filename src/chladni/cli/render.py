@@ -13,7 +13,7 @@ from ..errors import FileError
 from ..geometry.clearance import Gaps, PairClearance, all_gaps, nearest, summary
 from ..report.blocks import Block, Picture, Table
 from ..report.words import number
-from ..workflows.loaded_model import LEAST, Model, load_model, on_faces
+from ..workflows.loaded_model import LEAST_MODES, Model, load_model, on_faces
 from .run import Allow, DeckOrCase, Out, Run, Units, started
 from .shape_pictures import against_scan, cuts
 
@@ -95,7 +95,7 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     if not count:
         return None
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.2)
-    modal = model.modes(max(count, LEAST))
+    modal = model.modes(max(count, LEAST_MODES))
     if len(modal) < count:
         raise FileError(f"{job.source} has {len(modal)} modes, number {count} was asked for")
     rigid = int(rigid_modes(modal).sum())

@@ -14,7 +14,7 @@ from ..report.result_json import to_json
 from ..studies.parameter_study import ParameterStudy, study
 from ..studies.study_settings import StudySettings
 from ..studies.workers import NO_WORKER
-from ..workflows.loaded_model import DeckModels, beside, is_case, load_deck
+from ..workflows.loaded_model import DeckModels, is_case, load_deck, similar_names
 from .console import say, watched
 from .run import (
     MOST_LINES,
@@ -93,7 +93,7 @@ def run(
 
 def _source(source: Path, units: str | None, allow: list[str]) -> Case | DeckModels:
     if not source.exists():
-        raise FileError(f"no file or folder {source}{beside(source)}")
+        raise FileError(f"no file or folder {source}{similar_names(source)}")
     return load_case(source) if is_case(source) else load_deck(source, units, allow)
 
 

@@ -78,7 +78,7 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
         Q = table.deck(deck)
         if Q and not any(q > b for q, b in zip(Q, before, strict=True)):  # no Q is no worse
             return replace(decision, deck=deck)
-    if not table.leaning:
+    if not table.implausible:
         Q = table.deck(CalibratedDeck.PLAIN)
         if not all(q > b for q, b in zip(Q, before, strict=True)):
             return decision

@@ -20,7 +20,7 @@ from dataclasses import replace
 from .answer import with_numbers, with_ties
 from .decision_rules import DecisionRules
 from .hypothesis_table import NULL, HypothesisTable, Missing, Row, SetRow, Wanted
-from .judgement import JudgedTable, judged, tested, untested
+from .judgement import JudgedTable, apply_held_out, tested, untested
 from .named_sets import largest_named
 from .reasons import ALONE, Decision, Reason, Step, steps
 
@@ -57,8 +57,8 @@ def _named(case: JudgedTable) -> Decision:
         return found
     decision = replace(alone, steps=steps(alone, *refusals))
     if decision.named:
-        decision = _with_lead_renewed(case, alone, decision, [s for s in sets if not s.pays])
-    if decision.refused and decision.whole is None and case.rules.rivals:
+        decision = _with_lead_refined(case, alone, decision, [s for s in sets if not s.pays])
+    if decision.refused and decision.whole is None and case.rules.alternatives:
         decision = _rivals_heard(case, decision)
     return decision
 
@@ -100,14 +100,14 @@ def _borne_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
     gain = table.gain(lead)
     if gain <= (0.0 if poles else case.rules.good_part * decision.due):
         return decision
-    if not case.carried(gain, lead.heard(), decision.due, poles):
+    if not case.evidence_suffices(gain, lead.held_out_votes(), decision.due, poles):
         return decision
     done = tuple(s for s in decision.steps if s.key != NULL)  # without the steps on calibration
     borne = replace(decision, steps=(*done, Step(Reason.BORNE_BY_ALL, lead.key)))
     return tested(case, borne, lead)
 
 
-def _with_lead_renewed(
+def _with_lead_refined(
     case: JudgedTable, alone: Decision, decision: Decision, in_part: Sequence[SetRow]
 ) -> Decision:
     """Decide on the leader, fitted again on a refined basis, with all data.
@@ -121,12 +121,12 @@ def _with_lead_renewed(
     of Q must disappear from the fitted or from the held-out data.
     """
     key, *behind = decision.order
-    lead, rules = case.table.renewal(key), case.rules
+    lead, rules = case.table.refinement(key), case.rules
     step = Step(Reason.RENEWED, key)
     named = replace(
         decision, order=(lead.key, *behind), due=case.due(lead), steps=steps(decision, step)
     )
-    refused = judged(case, named, rules.most_left)
+    refused = apply_held_out(case, named, rules.most_left)
     if refused.reason is not Reason.LEAVES_MORE:
         return refused
     found, refusals = largest_named(case, alone, in_part if rules.sets_in_part else ())
@@ -134,9 +134,9 @@ def _with_lead_renewed(
         return found
     refused = replace(refused, steps=steps(refused, *refusals))
     p = case.table.rows[key].fit(rules)
-    if not (p > rules.usual and lead.heard().all_for):
+    if not (p > rules.usual and lead.held_out_votes().all_for):
         return refused
-    usual = judged(case, named, rules.most_usual_left)
+    usual = apply_held_out(case, named, rules.most_usual_left)
     if not usual.named:
         return refused
     return replace(usual, steps=steps(usual, Step(Reason.USUAL_LEFT, lead.key), *refusals))
@@ -150,39 +150,39 @@ def _rivals_heard(case: JudgedTable, refused: Decision) -> Decision:
     the true cause, while the leader imitates it and fits slightly better for a wrong reason. A
     leader that is far ahead refutes its rivals, as it refutes calibration alone.
     """
-    table, (lead, *rivals) = case.table, case.rows(refused.order)
+    table, (lead, *alternatives) = case.table, case.rows(refused.order)
     ahead = table.gain(lead)
     over: tuple[tuple[str, Reason], ...] = ((lead.name, refused.reason),)
-    for rival in rivals:
-        gain = table.gain(rival)
+    for alternative in alternatives:
+        gain = table.gain(alternative)
         if gain <= refused.due or ahead - gain > case.rules.running * refused.due:
             break
-        asked = _asked_next(case, refused, rival, over)
+        asked = _asked_next(case, refused, alternative, over)
         why = _against(case, refused, asked) if asked.named else asked.reason
         if why is None:
             return asked
-        over = (*over, (rival.name, why))
+        over = (*over, (alternative.name, why))
     return replace(refused, passed_over=over)
 
 
 def _asked_next(
-    case: JudgedTable, refused: Decision, rival: Row, over: tuple[tuple[str, Reason], ...]
+    case: JudgedTable, refused: Decision, alternative: Row, over: tuple[tuple[str, Reason], ...]
 ) -> Decision:
     """Test a rival, placed in front of the explanations that were passed over."""
-    row = case.table.renewal(rival.key)
-    others = (k for k in refused.order if k != rival.key)
+    row = case.table.refinement(alternative.key)
+    others = (k for k in refused.order if k != alternative.key)
     led = replace(
         refused, order=(row.key, *others), due=case.due(row), passed_over=over, one_of=(),
         refuting=None, votes=None,
         steps=steps(
             refused, Step(Reason.NEXT, row.key, over[-1][1], names=(over[-1][0],)),
-            Step(Reason.RENEWED, rival.key),
+            Step(Reason.RENEWED, alternative.key),
         ),
     )  # fmt: skip
     if not row.fitted:
         return replace(led, reason=Reason.NOT_FITTED, named=False)
     led = tested(case, led, row)
-    return judged(case, led, case.rules.most_left) if led.named else led
+    return apply_held_out(case, led, case.rules.most_left) if led.named else led
 
 
 def _against(case: JudgedTable, refused: Decision, asked: Decision) -> Reason | None:
@@ -192,8 +192,8 @@ def _against(case: JudgedTable, refused: Decision, asked: Decision) -> Reason | 
     calibration alone. Modal damping that follows the leader's change refutes a lossless rival.
     """
     table, rules = case.table, case.rules
-    (lead, *_), (rival, *_) = case.rows(refused.order), case.rows(asked.order)
+    (lead, *_), (alternative, *_) = case.rows(refused.order), case.rows(asked.order)
     news = [0.0 if d.votes is None else d.votes.news for d in (refused, asked)]
-    if table.gain(lead) + news[0] - table.gain(rival) - news[1] > rules.refuted * refused.due:
+    if table.gain(lead) + news[0] - table.gain(alternative) - news[1] > rules.refuted * refused.due:
         return Reason.REFUTED
-    return Reason.DAMPING if table.after(rival, lead) < rules.fits_damping else None
+    return Reason.DAMPING if table.after(alternative, lead) < rules.fits_damping else None

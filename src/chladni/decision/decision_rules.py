@@ -68,7 +68,9 @@ class DecisionRules:
     )
     usual: float = _rule(0.9, 1.0, "p above which what is left is what the model's form errs by")
     most_usual_left: float = _rule(0.8, 0.5, "of Q: so much may be left where that is usual")
-    rivals: bool = _rule(True, False, "where the leader is refused, what comes behind it is asked")
+    alternatives: bool = _rule(
+        True, False, "where the leader is refused, what comes behind it is asked"
+    )
     running: float = _rule(
         2.0, math.inf, "times the gain due: a rival further behind the leader is not asked"
     )

@@ -29,7 +29,7 @@ class Wanted:
 
     ask: Ask
     key: str
-    beside: str = ""
+    after: str = ""
 
 
 class Missing(Exception):
@@ -131,7 +131,7 @@ class Row:
         p = self.fit(rules)
         return not p < (rules.fits if p == self.p else rules.fits_damping)
 
-    def heard(self) -> Votes:
+    def held_out_votes(self) -> Votes:
         """The votes; raise ``Missing`` if they are not known."""
         if self.votes is None:
             raise Missing(Wanted(Ask.VOTES, self.key))
@@ -145,7 +145,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Rival:
+class AlternativeRow:
     """A family that could replace one member of a set.
 
     Attributes
@@ -179,7 +179,7 @@ class SetRow:
     gains: tuple[float, ...]
     due: float
     ahead: float
-    rivals: tuple[tuple[Rival, ...], ...]
+    alternatives: tuple[tuple[AlternativeRow, ...], ...]
 
     @property
     def pays(self) -> bool:
@@ -206,13 +206,13 @@ class HypothesisTable:
 
     Attributes
     ----------
-    rows : by key; ``NULL`` is calibration alone, ``renewed(key)`` a row that was fitted again
+    rows : by key; ``NULL`` is calibration alone, ``refined(key)`` a row that was fitted again
     singles : keys of the best of every family, best first
     sets : of several effects, in the order in which they grew
     nominal : -2 ln evidence of the given deck, scatter allowed
     poles : whether natural frequencies are compared
     enough : whether there are enough data to support a name
-    leaning : whether plain calibration has implausible values
+    implausible : whether plain calibration has implausible values
     decks : Q of each calibration, with and without the mesh error; () where there is no such fit;
         of ``GIVEN`` that of the given deck
     families : number of known families, used where none was tried
@@ -225,7 +225,7 @@ class HypothesisTable:
     nominal: float = 0.0
     poles: bool = False
     enough: bool = True
-    leaning: bool = False
+    implausible: bool = False
     decks: Mapping[CalibratedDeck, tuple[float, ...]] = field(default_factory=dict)
     families: int = 1
     known_noise: bool = False
@@ -239,11 +239,11 @@ class HypothesisTable:
         """Gain over calibration alone, in -2 ln evidence."""
         return self.null.neg2_log_evidence - row.neg2_log_evidence
 
-    def renewal(self, key: str) -> Row:
+    def refinement(self, key: str) -> Row:
         """The row fitted again on a refined basis; raise ``Missing`` if it was not."""
-        if renewed(key) not in self.rows:
+        if refined(key) not in self.rows:
             raise Missing(Wanted(Ask.RENEWAL, key))
-        return self.rows[renewed(key)]
+        return self.rows[refined(key)]
 
     def after(self, row: Row, leader: Row) -> float:
         """P of the test that the damping left by a row follows the change by the leader."""
@@ -263,9 +263,9 @@ class HypothesisTable:
         return replace(self, rows={**self.rows, **{r.key: r for r in rows}})
 
 
-def renewed(key: str) -> str:
+def refined(key: str) -> str:
     """Key of a row that was fitted again."""
-    return f"{key}, renewed"
+    return f"{key}, refined"
 
 
 def after(key: str, leader: str) -> str:

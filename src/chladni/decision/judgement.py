@@ -30,7 +30,7 @@ class JudgedTable:
         changed = self.table.nominal - self.table.null.neg2_log_evidence > self.rules.changed
         return "calibration only" if changed else "nothing missing"
 
-    def carried(self, gain: float, votes: Votes, due: float, poles: bool = False) -> bool:
+    def evidence_suffices(self, gain: float, votes: Votes, due: float, poles: bool = False) -> bool:
         """True if fitted and held-out data support a name whose required gain is ``due``.
 
         ``poles`` are few: all of them together must reach it. The sum also counts for responses,
@@ -62,7 +62,7 @@ def untested(case: JudgedTable, decision: Decision) -> Decision:
     )  # fmt: skip
 
 
-def judged(case: JudgedTable, decision: Decision, most_left: float) -> Decision:
+def apply_held_out(case: JudgedTable, decision: Decision, most_left: float) -> Decision:
     """Decide on the first row with the held-out data.
 
     The fitted data must still support the name after the second fit. Held-out data refuse it
@@ -79,16 +79,16 @@ def judged(case: JudgedTable, decision: Decision, most_left: float) -> Decision:
     """
     table, rules = case.table, case.rules
     row = table.rows[decision.order[0]]
-    due, gain, votes, left = decision.due, table.gain(row), row.heard(), row.leaves()
+    due, gain, votes, left = decision.due, table.gain(row), row.held_out_votes(), row.leaves()
     decision = replace(decision, votes=votes)
-    voted = case.carried(gain, votes, due, table.poles)
+    voted = case.evidence_suffices(gain, votes, due, table.poles)
     calibrated, held_out = left.held_out
     borne = voted and not held_out > rules.harm * calibrated
     faint = gain < rules.faint * due and held_out > calibrated
     if borne and not (faint or _leaves_more(row, most_left)):
         return replace(
             decision, verdict=row.verdict, reason=Reason.NAMED, named=True,
-            steps=steps(decision, Step(Reason.HEARD, row.key)),
+            steps=steps(decision, Step(Reason.HELD_OUT, row.key)),
         )  # fmt: skip
     why = Reason.AGAINST if any(g < 0 for g in votes.given) else Reason.TOO_LITTLE
     if voted:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from .hypothesis_table import NULL, SetRow
-from .judgement import JudgedTable, judged, tested
+from .judgement import JudgedTable, apply_held_out, tested
 from .reasons import Decision, Reason, Step, steps
 
 
@@ -33,13 +33,15 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
     the rules for held-out data, as a single effect must.
     """
     table, rules = case.table, case.rules
-    row = table.renewal(whole.key)
+    row = table.refinement(whole.key)
     lost = max(0.0, row.neg2_log_evidence - table.rows[whole.key].neg2_log_evidence)
     done = [Step(Reason.FOUND_TOGETHER, whole.key)]
     for k, gain in enumerate(whole.gains):
-        if not case.carried(gain - lost, table.rows[whole.member(k)].heard(), whole.due):
+        if not case.evidence_suffices(
+            gain - lost, table.rows[whole.member(k)].held_out_votes(), whole.due
+        ):
             return Step(Reason.SET_REFUSED, whole.key, Reason.NOT_BORNE, k)
-        done.append(Step(Reason.HEARD_BESIDE, whole.key, member=k))
+        done.append(Step(Reason.HELD_OUT_OF_SET, whole.key, member=k))
     begun = replace(
         alone, order=(row.key, *alone.order), due=case.due(row, 1), steps=tuple(done), whole=whole
     )
@@ -49,21 +51,21 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
     before = table.rows[alone.tested or NULL]
     if not before.fits(rules) and row.fit(rules) < rules.plainly:
         return Step(Reason.SET_REFUSED, whole.key, Reason.BARELY_FITS)
-    found = judged(case, found, rules.most_left)
+    found = apply_held_out(case, found, rules.most_left)
     if not found.named:
         return Step(Reason.SET_REFUSED, whole.key, found.reason)
     found = replace(found, reason=Reason.TOGETHER)
-    for k, rivals in enumerate(whole.rivals):
-        if rivals:
-            one_of = (whole.members[k], *(r.name for r in rivals))
+    for k, alternatives in enumerate(whole.alternatives):
+        if alternatives:
+            one_of = (whole.members[k], *(r.name for r in alternatives))
             step = Step(Reason.RIVAL_OF_MEMBER, whole.key, member=k, names=one_of)
             found = replace(found, one_of=one_of, steps=steps(found, step))
             break
-    renewed = Step(Reason.RENEWED, whole.key)
-    return replace(found, steps=steps(found, renewed, *_perhaps_beside(case, whole)))
+    refined = Step(Reason.RENEWED, whole.key)
+    return replace(found, steps=steps(found, refined, *_perhaps_of_set(case, whole)))
 
 
-def _perhaps_beside(case: JudgedTable, named: SetRow) -> tuple[Step, ...]:
+def _perhaps_of_set(case: JudgedTable, named: SetRow) -> tuple[Step, ...]:
     """One step for every effect that reaches a part of its required gain after the named ones."""
     part: dict[str, Step] = {}
     for other in case.table.sets:

@@ -32,9 +32,9 @@ class Reason(Enum):
     TESTED = auto()  # against its own predictions
     RENEWED = auto()  # the fit was repeated on a refined basis
     BORNE_BY_ALL = auto()  # all data together support the name
-    HEARD = auto()  # held-out data do not refuse the name
+    HELD_OUT = auto()  # held-out data do not refuse the name
     FOUND_TOGETHER = auto()
-    HEARD_BESIDE = auto()  # held-out data do not refuse a member of a set
+    HELD_OUT_OF_SET = auto()  # held-out data do not refuse a member of a set
     SET_REFUSED = auto()
     PERHAPS_BESIDE = auto()  # an effect that reaches a part of its required gain
     RIVAL_OF_MEMBER = auto()

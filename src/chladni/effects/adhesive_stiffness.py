@@ -23,7 +23,7 @@ from .search_context import Candidate, SearchContext, best_places
 
 SD = 3.0  # of ln of the factor
 STARTS = (-2.5, 2.0, 4.0)
-MOST = 12  # beads tried, longest first
+MOST_BEADS = 12  # beads tried, longest first
 FOLLOWED = 2
 SEALANT = 80e6  # [Pa] upper limit of a soft hem sealant (Echaniz Granado 2015: 6 MPa)
 
@@ -59,9 +59,9 @@ class AdhesiveStiffness(Effect):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write E of the bead, and E of the other beads as fitted with it."""
         assert self.joint is not None
-        beside = self.parameters[1].value(x[1]) if len(x) > 1 else 1.0
-        made = with_solids(assembly, beside, soft=True)
-        return with_factor_on(made, self.joint, float(np.exp(x[0])) / beside)
+        auxiliary_residual = self.parameters[1].value(x[1]) if len(x) > 1 else 1.0
+        made = with_solids(assembly, auxiliary_residual, soft=True)
+        return with_factor_on(made, self.joint, float(np.exp(x[0])) / auxiliary_residual)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """E of the bead."""
@@ -78,8 +78,8 @@ class AdhesiveStiffness(Effect):
 
 
 def longest_beads(built: Structure) -> list[Connection]:
-    """The ``MOST`` longest beads, which are tried."""
-    return sorted(beads(built), key=lambda bead: -len(bead.elements))[:MOST]
+    """The ``MOST_BEADS`` longest beads, which are tried."""
+    return sorted(beads(built), key=lambda bead: -len(bead.elements))[:MOST_BEADS]
 
 
 def beads_of(built: Structure) -> list[AdhesiveStiffness]:
@@ -132,7 +132,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if not effects:
         return []
     points = np.array([e.point for e in effects])
-    return best_places(context, effects, points, FOLLOWED, -1.0, carried=True)
+    return best_places(context, effects, points, FOLLOWED, -1.0, extended=True)
 
 
 def softened_bead(

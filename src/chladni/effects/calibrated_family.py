@@ -14,7 +14,7 @@ class CalibratedFamily(ModelFamily):
     """The factor of a joint family, written into the deck: on E of solids or on K of bushes."""
 
     claim = "joints of a kind are far stiffer or softer than the deck has them"
-    kind = "ordinary"
+    kind = "calibration"
     writable = True
     called = "stiffness, times the deck's"
 

@@ -32,8 +32,8 @@ class PartScale(Effect):
     """E, rho or t (of beams: the wall) of one part, or of several together, times e^x."""
 
     name = "part-scale"
-    claim = "an ordinary value of the deck is off"
-    kind = "ordinary"
+    claim = "a calibration parameter of the deck is off"
+    kind = "calibration"
 
     quantity: str = "E"
     positions: tuple[int, ...] = ()
@@ -49,7 +49,7 @@ class PartScale(Effect):
         return with_scaled(assembly, self.quantity, self.positions, float(np.exp(x[0])))
 
 
-def ordinary(
+def calibration_parameter(
     groups: ElementGroups, quantity: str, positions: Sequence[int], sd: float | None = None
 ) -> PartScale:
     """One calibration parameter of these parts, with its prior."""
@@ -77,9 +77,11 @@ def defaults(groups: ElementGroups) -> list[PartScale]:
     for k in used:
         material = _material(parts[k])
         by_material.setdefault(id(material) if material is None else material.id, []).append(k)
-    out = [ordinary(groups, "E", [k]) for k in used]
-    out += [ordinary(groups, "rho", ks) for ks in by_material.values()]
-    return out + [ordinary(groups, t, [k]) for k in used if (t := thickness_of(parts[k]))]
+    out = [calibration_parameter(groups, "E", [k]) for k in used]
+    out += [calibration_parameter(groups, "rho", ks) for ks in by_material.values()]
+    return out + [
+        calibration_parameter(groups, t, [k]) for k in used if (t := thickness_of(parts[k]))
+    ]
 
 
 def thickness_of(part: Part) -> str:

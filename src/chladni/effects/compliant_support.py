@@ -31,14 +31,14 @@ SEEN = 1e-11  # of a rigid spring: smaller modal reactions are rounding
 TYPICAL = 0.01  # prior median: share of stiffness lost by the mode with the largest reaction
 NEAR_AXIS = 0.999  # cosine from which a direction counts as an axis of the basic frame
 TOGETHER = 0.01  # correlation of moment and force below which they come from different modes
-MOST = 12  # ways tried: those with the largest loss of stiffness
+MOST_DIRECTIONS = 12  # ways tried: those with the largest loss of stiffness
 FOLLOWED = 2  # ways that are fitted
 DRAWN = 8  # modes of an article that set the reactions at its clamp
 TAKEN = 0.05, 0.25  # share of stiffness lost by that mode, for each spring of a concealed clamp
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class SupportDirection:
     """One compliance of a clamp: along the first axis of a frame, and about the second.
 
     Attributes
@@ -79,7 +79,7 @@ class CompliantSupport(Effect):
 
     every: tuple[Clamp, ...] = ()  # clamps of the structure, including this one
     rigid: np.ndarray | None = None  # springs as good as rigid of all of them (6 clamps,)
-    way: Way | None = None
+    direction: SupportDirection | None = None
     rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure
 
     def released(self, built: Structure) -> Structure:
@@ -90,9 +90,9 @@ class CompliantSupport(Effect):
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """(k - k_rigid) gᵀg for each compliant motion g of the clamp."""
         assert self.rows is not None
-        assert self.way is not None
+        assert self.direction is not None
         k = self.springs(x)
-        return (PointTerm("K", self.rows, k - self.way.rigid, np.diag(k)),)
+        return (PointTerm("K", self.rows, k - self.direction.rigid, np.diag(k)),)
 
     def springs(self, x: np.ndarray) -> np.ndarray:
         """Spring stiffness [N/m] and [N m/rad] of each parameter."""
@@ -104,22 +104,26 @@ class CompliantSupport(Effect):
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Replace the supports by GRID, RBE2 and CELAS2 to ground."""
-        assert self.way is not None
-        return on_springs(assembly, self.every[self.way.clamp], self.way, self.springs(x))
+        assert self.direction is not None
+        return on_springs(
+            assembly, self.every[self.direction.clamp], self.direction, self.springs(x)
+        )
 
 
-def on_springs(assembly: Assembly, clamp: Clamp, way: Way, k: np.ndarray) -> Assembly:
+def on_springs(
+    assembly: Assembly, clamp: Clamp, direction: SupportDirection, k: np.ndarray
+) -> Assembly:
     """The assembly with a clamp on springs k."""
-    springs = dict(zip(way.components, k.tolist(), strict=True))
+    springs = dict(zip(direction.components, k.tolist(), strict=True))
     return with_clamp_on_springs(
-        assembly, clamp.grids, clamp.held, clamp.centre, way.frame, springs
+        assembly, clamp.grids, clamp.held, clamp.centre, direction.frame, springs
     )
 
 
 def ways_of(
     built: Structure, every: tuple[Clamp, ...], frequency: np.ndarray, shapes: np.ndarray,
     stiff: np.ndarray,
-) -> list[Way]:  # fmt: skip
+) -> list[SupportDirection]:  # fmt: skip
     """Up to three compliances of each clamp, those with the largest loss of stiffness first.
 
     To first order a spring k reduces the stiffness of a mode with reaction f by f²/(k λ). A clamp
@@ -145,8 +149,10 @@ def ways_of(
             if 0 in seen:
                 components = tuple((1, 5)[j] for j in seen)
                 frame = np.stack([x, y, np.cross(x, y)])
-                out.append(Way(k, frame, components, rigid[seen], pull[seen]))
-    return sorted(out, key=lambda way: -float((way.pull / way.rigid[:, None]).sum()))
+                out.append(SupportDirection(k, frame, components, rigid[seen], pull[seen]))
+    return sorted(
+        out, key=lambda direction: -float((direction.pull / direction.rigid[:, None]).sum())
+    )
 
 
 def _turning(x: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
@@ -191,8 +197,10 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if not every or not elastic.any():
         return []
     stiff = rigid_springs(built.assembly, every, where.setup.weight, where.setup.f_max)
-    ways = ways_of(built, every, where.frequency[elastic], where.shapes[:, elastic], stiff)[:MOST]
-    effects = [_effect(built, every, stiff, way, len(ways)) for way in ways]
+    ways = ways_of(built, every, where.frequency[elastic], where.shapes[:, elastic], stiff)[
+        :MOST_DIRECTIONS
+    ]
+    effects = [_effect(built, every, stiff, direction, len(ways)) for direction in ways]
     best = sorted(
         best_starts(context, effects), key=lambda c: context.scores(c.effect, [c.start]).min()
     )
@@ -200,32 +208,38 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def _effect(
-    built: Structure, every: tuple[Clamp, ...], stiff: np.ndarray, way: Way, tried: int
+    built: Structure,
+    every: tuple[Clamp, ...],
+    stiff: np.ndarray,
+    direction: SupportDirection,
+    tried: int,
 ) -> CompliantSupport:
-    clamp, n, first = every[way.clamp], len(built.system.dofs), 6 * way.clamp
-    rows = sp.lil_array((len(way.components), n + 6 * len(every)))
-    rows[:, n + first : n + first + 6] = way.motions()
+    clamp, n, first = every[direction.clamp], len(built.system.dofs), 6 * direction.clamp
+    rows = sp.lil_array((len(direction.components), n + 6 * len(every)))
+    rows[:, n + first : n + first + 6] = direction.motions()
     names = {1: ("K", "N/m"), 5: ("K_rot", "N m/rad")}
     unknown = tuple(
         Parameter(*names[c], 0.0, SD, k, step=1.0, starts=STARTS, nominal=float(np.log(most / k)))
-        for c, k, most in zip(way.components, way.scale.tolist(), way.rigid, strict=True)
+        for c, k, most in zip(
+            direction.components, direction.scale.tolist(), direction.rigid, strict=True
+        )
     )
     x, y, z = clamp.centre.tolist()
     return CompliantSupport(
-        unknown, _said(clamp, way), grids=tuple(int(g) for g in clamp.grids), point=(x, y, z),
-        trials_factor=tried, every=every, way=way, rows=sp.csr_array(rows),
+        unknown, _said(clamp, direction), grids=tuple(int(g) for g in clamp.grids), point=(x, y, z),
+        trials_factor=tried, every=every, direction=direction, rows=sp.csr_array(rows),
         rigid=np.repeat(stiff, 3),
     )  # fmt: skip
 
 
-def _said(clamp: Clamp, way: Way) -> str:
+def _said(clamp: Clamp, direction: SupportDirection) -> str:
     """The place of the clamp and the direction of its compliance, in words."""
     at = ", ".join(f"{1e3 * v:.0f}" for v in clamp.centre)
     n = len(clamp.grids)
     grids = f"grid {clamp.grids[0]}" if n == 1 else f"{n} grids from {clamp.grids[0]} on"
     how = [
-        f"along {_named(way.frame[0])}" if c == 1 else f"about {_named(way.frame[1])}"
-        for c in way.components
+        f"along {_named(direction.frame[0])}" if c == 1 else f"about {_named(direction.frame[1])}"
+        for c in direction.components
     ]
     return f"the supports of {grids} round ({at} mm), {' and '.join(how)}"
 
@@ -248,18 +262,18 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     stiff = rigid_springs(assembly, every, mass_properties(assembly)[0], float(f[-1]))
     ways = ways_of(built, every, f, modes.shapes[:, elastic], stiff)
     chosen = int(rng.integers(len(every)))
-    way = max(
+    direction = max(
         (w for w in ways if w.clamp == chosen), key=lambda w: float((w.pull[:, 0] / w.scale).sum())
     )
-    springs = way.pull.max(axis=1) / rng.uniform(*TAKEN)
-    names = ["K" if c == 1 else "K_rot" for c in way.components]
+    springs = direction.pull.max(axis=1) / rng.uniform(*TAKEN)
+    names = ["K" if c == 1 else "K_rot" for c in direction.components]
     known = dict(zip(names, springs.tolist(), strict=True))
     truth = {
         "point_m": every[chosen].centre.tolist(),
         "value": float(springs[0]),
         "parameters": known,
     }
-    loose = on_springs(assembly, every[chosen], way, springs)
+    loose = on_springs(assembly, every[chosen], direction, springs)
     return replace(article, assembly=loose, truth=truth)
 
 

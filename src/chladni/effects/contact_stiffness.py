@@ -13,17 +13,17 @@ from ..geometry.refine import smooth_normals
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect import Effect, PointTerm
+from .effect_context import ElementGrids
 from .family import Article, Family
 from .points import strength
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .sheet_pairs import SheetPairs
-from .effect_context import ElementGrids
 
 MEDIAN, SD = 2e4, 2.0  # [N/m], sd of ln
 STARTS = (-2.0, 0.0, 2.0)
 TRIED = MEDIAN * np.exp(np.linspace(-4.0, 6.0, 6))
 CLOSE = 1e-3  # [m] of clearance, or less
-MOST, BY_POLES = 200, 16  # places, sampled from all that are close
+MOST_PLACES, BY_POLES = 200, 16  # places, sampled from all that are close
 FOLLOWED = 2
 
 
@@ -101,7 +101,7 @@ def contacts(built: Structure) -> list[ContactStiffness]:
     every = close_places(built.assembly)
     if not len(every):
         return []
-    places = every.only(farthest_point_sample(every.middle, MOST).tolist())
+    places = every.only(farthest_point_sample(every.middle, MOST_PLACES).tolist())
     rows, K = places.relative_rows(built), strength("K", "N/m", MEDIAN, SD, STARTS)
     out = []
     for k, sheets in enumerate(places.sheets):
@@ -130,7 +130,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if context.scan is None:
         some = farthest_point_sample(points, BY_POLES)
         chosen = [effects[k] for k in some]
-        return best_places(context, chosen, points[some], FOLLOWED, carried=True)
+        return best_places(context, chosen, points[some], FOLLOWED, extended=True)
     places = ElementGrids(
         np.array([e.grids[0] for e in effects]),
         np.array([e.place.along[0] for e in effects if e.place is not None]),

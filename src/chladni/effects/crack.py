@@ -23,7 +23,7 @@ from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, ResponseScan, SearchContext, best_places, distinct
 
-LEAST = 0.1  # of the bending stiffness always remains, so that K stays positive
+LEAST_LEFT = 0.1  # of the bending stiffness always remains, so that K stays positive
 SHELLS = 3  # in a line at least
 REACH = 0.55  # of a shell's size times ``SHELLS``: half the least length
 WIDE = 0.75  # of a shell's size: half the width of a line, so that no corner bridges an oblique one
@@ -169,7 +169,7 @@ class Crack(Effect):
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """(f - 1) B."""
         f = left(x[0])
-        slope = -(f - LEAST) * (1 - (f - LEAST) / (1 - LEAST))
+        slope = -(f - LEAST_LEFT) * (1 - (f - LEAST_LEFT) / (1 - LEAST_LEFT))
         return (MatrixTerm("K", self.operator, f - 1, np.array([slope])),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
@@ -184,7 +184,7 @@ class Crack(Effect):
 
 def left(x: float) -> float:
     """Remaining share of the bending stiffness, from 1 down to LEAST."""
-    return float(LEAST + (1 - LEAST) / (1 + np.exp(x)))
+    return float(LEAST_LEFT + (1 - LEAST_LEFT) / (1 + np.exp(x)))
 
 
 def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:

@@ -16,7 +16,7 @@ from ..geometry.refine import refined
 from ..model.assembly import Assembly
 from .effect import Effect, Parameter, PointTerm, ShapeChange
 
-MOST = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
+MOST_DOFS = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
 LARGE = 20_000  # dofs from which refined modes are solved only up to the comparison limit
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
@@ -94,7 +94,7 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     """
     built = model.structure
     made = built.assembly
-    if len(built.system.dofs) > MOST or not len(made.shells) + len(made.beams):
+    if len(built.system.dofs) > MOST_DOFS or not len(made.shells) + len(made.beams):
         return []
     above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
     coarse = _CoarseModes.of(

@@ -28,7 +28,7 @@ from ..model.assembly import Assembly
 from .estimate import Estimate, Location
 
 if TYPE_CHECKING:
-    from .effect_context import Surroundings
+    from .effect_context import EffectContext
 
 FIELDS = ("t", "E", "rho", "bending", "Q11", "Q22", "Q12", "Q66")
 
@@ -151,7 +151,7 @@ class MatrixTerm:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class AuxiliaryResidual:
     """Whitened residuals r (k,) of an effect in addition to the data that are compared.
 
     ``gradient`` (k, n_parameters) are the slopes by its own parameters. ``by_lam`` and
@@ -204,7 +204,7 @@ class Effect:
 
     name: ClassVar[str] = "nothing"
     claim: ClassVar[str] = "the model is right as it is"
-    kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
+    kind: ClassVar[str] = "physics"  # physics, test, calibration, nuisance
     writable: ClassVar[bool] = True  # whether a deck can represent it
     remakes_structure: ClassVar[bool] = False  # strong: mesh error and basis are computed again
     elastic: ClassVar[bool] = False  # adds or removes stiffness only, without friction
@@ -244,7 +244,9 @@ class Effect:
         """Change of the motion at the measured places only."""
         return None
 
-    def beside(self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray) -> Beside | None:
+    def auxiliary_residual(
+        self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray
+    ) -> AuxiliaryResidual | None:
         """Additional residuals, at λ (m,) and the damping that effects add (m,).
 
         ``neg2_log_without`` is their -2 ln p without the effect.
@@ -253,7 +255,7 @@ class Effect:
 
     @property
     def neg2_log_without(self) -> float:
-        """-2 ln p, without the effect, of the data that :meth:`beside` compares."""
+        """-2 ln p, without the effect, of the data that :meth:`auxiliary_residual` compares."""
         return 0.0
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
@@ -266,7 +268,7 @@ class Effect:
 
     @classmethod
     def of_lump(
-        cls, where: "Surroundings", point: np.ndarray, mass: float
+        cls, where: "EffectContext", point: np.ndarray, mass: float
     ) -> tuple["Effect", np.ndarray] | None:
         """The effect and its start from a mass [kg] at a place (3,) [m], or None if impossible."""
         return None
@@ -300,7 +302,9 @@ class Effect:
         """
         return M @ static
 
-    def recentred(self, x: np.ndarray, where: "Surroundings") -> tuple["Effect", np.ndarray] | None:
+    def recentred(
+        self, x: np.ndarray, where: "EffectContext"
+    ) -> tuple["Effect", np.ndarray] | None:
         """The effect centred on its fitted place, and its start; None if it is near enough."""
         return None
 

@@ -138,7 +138,7 @@ def _across_beams(
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class EffectContext:
     """The structure and its test, as every effect sees them.
 
     Attributes

@@ -107,7 +107,7 @@ class ElementGroups:
                 stack[g] = own if k < r else (own + own.T) / 2
         return out
 
-    def carried(self, basis: Basis, motion: np.ndarray) -> np.ndarray:
+    def inertia_of_motion(self, basis: Basis, motion: np.ndarray) -> np.ndarray:
         """Φᵀ m_g R (n_groups, r, k) of each group g, for a motion R (6 n_points, k) of points."""
         of_each = [
             place.motion(basis).T @ place.forces(self.mass, motion[place.dofs])

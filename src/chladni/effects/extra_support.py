@@ -10,12 +10,12 @@ from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.ground_springs import with_ground_bushes
 from .effect import Effect, Parameter, PointTerm
+from .effect_context import EffectContext
 from .estimate import Location
 from .family import Article, Family
 from .movable_attachment import MovableAttachment, attachments, moved, patch, there
 from .points import strength, with_springs
 from .search_context import Candidate, SearchContext
-from .effect_context import Surroundings
 
 TILT = 0.5  # prior sd of the tangent of its tilt: folds of a sheet have normals up to 45 deg apart
 FLATTEST = 0.2  # least cosine to a new normal for which the tilt is converted exactly
@@ -36,7 +36,7 @@ class ExtraSupport(MovableAttachment):
     elastic = True
 
     @classmethod
-    def near(cls, where: Surroundings, k: int) -> Self:
+    def near(cls, where: EffectContext, k: int) -> Self:
         """A spring along the normal near the k-th grid."""
         K = strength("K", "N/m", where.setup.stiffness, 2.0, (-2.0, 0.0, 2.0))
         n = where.grids.normal[k]
@@ -68,7 +68,7 @@ class ExtraSupport(MovableAttachment):
         """Direction of the spring in the basic frame (3,)."""
         return _tilted(x[3:])[0] @ np.stack([self.direction, *tangents(self.direction)])
 
-    def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
+    def recentred(self, x: np.ndarray, where: EffectContext) -> tuple[Effect, np.ndarray] | None:
         """The effect centred on the grid it moved to, with the same direction of force."""
         again = super().recentred(x, where)
         if again is None:

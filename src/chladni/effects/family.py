@@ -12,8 +12,8 @@ from ..fem.energy import mass_properties
 from ..geometry.sampling import nearest_points
 from ..model.assembly import Assembly
 from .effect import Effect
+from .effect_context import EffectContext
 from .search_context import Candidate, SearchContext, best_starts
-from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Family:
 
     effect: type[Effect]
     conceal: Callable[[Article, np.random.Generator], Article]
-    placed: Callable[[Surroundings], Sequence[Effect]] | None = None
+    placed: Callable[[EffectContext], Sequence[Effect]] | None = None
     candidates: Callable[[SearchContext], Iterable[Candidate]] | None = None
     closer: Callable[[SearchContext, Effect, np.ndarray], Candidate | None] | None = None
     cards: tuple[str, ...] = ()

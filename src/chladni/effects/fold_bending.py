@@ -15,7 +15,7 @@ from .effect import Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
 
 SPREAD = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
-LEAST = 0.02  # share at folds, in groups that have folds, below which a part has no factor
+LEAST_SHARE = 0.02  # share at folds, in groups that have folds, below which a part has no factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def fold_bending(groups: ElementGroups) -> list[FoldBending]:
     out = []
     for k in np.unique(groups.part[groups.sheet]):
         own = np.where((groups.part == k) & groups.sheet, share, 0.0)
-        if own @ groups.area > LEAST * groups.area[own > 0].sum():
+        if own @ groups.area > LEAST_SHARE * groups.area[own > 0].sum():
             name = assembly.parts[k].name
             unknown = Parameter("k", "-", 0.0, SPREAD, step=0.3)
             out.append(FoldBending((unknown,), f"bending at folds of {name}", share=own))

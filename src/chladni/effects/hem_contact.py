@@ -140,7 +140,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
         middles = (2 * np.arange(PLACES) + 1) / PLACES
         starts = [np.array([k, s, 0.0]) for s in middles for k in STARTS[::2]]
         for effect, tried in ((whole, whole.starts()), (some, starts)):
-            scores = context.scores(effect, tried, carried=True)[0]
+            scores = context.scores(effect, tried, extended=True)[0]
             out.append(Candidate(effect, tried[int(np.argmin(scores))], context.bases[-1]))
     return out
 

@@ -18,8 +18,8 @@ class LinearScale(Effect):
     ``weight_slope`` is ∂m/∂v [kg]; ``write`` puts a value into an assembly.
     """
 
-    kind = "ordinary"
-    claim = "an ordinary value of the deck is off"
+    kind = "calibration"
+    claim = "a calibration parameter of the deck is off"
 
     slope: Slope | None = None
     write: Callable[[Assembly, float], Assembly] | None = None

@@ -19,19 +19,19 @@ from ..geometry.facets import point_normals, tangents
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Bushes, Masses
 from .effect import Effect, Parameter, PointTerm
+from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate
 from .family import Article, Family
 from .movable_attachment import MovableAttachment, around, moved, patch, there
 from .points import strength
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .effect_context import ElementGrids, Surroundings
 
 SHARE = 0.015  # of the structure's mass: prior median of the resonator's mass
 TYPICAL = 3.0  # highest spectral line over the prior median of its frequency
 LOWEST = 20.0  # highest spectral line over the lowest frequency tried
 TRIED = 14  # frequencies, evenly spaced in their logarithm; broadened peaks smooth the gaps
 PLACES = 60  # at which each is tried
-LEAST = 0.05  # of the typical mass: the least mass accepted
+LEAST_MASS = 0.05  # of the typical mass: the least mass accepted
 CARRIED = 1e3  # times the spring: stiffness that holds the written mass in the plane of the sheet
 
 
@@ -47,7 +47,7 @@ class LocalResonator(MovableAttachment):
     nowhere: sp.csr_array = field(default_factory=lambda: sp.csr_array((1, 0)))  # zero row
 
     @classmethod
-    def near(cls, where: Surroundings, k: int) -> Self:
+    def near(cls, where: EffectContext, k: int) -> Self:
         """A resonator along the normal near the k-th grid."""
         n = where.grids.normal[k]
         m = strength("M", "kg", SHARE * where.setup.weight, 1.0, (-0.7, 0.7))
@@ -180,7 +180,7 @@ def _scores(
     """Mass and score (n_places, n_hertz); the score is inf where the mass is too small."""
     assert context.scan is not None
     amount, score = context.scan.oscillator_scores(about, mass, hertz, places)
-    return amount, np.where(amount > LEAST * mass, score, np.inf)
+    return amount, np.where(amount > LEAST_MASS * mass, score, np.inf)
 
 
 def _best(
@@ -192,7 +192,7 @@ def _best(
     k, level = np.unravel_index(int(np.argmin(score)), score.shape)
     at = where.grids.position(places.grids[k], places.normal[k])
     effect = LocalResonator.near(where, at)
-    m, f = np.clip(amount[k, level], LEAST * mass, 10 * mass), hertz[level]
+    m, f = np.clip(amount[k, level], LEAST_MASS * mass, 10 * mass), hertz[level]
     ln_m, ln_f = (np.log(v / effect.parameters[p].scale) for v, p in ((m, 0), (f, 3)))
     return Candidate(effect, np.array([ln_m, 0.0, 0.0, ln_f]), context.bases[about])
 

@@ -9,6 +9,7 @@ from ..geometry.facets import cell_areas
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
 from .effect import Effect, Parameter
+from .effect_context import EffectContext
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
@@ -16,7 +17,6 @@ from .points import strength
 from .property_bands import levels, with_bands
 from .search_context import Candidate, SearchContext
 from .sheet_patch import RADII, RIMMED, SheetPatch, patches
-from .effect_context import Surroundings
 
 SHARE = 0.03  # of the structure's mass: prior median
 
@@ -63,7 +63,7 @@ class MassPatch(SheetPatch):
 
     @classmethod
     def of_lump(
-        cls, where: Surroundings, point: np.ndarray, mass: float
+        cls, where: EffectContext, point: np.ndarray, mass: float
     ) -> tuple[Self, np.ndarray] | None:
         """The mass with the smallest scanned radius, round the nearest group of shells."""
         groups = where.groups

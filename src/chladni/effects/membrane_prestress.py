@@ -29,7 +29,9 @@ from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
 
-MOST = 0.7  # of buckling; with both forces 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
+MOST_OF_BUCKLING = (
+    0.7  # of buckling; with both forces 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
+)
 SD = 0.4  # of N / (0.7 N_cr) where that is small: mostly within a third of buckling
 STARTS = (-0.35, 0.35)
 LARGE = 0.05  # share of the shells' area below which a part is not tried
@@ -58,12 +60,17 @@ class MembranePrestress(Effect):
 
     def force(self, x: np.ndarray) -> np.ndarray:
         """N (2,) [N/m], positive in tension."""
-        return np.asarray(MOST * self.critical * x / np.sqrt(1 + x @ x))
+        return np.asarray(MOST_OF_BUCKLING * self.critical * x / np.sqrt(1 + x @ x))
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """N_k K_k."""
         s = 1 + x @ x
-        slope = MOST * self.critical[:, None] * (np.eye(2) - np.outer(x, x) / s) / np.sqrt(s)
+        slope = (
+            MOST_OF_BUCKLING
+            * self.critical[:, None]
+            * (np.eye(2) - np.outer(x, x) / s)
+            / np.sqrt(s)
+        )
         every = zip(self.operators, self.force(x), slope, strict=True)
         return tuple(MatrixTerm("K", K, float(N), g) for K, N, g in every)
 
@@ -123,7 +130,7 @@ def prestress(built: Structure, part: int, tried: int = 1) -> MembranePrestress:
     )
     return MembranePrestress(
         unknown, f"in {name}", (name,), trials_factor=tried, part=part, tensors=both,
-        critical=np.full(2, 1 / MOST),
+        critical=np.full(2, 1 / MOST_OF_BUCKLING),
         operators=tuple(unit_stiffness(built, part, tensor) for tensor in both),
     )  # fmt: skip
 

@@ -16,9 +16,9 @@ import scipy.sparse as sp
 
 from ..geometry.facets import tangents
 from .effect import WIDER, Effect, Parameter, PointTerm
+from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate, Location
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .effect_context import ElementGrids, Surroundings
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
@@ -116,11 +116,11 @@ class MovableAttachment(Effect):
         return sp.csr_array(sp.vstack([rows[nearest] for rows in self.patch.rows]))
 
     @classmethod
-    def near(cls, where: Surroundings, k: int) -> Self:
+    def near(cls, where: EffectContext, k: int) -> Self:
         """The effect near the k-th of ``where.grids``."""
         raise NotImplementedError
 
-    def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
+    def recentred(self, x: np.ndarray, where: EffectContext) -> tuple[Effect, np.ndarray] | None:
         """The effect centred on the grid it moved to, if beyond ``FAR`` of the patch's size."""
         if np.abs(x[1:3]).max() < FAR:
             return None
@@ -173,7 +173,7 @@ def moved(strength: Parameter) -> tuple[Parameter, ...]:
     return (replace(strength), *place)
 
 
-def there(where: Surroundings, k: int) -> dict[str, Any]:
+def there(where: EffectContext, k: int) -> dict[str, Any]:
     """Fields of an effect near the k-th of ``where.grids``."""
     grid, (x, y, z) = int(where.grids.grids[k]), where.grids.point[k]
     point = float(x), float(y), float(z)
@@ -181,7 +181,7 @@ def there(where: Surroundings, k: int) -> dict[str, Any]:
     return {"text": f"at grid {grid}", "grids": (grid,), "point": point, "trials_factor": tried}
 
 
-def patch(where: Surroundings, k: int, directions: np.ndarray) -> Patch:
+def patch(where: EffectContext, k: int, directions: np.ndarray) -> Patch:
     """The neighbours of the k-th grid in the same face of the sheet, or on its line of beams."""
     spots = where.grids
     d = spots.point - spots.point[k]
@@ -210,7 +210,7 @@ TRIED = 40  # places that are evaluated one by one if only natural frequencies a
 
 
 def attachments(
-    context: SearchContext, near: Callable[[Surroundings, int], MovableAttachment], matrix: str,
+    context: SearchContext, near: Callable[[EffectContext, int], MovableAttachment], matrix: str,
     strengths: np.ndarray, known: Sequence[float] = (),
 ) -> list[Candidate]:  # fmt: skip
     """The two best places about each baseline, by exact re-analysis at every place.

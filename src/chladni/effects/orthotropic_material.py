@@ -8,11 +8,11 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
 from .effect import Effect, FieldChange, Parameter
+from .effect_context import EffectContext
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 from .material_class import is_metal, orthotropy
-from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ def orthotropic(
     )
 
 
-def material_axes(where: Surroundings) -> list[OrthotropicMaterial]:
+def material_axes(where: EffectContext) -> list[OrthotropicMaterial]:
     """Orthotropy of every isotropic material, axis 1 along the longest extent of its parts."""
     groups = where.groups
     parts = groups.structure.assembly.parts

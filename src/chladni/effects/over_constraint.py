@@ -91,7 +91,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if context.scan is None:
         some = farthest_point_sample(points, BY_POLES)
         chosen = [effects[k] for k in some]
-        return best_places(context, chosen, points[some], FOLLOWED, -1.0, carried=True)
+        return best_places(context, chosen, points[some], FOLLOWED, -1.0, extended=True)
     left = np.ones((len(every), len(STARTS)))
     left[at] = [[e.left(x) for x in STARTS] for e in effects]
     out: dict[int, Candidate] = {}

@@ -6,11 +6,11 @@ from typing import Self
 import numpy as np
 
 from ..model.assembly import Assembly
+from .effect_context import EffectContext
 from .family import Article, Family
 from .movable_attachment import MovableAttachment, attachments, moved, patch, there
 from .points import strength, with_masses
 from .search_context import Candidate, SearchContext
-from .effect_context import Surroundings
 
 SHARE = 0.03  # of the structure's mass: prior median
 TRIED = np.exp(np.linspace(-3.0, 1.5, 7))  # multiples of the median
@@ -25,7 +25,7 @@ class PointMass(MovableAttachment):
     matrix = "M"
 
     @classmethod
-    def near(cls, where: Surroundings, k: int) -> Self:
+    def near(cls, where: EffectContext, k: int) -> Self:
         """A mass near the k-th grid."""
         m = strength("M", "kg", SHARE * where.setup.weight, 1.2, (-1.5, -0.5, 0.5))
         return cls(moved(m), patch=patch(where, k, np.eye(3)), **there(where, k))
@@ -36,7 +36,7 @@ class PointMass(MovableAttachment):
 
     @classmethod
     def of_lump(
-        cls, where: Surroundings, point: np.ndarray, mass: float
+        cls, where: EffectContext, point: np.ndarray, mass: float
     ) -> tuple[Self, np.ndarray]:
         """The mass at the nearest grid."""
         k = int(np.linalg.norm(where.grids.point - point, axis=1).argmin())

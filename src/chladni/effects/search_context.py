@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from .effect import Effect
+from .effect_context import EffectContext, ElementGrids
 from .joints import Connection
-from .effect_context import ElementGrids, Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class ResponseScan(Protocol):
     ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths).
 
-        ``places`` are those of :class:`Surroundings` unless others are given.
+        ``places`` are those of :class:`EffectContext` unless others are given.
         """
 
     def oscillator_scores(
@@ -108,7 +108,7 @@ class SearchContext(Protocol):
     """
 
     @property
-    def where(self) -> Surroundings:
+    def where(self) -> EffectContext:
         """The structure and its test."""
 
     @property
@@ -136,18 +136,18 @@ class SearchContext(Protocol):
         """Welds and fasteners of the structure, each with the share z/(w + z) of its rows (r,)."""
 
     def scores(
-        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False, about: int = -1
+        self, effect: Effect, starts: Sequence[np.ndarray], extended: bool = False, about: int = -1
     ) -> np.ndarray:
         """Score of an effect at each start, from one of ``bases`` (n_ways, n_starts).
 
-        With ``carried``, or if the effect releases clamps, the basis is extended by the responses
+        With ``extended``, or if the effect releases clamps, the basis is extended by the responses
         of the effect, as for a fit.
         """
 
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
 
-    def valleys(self, effect: Effect) -> list[np.ndarray]:
+    def optima(self, effect: Effect) -> list[np.ndarray]:
         """The lowest local minima over the effect's whole prior, if only poles are known."""
 
 
@@ -164,7 +164,7 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
     out: list[Candidate] = []
     for effect in effects:
         if context.scan is None and len(effect.parameters) > 2:
-            out += [Candidate(effect, x, context.bases[0]) for x in context.valleys(effect)]
+            out += [Candidate(effect, x, context.bases[0]) for x in context.optima(effect)]
             continue
         starts = effect.starts()
         for scores in context.scores(effect, starts):
@@ -178,7 +178,7 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
 
 def best_places(
     context: SearchContext, effects: Sequence[Effect], point: np.ndarray, wanted: int = 2,
-    apart: float = APART, carried: bool = False,
+    apart: float = APART, extended: bool = False,
 ) -> list[Candidate]:  # fmt: skip
     """The best places of an effect, evaluated at many places with all its starts.
 
@@ -186,11 +186,11 @@ def best_places(
     ----------
     point : (n_effects, 3)   their places [m]
     apart : see :func:`distinct`
-    carried : see :meth:`SearchContext.scores`
+    extended : see :meth:`SearchContext.scores`
     """
     options = []
     for effect in effects:
-        scores = context.scores(effect, effect.starts(), carried)[0]
+        scores = context.scores(effect, effect.starts(), extended)[0]
         options.append((float(scores.min()), effect.starts()[int(np.argmin(scores))]))
     best = distinct(np.array([score for score, _ in options]), point, [], wanted, apart)
     return [Candidate(effects[k], options[k][1], context.bases[-1]) for k in best]

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..fem.locate import Share
 from ..model.assembly import Assembly
+from .effect_context import EffectContext
 from .family import Article, Family
 from .points import MassEffect, strength, with_masses
-from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class SensorMass(MassEffect):
         return len(self.shares) * self.parameters[0].value(x[0])
 
 
-def sensor_mass(where: Surroundings) -> list[SensorMass]:
+def sensor_mass(where: EffectContext) -> list[SensorMass]:
     """One mass for every sensor; median 6 % of the structure's mass in total, 2 g each or more."""
     setup = where.setup
     if not setup.sensors:

@@ -18,11 +18,11 @@ from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.ground_springs import with_ground_bushes
 from .effect import Effect, PointTerm
+from .effect_context import EffectContext
 from .family import Article, Family
 from .points import strength, with_masses
-from .effect_context import Surroundings
 
-MOST = 3  # drive points of fixed shakers; more points mean a hammer or a roving shaker
+MOST_DRIVES = 3  # drive points of fixed shakers; more points mean a hammer or a roving shaker
 ACROSS, TURNING, GAUGE = 1e4, 3.0, 0.01  # medians of their priors [N/m, N m/rad, kg]
 
 
@@ -82,16 +82,16 @@ def restrained(
     return with_masses(held, grids, m * weights)
 
 
-def shaker_restraint(where: Surroundings) -> list[ShakerRestraint]:
+def shaker_restraint(where: EffectContext) -> list[ShakerRestraint]:
     """One effect at each drive point, if there are few enough for shakers."""
     drives = tuple(dict.fromkeys(where.setup.drives))
-    if len(drives) > MOST:
+    if len(drives) > MOST_DRIVES:
         return []
     return [_at(where, shares, direction, len(drives)) for shares, direction in drives]
 
 
 def _at(
-    where: Surroundings, shares: Share, direction: tuple[float, float, float], tried: int
+    where: EffectContext, shares: Share, direction: tuple[float, float, float], tried: int
 ) -> ShakerRestraint:
     built = where.groups.structure
     grid = max(shares, key=lambda pair: pair[1])[0]

@@ -12,16 +12,16 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import Part
+from .calibration_parameters import scaled
 from .effect import Effect, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
-from .calibration_parameters import scaled
 from .property_bands import with_bands
 from .search_context import Candidate, SearchContext
 from .sheet_patch import RIMMED, SheetPatch, patches
 
-MOST = 0.9  # of the stiffness may be lost in the middle
+MOST_LOSS = 0.9  # of the stiffness may be lost in the middle
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class StiffnessPatch(SheetPatch):
     def begun(cls, amount: float) -> float:
         """Start of the logit, for losses from 5 to 75 %."""
         beta = np.clip(amount * lost(cls.scanned), 0.05, 0.75)
-        return float(np.log(beta / (MOST - beta)))
+        return float(np.log(beta / (MOST_LOSS - beta)))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write new properties, in bands of equal ratio."""
@@ -70,7 +70,7 @@ class StiffnessPatch(SheetPatch):
 
 def lost(x: float) -> float:
     """β, from 0 to MOST."""
-    return float(MOST / (1 + np.exp(-x)))
+    return float(MOST_LOSS / (1 + np.exp(-x)))
 
 
 def softened(part: Part, log: float) -> Part:

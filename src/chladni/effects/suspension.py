@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model.assembly import Assembly
+from .effect_context import EffectContext
 from .family import Article, Family
 from .points import AtPoints, strength, with_springs
-from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Suspension(AtPoints):
         return with_springs(assembly, self.grids, self.directions, k)
 
 
-def suspension(where: Surroundings) -> list[Suspension]:
+def suspension(where: EffectContext) -> list[Suspension]:
     """Springs at the hangers, along the surface normal or along every direction.
 
     A tube has no normal. If a hanger is on a tube, springs in every direction come first, then each

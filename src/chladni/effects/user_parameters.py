@@ -18,11 +18,20 @@ from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.properties import Isotropic, Part, ShellSection, SolidSection
+from .calibration_parameters import (
+    OF_FIELDS,
+    SHEET,
+    SPREAD,
+    TUBE,
+    calibration_parameter,
+    scaled,
+    value,
+    with_scaled,
+)
 from .effect import ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
-from .calibration_parameters import OF_FIELDS, SHEET, SPREAD, TUBE, ordinary, scaled, value, with_scaled
 
 UNITS = {
     **OF_FIELDS,
@@ -38,12 +47,12 @@ SERVES = 0.3  # of the way of nu to 1/2: there two terms of 1/(1 - 2 nu) are acc
 
 
 @dataclass(frozen=True, eq=False)
-class Freed(Effect):
+class UserParameter(Effect):
     """Members that share their parameters; a single parameter may have bounds of ln factor."""
 
     name = "part-scale"
-    claim = "an ordinary value of the deck is off"
-    kind = "ordinary"
+    claim = "a calibration parameter of the deck is off"
+    kind = "calibration"
 
     members: tuple[Effect, ...] = ()
     low: float = -np.inf
@@ -121,7 +130,7 @@ class Freed(Effect):
         return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
 
 
-def freed(groups: ElementGroups, free: FreeParameter) -> Freed:
+def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
     """The effect of one user parameter."""
     built = groups.structure
     parts = built.assembly.parts
@@ -129,7 +138,7 @@ def freed(groups: ElementGroups, free: FreeParameter) -> Freed:
     grouped = set(groups.part.tolist())
     plain = [k for k in free.positions if k in grouped and free.field in (*SHEET, *TUBE)]
     if plain:
-        members.append(ordinary(groups, free.field, plain))
+        members.append(calibration_parameter(groups, free.field, plain))
     members += [_of_part(built, k, free.field) for k in free.positions if k not in plain]
     members += [_of_lumps(built, family, rows) for family, rows in _lumps(free) if rows]
     values = values_of(built.assembly, free)
@@ -140,7 +149,7 @@ def freed(groups: ElementGroups, free: FreeParameter) -> Freed:
     text = f"{free.field} of {', '.join(free.parts or names) or 'all'}"
     unknown = (Parameter(free.field, unit, 0.0, sd, float(scale), step=min(0.3, 2 * sd)),)
     low, high = _bounds(parts, free)
-    return Freed(
+    return UserParameter(
         unknown, text, names, members=tuple(members), low=low, high=high, called=free.name
     )  # fmt: skip
 
@@ -156,9 +165,9 @@ def _bounds(parts: Sequence[Part], free: FreeParameter) -> tuple[float, float]:
     return low, high
 
 
-def freed_effect(effect: Effect, called: str) -> Freed:
+def freed_effect(effect: Effect, called: str) -> UserParameter:
     """An effect of known place as a free parameter of every fit."""
-    return Freed(
+    return UserParameter(
         effect.parameters, effect.text, effect.parts, effect.grids, replaces=effect.replaces,
         members=(effect,), called=called,
     )  # fmt: skip

@@ -19,8 +19,8 @@ import scipy.sparse as sp
 from ..fem.assemble import Structure
 from ..fem.derivative import of_lumps
 from ..model.assembly import Assembly
-from .adhesive_stiffness import MOST, longest_beads, modulus_of, softened_bead
-from .effect import Beside, Effect, MatrixTerm, Parameter, Rise
+from .adhesive_stiffness import MOST_BEADS, longest_beads, modulus_of, softened_bead
+from .effect import AuxiliaryResidual, Effect, MatrixTerm, Parameter, Rise
 from .estimate import Estimate, Location
 from .family import Article, Family
 from .identified_damping import LEVEL_SD, IdentifiedDamping, paired_with
@@ -38,7 +38,7 @@ WORTH = 2.0  # least gain in -2 ln p for a fit: the cost of its one parameter (A
 FOLLOWED = 2
 RIGID = 0.02  # of the highest spectral line: below it a mode of the deck is rigid
 CORDS = 0.7  # of the first flexible mode: lower modes are damped by the suspension
-NEAR = 0.03  # relative error of natural frequencies while joints are only ranked
+RANKING_ERROR = 0.03  # relative error of natural frequencies while joints are only ranked
 AMOUNTS = np.geomspace(0.3, 100.0, 18)  # of the usual damping, in the mode that has most
 
 
@@ -96,7 +96,9 @@ class ViscoelasticJoint(Effect):
         """Loads A u of the joint, for any stiffness of it (as for ``adhesive-stiffness``)."""
         return self.operator @ static
 
-    def beside(self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray) -> Beside | None:
+    def auxiliary_residual(
+        self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray
+    ) -> AuxiliaryResidual | None:
         """Residuals of the identified damping against a common level plus the joint's loss."""
         if self.damping is None:
             return None
@@ -108,7 +110,7 @@ class ViscoelasticJoint(Effect):
         by_more = (slope / (own + more))[:, None]
         by_own = np.outer(slope * own / (own + more), np.eye(len(x))[2])
         moved = w * steep * (dissipated - more[:, None]) / (2 * np.maximum(lam, 1e-9 * lam[-1]))
-        return Beside(r, by_own, by_more * moved, by_more * w)
+        return AuxiliaryResidual(r, by_own, by_more * moved, by_more * w)
 
     @property
     def neg2_log_without(self) -> float:
@@ -167,10 +169,10 @@ class _Suspect:
 
 
 def _suspects(built: Structure, bushes: Sequence[Connection]) -> list[_Suspect]:
-    """Beads, longest first; all bushes together, then each of them; at most ``MOST`` of either."""
+    """Beads, longest first, and bushes, all together then each; at most ``MOST_BEADS`` each."""
     out = [_Suspect(b, stiffness(built, b), "adhesive") for b in longest_beads(built)]
     whole = [_together(bushes)] if len(bushes) > 1 else []
-    for joint in [*whole, *bushes][:MOST]:
+    for joint in [*whole, *bushes][:MOST_BEADS]:
         rows = joint.elements.tolist()
         out.append(_Suspect(joint, of_lumps(built, "bushes", rows).K, "bushes"))
     return out
@@ -197,7 +199,7 @@ def _of_one(
     low, high = _first(where.frequency, where.setup.f_max), where.setup.f_max
     E = modulus_of(built.assembly, one.joint) if one.joint.kind == "solids" else None
     name, unit = ("E", "Pa") if E else ("K", "of the deck's")
-    damping = _heard(context)
+    damping = _held_out(context)
     assert damping is not None
     unknown: tuple[Parameter, ...] = (
         Parameter(name, unit, 0.0, SD, E or 1.0, step=1.0, starts=STARTS),
@@ -221,7 +223,7 @@ def _first(frequency: np.ndarray, f_max: float) -> float:
     return float(flexible.min(initial=f_max))
 
 
-def _heard(context: SearchContext) -> IdentifiedDamping | None:
+def _held_out(context: SearchContext) -> IdentifiedDamping | None:
     """Damping of the flexible modes, or None if there are too few."""
     damping, where = context.where.setup.damping, context.where
     if damping is None:
@@ -231,7 +233,10 @@ def _heard(context: SearchContext) -> IdentifiedDamping | None:
 
 
 def speaks_for(
-    damping: IdentifiedDamping, frequency: np.ndarray, share: np.ndarray, same: float = NEAR
+    damping: IdentifiedDamping,
+    frequency: np.ndarray,
+    share: np.ndarray,
+    same: float = RANKING_ERROR,
 ) -> float:
     """Gain in 2 ln p of damping proportional to a modal energy share (m,) over uniform damping.
 
@@ -261,7 +266,7 @@ def _spoken_for(context: SearchContext, effect: ViscoelasticJoint) -> float:
 
 def candidates(context: SearchContext) -> list[Candidate]:
     """The joints that the modal damping supports most, if it supports any."""
-    if _heard(context) is None:
+    if _held_out(context) is None:
         return []
     built = context.where.groups.structure
     bushes = [j for j, _ in context.fasteners if j.kind == "bushes" and not j.rigid]
@@ -273,7 +278,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if not best:
         return []
     points = np.array([e.point for e in best])
-    return best_places(context, best, points, FOLLOWED, -1.0, carried=True)
+    return best_places(context, best, points, FOLLOWED, -1.0, extended=True)
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:

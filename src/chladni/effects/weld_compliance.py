@@ -25,7 +25,7 @@ from .model_families import joint_families
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
 
 NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
-MOST = 3.0  # ln of what is left over s, at most
+MOST_LN_LEFT = 3.0  # ln of what is left over s, at most
 SD = 1.2  # of the same: from next to nothing of the load to nearly all
 STARTS = (-1.5, 0.0, 1.5)
 SOUND = 40.0  # x of the deck's own
@@ -64,12 +64,12 @@ class WeldCompliance(Effect):
         return Parameter("K", "of the deck's", 0.0, SD, softness, starts=STARTS, nominal=SOUND)
 
     def left(self, x: float) -> tuple[float, float]:
-        """f(x) = s e^x, x > 0 bent towards ``MOST``, and its slope; a sound one is apart: 1."""
+        """f(x) = s e^x, x > 0 bent towards ``MOST_LN_LEFT``, and its slope; 1 if sound."""
         if x >= SOUND:
             return 1.0, 0.0
-        y = MOST * np.tanh(x / MOST) if x > 0 else x
+        y = MOST_LN_LEFT * np.tanh(x / MOST_LN_LEFT) if x > 0 else x
         f = min(self.parameters[0].value(y), 1.0)
-        return f, f * (1 - (y / MOST) ** 2 if x > 0 else 1.0)
+        return f, f * (1 - (y / MOST_LN_LEFT) ** 2 if x > 0 else 1.0)
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The joint's own and that of the others of its kind."""
@@ -88,9 +88,11 @@ class WeldCompliance(Effect):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """A property of its own for the joint, the others as they were fitted beside it."""
         assert self.joint is not None
-        beside = x[1] if len(x) > 1 else 0.0
-        made = with_all(assembly, self.joint.kind, float(np.exp(beside)))
-        return with_factor_on(made, self.joint, self.left(x[0])[0] / float(np.exp(beside)))
+        auxiliary_residual = x[1] if len(x) > 1 else 0.0
+        made = with_all(assembly, self.joint.kind, float(np.exp(auxiliary_residual)))
+        return with_factor_on(
+            made, self.joint, self.left(x[0])[0] / float(np.exp(auxiliary_residual))
+        )
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """What is left of the joint's stiffness."""
@@ -161,7 +163,7 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
         points = np.array([tried[k][0].point for k in own])
         some = farthest_point_sample(points, BY_POLES)
         chosen = [effect(own[k]) for k in some]
-        return best_places(context, chosen, points[some], FOLLOWED, -1.0, carried=True)
+        return best_places(context, chosen, points[some], FOLLOWED, -1.0, extended=True)
     alone = [kind((kind.strength(float(share.min())),)) for _, share in tried]
     left = np.array([[e.left(x[0])[0] for x in e.starts()] for e in alone])
     out: dict[int, Candidate] = {}

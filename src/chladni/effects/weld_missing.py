@@ -32,8 +32,10 @@ class WeldMissing(WeldCompliance):
         assert self.joint is not None
         if x[0] > NONE_LEFT:
             return super().apply(assembly, x)
-        beside = x[1] if len(x) > 1 else 0.0
-        return without_joint(with_all(assembly, self.joint.kind, np.exp(beside)), self.joint)
+        auxiliary_residual = x[1] if len(x) > 1 else 0.0
+        return without_joint(
+            with_all(assembly, self.joint.kind, np.exp(auxiliary_residual)), self.joint
+        )
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Zero stiffness, with an upper limit that would carry a twentieth of the load."""

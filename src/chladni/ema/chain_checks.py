@@ -19,7 +19,7 @@ SURE, HINT = 6.0, 3.0  # standard deviations of a delay, to be named and to be l
 BETTER, HINTED = 3.0, 1.5  # times less scatter (of phases, of what is left), the same
 QUARTER = 0.35  # rms of the sine of the phases that a quarter turn may leave
 LOUD = 2.5  # factor between recording and model beyond which a unit is wrong
-NEAR = 0.3  # ln: how near a named factor has to be
+NEAR_FACTOR = 0.3  # ln: how near a named factor has to be
 ALIKE = 0.6  # MAC from which a mode of the model is the one of the test
 FACTORS = {  # what multiplies the recording to mend it: how it comes about
     9.80665: "responses in g taken for m/s²",
@@ -235,7 +235,7 @@ def _derivative(size: np.ndarray, w: np.ndarray, known_gain: bool) -> tuple[int,
     left = size - order * w
     sure = low > 0.3 or high < -0.3
     if known_gain:  # the level says it as well
-        sure = abs(np.median(left)) < min(abs(np.median(size)), NEAR if not sure else np.inf)
+        sure = abs(np.median(left)) < min(abs(np.median(size)), NEAR_FACTOR if not sure else np.inf)
     return (order, left) if sure else (0, size)
 
 
@@ -254,7 +254,7 @@ def _quantity(identified: Identified, order: int) -> Finding:
 def _unit(level: float) -> Finding:
     factor, why = min(FACTORS.items(), key=lambda item: abs(level + np.log(item[0])))
     said = f"the recording is {np.exp(level):.3g} times the model"
-    if abs(level + np.log(factor)) < NEAR:
+    if abs(level + np.log(factor)) < NEAR_FACTOR:
         mend = f"in case.toml, [test]: factor = {factor:.7g}"
         return Finding("wrong units", f"{said}: {why}.", "fault", (), mend, factor)
     mend = 'look at the calibration, or in case.toml, [test]: gain = "unknown"'

@@ -18,7 +18,7 @@ from .level_modes import ModeLevels
 FLOOR_FREQUENCY = 5e-4  # ln f between runs: what 4 K of temperature do to steel
 FLOOR_DAMPING = 0.05  # ln ζ between runs: what damping of clamped objects repeats to
 STARTS = 4  # fits of an element, from the best of its starts
-LEAST = 3  # levels an element is fitted to
+LEAST_LEVELS = 3  # levels an element is fitted to
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ def fitted_elements(mode: ModeLevels) -> tuple[ElementFit, ...]:
 
     Elements that dissipate are fitted only if the damping changes.
     """
-    if len(set(mode.level)) < LEAST:
+    if len(set(mode.level)) < LEAST_LEVELS:
         return ()
     count = 2 * len(mode.level)
     tried = [e for e in ELEMENTS if 2 + len(e.numbers) < count]
@@ -185,7 +185,7 @@ def foretold(mode: ModeLevels, held: Sequence[int] | None = None) -> HeldOutLeve
     """
     n = len(mode.level)
     if held is None:
-        held = [*range(1, n - 1, 2)][: max(n - LEAST, 0)]
+        held = [*range(1, n - 1, 2)][: max(n - LEAST_LEVELS, 0)]
     rows = np.array(held, int)
     seen = np.ones(n, bool)
     seen[rows] = False

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..dynamics.frf import FRF
-from .identification import DERIVATIVES, Identified, evaluate
 from .coincident_poles import alike_shapes, twins_joined
+from .identification import DERIVATIVES, Identified, evaluate
 from .pole_search import STEADY
 from .response_variance import frf_variance, left_scatter
 from .setup import Control
@@ -18,7 +18,7 @@ from .setup import Control
 PARTNER = 0.05  # of a frequency: farther away is another mode
 STANDS_OUT = 3.0  # fall of χ² due to a pole over its required gain, for a mode to be followed
 KNOWN = 0.5  # standard deviation over its damping: a mode of which less is known is not followed
-NEAR = 5.0  # half-bandwidths of the level's own pole: lines beyond are another mode's
+NEAR_BANDWIDTHS = 5.0  # half-bandwidths of the level's own pole: lines beyond are another mode's
 ABOUT = 0.75  # of a peak: lines above are averaged; there D is known best
 CHANCE = 1e-5  # of a linear mode: moves less probable than that, and larger than these, are moves
 MOVED_FREQUENCY = 1e-3  # largest over smallest - 1; a few kelvin of temperature do half of that
@@ -278,7 +278,7 @@ def _modal_lines(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """ω, y and the variance of y at the lines near a pole, all but the mode taken off (n,) each."""
     away = np.abs(2 * np.pi * one.frf.frequency - np.abs(pole))
-    near = away <= max(-NEAR * pole.real, np.sort(away)[2])
+    near = away <= max(-NEAR_BANDWIDTHS * pole.real, np.sort(away)[2])
     frf, s = one.frf, 2j * np.pi * one.frf.frequency[near]
     rest = first.sel(np.arange(first.order) != mode)
     q = np.abs(s[:, None] ** DERIVATIVES[first.quantity]) ** 2

@@ -21,7 +21,7 @@ from .pole_search_by_parts import few_channels
 from .pole_selection import Rule, uncertainty
 from .subspace import subspace
 
-NEAR = 0.02  # of a frequency given by hand: the pole that is meant
+NEAR_FREQUENCY = 0.02  # of a frequency given by hand: the pole that is meant
 COMBINATIONS = 24  # of channels
 
 
@@ -77,9 +77,11 @@ def _nearest(p: np.ndarray, f: float, f_max: float) -> int:
         If none is near enough.
     """
     there = f_max * np.abs(p)
-    if not len(p) or np.abs(there - f).min() > NEAR * f:
+    if not len(p) or np.abs(there - f).min() > NEAR_FREQUENCY * f:
         known = ", ".join(f"{x:.5g}" for x in np.sort(there)) or "none"
-        raise LabelError(f"no pole within {100 * NEAR:g} % of {f:g} Hz; there are {known}")
+        raise LabelError(
+            f"no pole within {100 * NEAR_FREQUENCY:g} % of {f:g} Hz; there are {known}"
+        )
     return int(np.abs(there - f).argmin())
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh
 
+from ..parallel import in_parallel
 from ..progress import Progress, counted, silent, within
-from ..parallel import side_by_side
 from .condensed_lines import condensed
 from .out_of_band_poles import outside, with_outer_poles
 from .pole_fitting import PoleData, PoleFit, basis, polish, solve, stacked
@@ -70,7 +70,7 @@ def searched_by_parts(
     size = f"{data.y.shape[1]} channels x {len(data.s)} lines"
     step = counted(within(progress, 0.0, SEARCH), f"identifying {size}: band", len(bands))
     parts = []
-    for part in side_by_side(lambda band: _part(data, *band, rule, stated, orders, tries), bands):
+    for part in in_parallel(lambda band: _part(data, *band, rule, stated, orders, tries), bands):
         parts.append(part)
         step(len(parts))
     progress(f"identifying {size}: all bands together", SEARCH)

@@ -39,7 +39,7 @@ MIMICKED = 15.0  # of ln L, of what physics may mimic, over a channel that the m
 _UNLESS = ", unless the model is wrong about the shapes there"
 WORST, LIKELY = 3, 6  # channels for which other places are tried, mixtures they are tried in
 COPY = 0.05  # of the power of two channels, their difference: they may be one
-MOST = 3  # faults that are named one after another
+MOST_FAULTS = 3  # faults that are named one after another
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def shape_faults(
     phi, at = model.values, np.arange(n)
     psi = psi / np.linalg.norm(psi, axis=0)
     found: list[Finding] = []
-    for _ in range(MOST):
+    for _ in range(MOST_FAULTS):
         best = _best(labels, psi, frequency, phi, model, at)
         if best is None:
             break

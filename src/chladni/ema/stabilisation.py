@@ -18,7 +18,7 @@ from .subspace import subspace
 CLASSES = "ofdvs"  # new; steady in frequency; and damping; and shape; in all three
 FREQUENCY, DAMPING, MAC = 0.01, 0.05, 0.95
 STEP = 2  # states, one pair of poles
-LEAST, MOST = 40, 160  # states of the highest order
+LEAST_STATES, MOST_STATES = 40, 160  # states of the highest order
 COMBINATIONS = 12
 CONFIRMED = 1 / 3  # of the orders that could hold all poles found
 
@@ -66,7 +66,7 @@ def stabilisation(
     """
     data, omega_max = pole_data(frf, kept_lines(frf, found.band, use), averages)
     few = few_channels(data, COMBINATIONS)
-    top = min(max(LEAST, 6 * found.order), MOST, 2 * (len(data.s) // 6))
+    top = min(max(LEAST_STATES, 6 * found.order), MOST_STATES, 2 * (len(data.s) // 6))
     space = subspace(few, top)
     rows: list[tuple[int, np.ndarray, str]] = []
     before = (np.zeros(0, complex), np.zeros((few.y.shape[1], 0), complex))

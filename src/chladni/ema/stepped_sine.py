@@ -12,7 +12,7 @@ from ..errors import FileError
 from .time_record import TimeRecord
 
 SPAN = 8  # cycles on either side of a step, by which its frequency is known
-LEAST = 12  # cycles of a dwell: less is a passage
+LEAST_CYCLES = 12  # cycles of a dwell: less is a passage
 SETTLED = 0.5  # share of a dwell that is left to settle
 PARTS = 4  # of the rest, for the scatter
 HARMONICS = 5
@@ -83,7 +83,7 @@ def dwells(x: np.ndarray) -> list[tuple[int, int]]:
         edges.append(SPAN + k + int(jump[k:stop].argmax()))
         k = stop
     edges.append(len(at) - 1)
-    return [(int(at[a]), int(at[b])) for a, b in pairwise(edges) if b - a >= LEAST]
+    return [(int(at[a]), int(at[b])) for a, b in pairwise(edges) if b - a >= LEAST_CYCLES]
 
 
 def _analytic(x: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ class BaseMotion:
     free: np.ndarray
     force: np.ndarray
 
-    def over(self, built: Structure) -> "BaseMotion":
+    def extended_to(self, built: Structure) -> "BaseMotion":
         """Extend to a structure with additional dofs, whose motion is relative to the base too."""
         more = built.T.shape[1] - len(self.free)
         force = built.T.T @ (over_all_motions(built.assembly)[0] @ self.whole)

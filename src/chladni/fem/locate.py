@@ -3,13 +3,13 @@
 import numpy as np
 import scipy.sparse as sp
 
-from ..geometry.nearest import Feet, ShellSurface
+from ..geometry.nearest import ClosestPoints, ShellSurface
 from ..model.assembly import Assembly
 from .assemble import Structure
 
 
 def rows_at(
-    structure: Structure, feet: Feet, directions: np.ndarray, turning: bool = False
+    structure: Structure, feet: ClosestPoints, directions: np.ndarray, turning: bool = False
 ) -> sp.csr_array:
     """Translation of points of shells along directions (k, 3): rows over the free dofs (k, n).
 
@@ -41,7 +41,7 @@ def rows_of(
         out[on] = structure.along(grids[on], directions[on], turning)
     if len(off):
         shells = ShellSurface.whole(structure.assembly)
-        out[off] = rows_at(structure, shells.feet(points[off]), directions[off], turning)
+        out[off] = rows_at(structure, shells.closest_points(points[off]), directions[off], turning)
     return sp.csr_array(out)
 
 
@@ -59,7 +59,7 @@ def shares_of(assembly: Assembly, grids: np.ndarray, points: np.ndarray) -> list
     out: list[Share] = [((int(grid), 1.0),) for grid in grids]
     off = np.flatnonzero(grids <= 0)
     if len(off):
-        found = ShellSurface.whole(assembly).feet(points[off])
+        found = ShellSurface.whole(assembly).closest_points(points[off])
         for k, nodes, weights in zip(off, found.nodes, found.weight, strict=True):
             pairs = zip(assembly.ids[nodes].tolist(), weights.tolist(), strict=True)
             out[k] = tuple((grid, w) for grid, w in pairs if w > 0)

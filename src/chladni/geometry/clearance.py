@@ -120,11 +120,11 @@ def _gaps(
     rows = np.unique(a.nodes)
     rows = rows[_in_box(assembly.points[rows], assembly.points[np.unique(b.nodes)], within)]
     rows = rows if len(rows) else a.nodes[0, :1]
-    feet = b.feet(assembly.points[rows])
-    near = feet.distance <= within
-    rows, opposite, weight = rows[near], feet.nodes[near], feet.weight[near]
-    across = feet.place[near] - assembly.points[rows]
-    away_from = np.einsum("ki,ki->k", across, feet.normal[near]) < 0
+    closest_points = b.closest_points(assembly.points[rows])
+    near = closest_points.distance <= within
+    rows, opposite, weight = rows[near], closest_points.nodes[near], closest_points.weight[near]
+    across = closest_points.place[near] - assembly.points[rows]
+    away_from = np.einsum("ki,ki->k", across, closest_points.normal[near]) < 0
     t, error = (
         v[rows] + (v[opposite] * weight).sum(axis=1) for v in (sheets.thickness, sheets.error)
     )
@@ -138,8 +138,8 @@ def _gaps(
         rows,
         opposite,
         weight,
-        feet.normal[near] * np.where(away_from, -1.0, 1.0)[:, None],
-        feet.distance[near] - t / 2,
+        closest_points.normal[near] * np.where(away_from, -1.0, 1.0)[:, None],
+        closest_points.distance[near] - t / 2,
         error,
         free,
     )

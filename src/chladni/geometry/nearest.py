@@ -17,7 +17,7 @@ from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
 from .facets import tangents, unit
 
-NEAR = 12  # quads around a place whose triangles are tried first
+NEAR_QUADS = 12  # quads around a place whose triangles are tried first
 AT_ONCE = 20_000  # places whose nearest shells are in memory at a time, a third of a gigabyte
 BLOCK = 256  # far places processed together: each may need thousands of shells
 IN_LINE = 0.02  # nodes whose second extent is below this fraction of the first lie in a line
@@ -26,7 +26,7 @@ ShellChoice = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows 
 
 
 @dataclass(frozen=True, eq=False)
-class Feet:
+class ClosestPoints:
     """Nearest points of a surface to k places.
 
     Attributes
@@ -94,13 +94,13 @@ class ShellSurface:
         nodes = assembly.shells.nodes[rows]
         return cls(name, assembly.points, nodes, rows, *_spread(assembly.points[nodes]))
 
-    def feet(
+    def closest_points(
         self,
         places: np.ndarray,
         normal: np.ndarray | None = None,
         cosine: float = 0.7,
-        near: int = NEAR,
-    ) -> Feet:
+        near: int = NEAR_QUADS,
+    ) -> ClosestPoints:
         """The nearest point of the surface to each place (k, 3) [m].
 
         With a `normal` (k, 3) at each place, triangles of another direction (|cos| below `cosine`)
@@ -113,24 +113,24 @@ class ShellSurface:
             some = slice(k, k + AT_ONCE)
             facing = None if normal is None else normal[some]
             found.append(vars(self._feet(places[some], facing, cosine, near)).values())
-        return Feet(*(np.concatenate(column) for column in zip(*found, strict=True)))
+        return ClosestPoints(*(np.concatenate(column) for column in zip(*found, strict=True)))
 
     def _feet(
         self, places: np.ndarray, normal: np.ndarray | None, cosine: float, near: int
-    ) -> Feet:
+    ) -> ClosestPoints:
         k, count = len(places), min(near, len(self.owner))
         reach, at = (v.reshape(k, count) for v in self.tree.query(places, count))
         of = np.repeat(np.arange(k), count)
-        feet = self._nearest(places, of, self.owner[at.ravel()], normal, cosine)
+        closest = self._nearest(places, of, self.owner[at.ravel()], normal, cosine)
         if normal is None and count < len(self.owner):
-            open_ = np.flatnonzero(feet.distance > reach[:, -1] - self.cover.max())
+            open_ = np.flatnonzero(closest.distance > reach[:, -1] - self.cover.max())
             for first in range(0, len(open_), BLOCK):
-                self._improve(feet, places, open_[first : first + BLOCK])
-        return feet
+                self._improve(closest, places, open_[first : first + BLOCK])
+        return closest
 
-    def _improve(self, feet: Feet, places: np.ndarray, rows: np.ndarray) -> None:
+    def _improve(self, closest: ClosestPoints, places: np.ndarray, rows: np.ndarray) -> None:
         """Try every shell that may be nearer to some of the places than the shell found."""
-        x, reach = places[rows], feet.distance[rows] + 1e-12
+        x, reach = places[rows], closest.distance[rows] + 1e-12
         near = self.tree.query_ball_point(x, reach + self.cover.max())
         of = np.repeat(np.arange(len(rows)), [len(n) for n in near])
         at = np.concatenate(near).astype(int)
@@ -138,7 +138,7 @@ class ShellSurface:
         worth = least <= reach[of]
         found = self._nearest(x, of[worth], self.owner[at[worth]])
         for name, value in vars(found).items():
-            getattr(feet, name)[rows] = value
+            getattr(closest, name)[rows] = value
 
     def _nearest(
         self,
@@ -147,7 +147,7 @@ class ShellSurface:
         shell: np.ndarray,
         normal: np.ndarray | None = None,
         cosine: float = 0.0,
-    ) -> Feet:
+    ) -> ClosestPoints:
         """The nearest point to each place on its trial shells; ``of`` is their place, increasing.
 
         If points are equally near to 1e-12 m, the first counts.
@@ -166,9 +166,9 @@ class ShellSurface:
         candidate = np.where(rounded == lowest[of], np.arange(len(of)), len(of))
         best = np.minimum.reduceat(candidate, begin)
         rows = (foot, triangles, weight, distance, facing)
-        return Feet(shell[best // 2], *(v[best] for v in rows))
+        return ClosestPoints(shell[best // 2], *(v[best] for v in rows))
 
-    def within(self, feet: Feet, places: np.ndarray, reach: float) -> None:
+    def within(self, closest: ClosestPoints, places: np.ndarray, reach: float) -> None:
         """Refuse places farther than `reach` from the surface.
 
         Raises
@@ -176,17 +176,18 @@ class ShellSurface:
         ModelError
             If a place is farther; the message names the worst place and its distance.
         """
-        worst = int(feet.distance.argmax())
-        if feet.distance[worst] > reach:
+        worst = int(closest.distance.argmax())
+        if closest.distance[worst] > reach:
             x, y, z = 1e3 * np.atleast_2d(places)[worst]
             raise ModelError(
-                f"a joint at ({x:.1f}, {y:.1f}, {z:.1f}) mm is {1e3 * feet.distance[worst]:.1f} mm "
-                f"from {self.name}, farther than {1e3 * reach:.1f} mm; move it or widen its reach"
+                f"a joint at ({x:.1f}, {y:.1f}, {z:.1f}) mm is "
+                f"{1e3 * closest.distance[worst]:.1f} mm from {self.name}, "
+                f"farther than {1e3 * reach:.1f} mm; move it or widen its reach"
             )
 
-    def cells(self, feet: Feet) -> list[np.ndarray]:
+    def cells(self, closest: ClosestPoints) -> list[np.ndarray]:
         """Nodes of each foot's shell; also of its neighbours if its own nodes lie in a line."""
-        own = [np.unique(nodes) for nodes in self.nodes[feet.shell]]
+        own = [np.unique(nodes) for nodes in self.nodes[closest.shell]]
         return [self._with_ring(n) if _in_line(self.points[n]) else n for n in own]
 
     def _with_ring(self, nodes: np.ndarray) -> np.ndarray:
@@ -199,11 +200,11 @@ class ShellSurface:
         converge to the integral over the disc. On a mesh coarser than the disc they are the shell's
         nodes.
         """
-        centre = self.feet(place[None])
+        centre = self.closest_points(place[None])
         u, v = tangents(centre.normal[0])
-        feet = self.feet(centre.place + radius * (_DISC @ np.stack([u, v])))
-        nodes, at = np.unique(feet.nodes, return_inverse=True)
-        weight = np.bincount(at.ravel(), feet.weight.ravel()) / len(_DISC)
+        closest = self.closest_points(centre.place + radius * (_DISC @ np.stack([u, v])))
+        nodes, at = np.unique(closest.nodes, return_inverse=True)
+        weight = np.bincount(at.ravel(), closest.weight.ravel()) / len(_DISC)
         keep = weight > 1e-9
         if keep.sum() < 3 or _in_line(self.points[nodes[keep]]):
             nodes = self._with_ring(nodes)
@@ -284,8 +285,8 @@ def barycentric_foot(p: np.ndarray, x: np.ndarray) -> np.ndarray:
         [(np.cross(v - u, p - u) * n).sum(-1) / nn for u, v in ((b, c), (c, a), (a, b))], axis=-1
     )
     options = [w, *(_on_side(p, x, k) for k in range(3))]
-    feet = np.stack([np.einsum("...a,...ai->...i", o, x) for o in options])
-    far = np.linalg.norm(feet - p, axis=-1)
+    closest = np.stack([np.einsum("...a,...ai->...i", o, x) for o in options])
+    far = np.linalg.norm(closest - p, axis=-1)
     far[0] = np.where((w >= 0).all(-1) & (nn > 1e-50), far[0] - 1e-15, np.inf)
     best = far.argmin(axis=0)
     return np.take_along_axis(np.stack(options), best[None, ..., None], axis=0)[0]
@@ -318,7 +319,7 @@ def nearest_parts(assembly: Assembly, places: np.ndarray, reach: float) -> list[
     surfaces = [
         ShellSurface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present
     ]
-    far = np.stack([surface.feet(places).distance for surface in surfaces], axis=1)
+    far = np.stack([surface.closest_points(places).distance for surface in surfaces], axis=1)
     order = np.argsort(far, axis=1, kind="stable")[:, :2]
     if order.shape[1] < 2 or np.any(np.take_along_axis(far, order, 1)[:, 1] > reach):
         second = np.sort(far, axis=1)[:, 1] if order.shape[1] == 2 else np.full(len(far), np.inf)

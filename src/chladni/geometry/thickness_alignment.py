@@ -170,15 +170,15 @@ def _icp(
     residual = before = np.inf
     for _ in range(steps):
         p = source @ R.T + d
-        feet = target.feet(p, normal @ R.T, _GATE, near=_NEAR)
-        ok = np.isfinite(feet.distance)
-        far = np.where(ok, feet.distance, np.linalg.norm(np.ptp(source, axis=0)))
+        closest_points = target.closest_points(p, normal @ R.T, _GATE, near=_NEAR)
+        ok = np.isfinite(closest_points.distance)
+        far = np.where(ok, closest_points.distance, np.linalg.norm(np.ptp(source, axis=0)))
         keep = np.argsort(far, kind="stable")[: int(TRIM * len(p))]
         residual = float(np.sqrt((far[keep] ** 2).mean()))
         keep = keep[ok[keep]]
         if len(keep) < 6:
             break
-        n, gap = feet.normal[keep], feet.place[keep] - p[keep]
+        n, gap = closest_points.normal[keep], closest_points.place[keep] - p[keep]
         A = np.column_stack([np.cross(p[keep], n), n])
         step = np.linalg.lstsq(A, np.einsum("ki,ki->k", n, gap), rcond=1e-10)[0]
         turn = _rotation(step[:3])

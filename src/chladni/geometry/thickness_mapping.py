@@ -194,7 +194,10 @@ def _by_place(
     for k in np.unique(piece):
         cells = formed.cells[piece == k]
         at, normal = samples(formed.points, cells[:: max(1, len(cells) // 400)])
-        far = {p: np.median(s.feet(at[:, 0], normal, facing).distance) for p, s in surfaces.items()}
+        far = {
+            p: np.median(s.closest_points(at[:, 0], normal, facing).distance)
+            for p, s in surfaces.items()
+        }
         best = min(far, key=lambda p: float(far[p]))
         if far[best] <= reach:
             owner.setdefault(best, []).append(int(k))
@@ -222,9 +225,9 @@ def values_at(
     if not len(formed.cells):
         return _from_points(formed, places, reach)
     surface = ShellSurface.over("the formed mesh", formed.points, formed.cells)
-    feet = surface.feet(places, normal, facing)
-    t = np.einsum("nk,nk->n", formed.nodal[feet.nodes], feet.weight)
-    return np.where(feet.distance <= reach, t, np.nan), feet.distance
+    closest_points = surface.closest_points(places, normal, facing)
+    t = np.einsum("nk,nk->n", formed.nodal[closest_points.nodes], closest_points.weight)
+    return np.where(closest_points.distance <= reach, t, np.nan), closest_points.distance
 
 
 def _from_points(

@@ -67,7 +67,7 @@ def _between(
     height = []
     for side in (1.0, -1.0):
         start = at + side * gauge[:, None] * normal
-        foot = surface.feet(start, normal, FACING)
+        foot = surface.closest_points(start, normal, FACING)
         away = np.einsum("nk,nk->n", foot.place - at, normal)
         height.append(np.where(foot.distance <= gauge, away, np.nan))
     t, off = height[0] - height[1], np.abs(height[0] + height[1]) / 2

@@ -26,3 +26,13 @@ def with_masses(
         np.concatenate([old.matrix, each * (arm.T @ arm)]),
     )
     return replace(assembly, masses=new)
+
+
+def with_mass_pairs(
+    assembly: Assembly, pairs: Sequence[tuple[int, float]], factor: float = 1.0
+) -> Assembly:
+    """Add the mass of each (grid, kg) pair, times ``factor``; without pairs, the same assembly."""
+    if not pairs:
+        return assembly
+    grids, m = zip(*pairs, strict=True)
+    return with_masses(assembly, grids, factor * np.array(m))

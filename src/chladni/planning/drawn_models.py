@@ -11,8 +11,8 @@ import numpy as np
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import rigid_modes
 from ..dynamics.reduction import orthonormal
+from ..effects.calibration_parameters import PartScale, calibration_parameter, thickness_of
 from ..effects.element_groups import element_groups
-from ..effects.calibration_parameters import PartScale, ordinary, thickness_of
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..progress import Progress, silent
@@ -60,7 +60,7 @@ def ensemble(
     groups = element_groups(built, 1)
     parts = built.assembly.parts
     effects = tuple(
-        ordinary(groups, t, [p], spread)
+        calibration_parameter(groups, t, [p], spread)
         for p in np.unique(groups.part).tolist()
         if (t := thickness_of(parts[p]))
     )

@@ -273,7 +273,7 @@ def _reachable(
     )
     all_faces = ShellSurface.over("the structure", seen.points, seen.faces)
     lift = [
-        all_faces.feet(points + side * room / 2 * normals).distance >= 0.4 * room
+        all_faces.closest_points(points + side * room / 2 * normals).distance >= 0.4 * room
         for side in (1, -1)
     ]
     for k in range(len(points)):

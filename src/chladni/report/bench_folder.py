@@ -30,7 +30,7 @@ RENEWED = {  # words that do not hold for the new recordings, or stand in the de
     },
     "held_out": {"band"},
 }
-LEAST = 0.5  # of a band of the case must be in the test's, or all of the test's in it
+LEAST_OVERLAP = 0.5  # of a band of the case must be in the test's, or all of the test's in it
 
 
 def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
@@ -151,5 +151,7 @@ def _covered(
     if band is None:
         return None
     low, high = max(band[0], by[0]), min(band[1], by[1])
-    enough = high - low >= LEAST * (band[1] - band[0]) or band[0] <= by[0] < by[1] <= band[1]
+    enough = (
+        high - low >= LEAST_OVERLAP * (band[1] - band[0]) or band[0] <= by[0] < by[1] <= band[1]
+    )
     return (low, high) if enough else None

@@ -136,7 +136,7 @@ def _modes(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pat
 
 def _left(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
     """Draw the residual of the explanation on the mesh: grey where the test is blind."""
-    left = result.left_where
+    left = result.residual_localisation
     if left is None:
         return {}
     if len(left.gain):

@@ -47,8 +47,8 @@ def drawings(case: Case, result: DiagnosisResult, shown: Shown) -> Drawings:
         shared = {"mesh": live_mesh.mesh(shown)}
         found = {"spots": live_mesh.spots(_places(result), shown), "setup": live_mesh.setup(shown)}
         made["where"] = Drawing("structure", "first", found, ("where",), _CAPTIONS["where"])
-        if result.left_where is not None and len(result.left_where.gain):
-            left = live_mesh.left(result.left_where.gain, shown)
+        if result.residual_localisation is not None and len(result.residual_localisation.gain):
+            left = live_mesh.left(result.residual_localisation.gain, shown)
             made["left"] = Drawing("remainder", "scores", left, ("left",), _CAPTIONS["left"])
     return Drawings(made, shared)
 

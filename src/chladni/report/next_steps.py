@@ -9,7 +9,7 @@ from ..updating.result import CalibratedParameter
 from ..workflows.diagnosis_result import DiagnosisResult
 from .words import interval, percent, quantity
 
-_FAR = 0.05  # relative change of an ordinary parameter that is worth a measurement
+_FAR = 0.05  # relative change of a calibration parameter that is worth a measurement
 _MOST = 6  # steps
 
 

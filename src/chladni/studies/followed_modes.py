@@ -11,9 +11,9 @@ from ..ema.correlation import mac, subspace_mac
 from ..geometry.sampling import farthest_point_sample
 
 MARGIN = 1.4  # modes solved over modes followed: a mode may rise past its neighbours
-MOST = 1500  # nodes at which shapes are compared: a MAC of thousands of dofs gains nothing
+MOST_NODES = 1500  # nodes at which shapes are compared: a MAC of thousands of dofs gains nothing
 CLOSE = 5e-3  # relative distance of frequencies below which shapes may mix freely
-LEAST = 0.5  # MAC below which a mode is lost
+LEAST_MAC = 0.5  # MAC below which a mode is lost
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class FollowedModes:
         m, n = linear_sum_assignment(share + 1e-3 * own, maximize=True)
         f, value = np.full(len(group), np.nan), np.full(len(group), np.nan)
         value[m] = share[m, n]
-        kept = share[m, n] >= LEAST
+        kept = share[m, n] >= LEAST_MAC
         f[m[kept]] = elastic.frequency[n[kept]]
         return f, value
 
@@ -74,7 +74,7 @@ def followed(modal: ModalModel, places: np.ndarray, count: int) -> FollowedModes
     """
     rigid = int(rigid_modes(modal).sum())
     ids, first = np.unique(modal.dofs[:, 0], return_index=True)
-    chosen = ids[farthest_point_sample(places[first], MOST)]
+    chosen = ids[farthest_point_sample(places[first], MOST_NODES)]
     use = np.isin(modal.dofs[:, 0], chosen) & (modal.dofs[:, 1] <= 3)
     elastic = slice(rigid, rigid + count)
     return FollowedModes(

@@ -299,7 +299,7 @@ def _identity(asked: StudyModel) -> dict[str, Any]:
     measured: tuple[Any, ...] = ()
     if case is not None:
         measured = (*case.frfs[:1], case.outputs, case.inputs, case.band, case.exclude,
-                    case.damping, case.gain_known, case.carried)  # fmt: skip
+                    case.damping, case.gain_known, case.sensor_masses)  # fmt: skip
     rest = replace(s, samples=1, sampler="sobol", seed=0)
     return {
         "model": fingerprint((asked.model.assembly, *measured)),

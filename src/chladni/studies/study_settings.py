@@ -8,7 +8,7 @@ from ..errors import LabelError
 
 Sampler = Literal["sobol", "lhs", "grid", "oat", "saltelli", "morris"]
 SAMPLERS: tuple[str, ...] = get_args(Sampler)
-MOST = 10_000_000  # samples; a larger number is taken as a typing error
+MOST_SAMPLES = 10_000_000  # samples; a larger number is taken as a typing error
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class StudySettings:
         if self.quantity not in UNIT:
             raise LabelError(f"no quantity {self.quantity!r}; there are {', '.join(UNIT)}")
         for name, least, most in (
-            ("samples", 1, MOST), ("modes", 1, 10_000), ("lines", 2, 1_000_000),
+            ("samples", 1, MOST_SAMPLES), ("modes", 1, 10_000), ("lines", 2, 1_000_000),
             ("seed", 0, 2**32 - 1),
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:

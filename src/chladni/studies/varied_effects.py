@@ -7,11 +7,11 @@ import numpy as np
 
 from ..case import Case
 from ..effects.effect import Effect
+from ..effects.effect_context import EffectContext, Setup, element_grids
 from ..effects.element_groups import element_groups
 from ..effects.family import Family
 from ..effects.movable_attachment import MovableAttachment
 from ..effects.registry import family
-from ..effects.effect_context import Setup, Surroundings, element_grids
 from ..errors import FileError
 from ..fem.assemble import structure
 from ..fem.energy import mass_properties
@@ -98,13 +98,13 @@ def _refused(asked: VaryText, kind: Family) -> FileError:
     )
 
 
-def _surroundings(assembly: Assembly, case: Case | None) -> Surroundings:
+def _surroundings(assembly: Assembly, case: Case | None) -> EffectContext:
     sensors: Any = () if case is None else case.outputs.shares(assembly)
     hangers = () if case is None else tuple(case.setup.hangers)
     groups = element_groups(structure(assembly), 1)
     grids = element_grids(groups)
     setup = Setup(tuple(sensors), hangers, mass_properties(assembly)[0], _TOP)
-    return Surroundings(groups, grids, grids, setup)
+    return EffectContext(groups, grids, grids, setup)
 
 
 def _scale(unit: str, units: Units | None) -> tuple[float, str]:

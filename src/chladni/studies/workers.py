@@ -15,7 +15,7 @@ from .sample import SampleResult, StudyModel, computed
 from .worker_memory import keep_freed_memory
 
 PATIENCE = 15  # seconds a scheduler may take to answer
-MOST = 4  # local processes a core
+MOST_PER_CORE = 4  # local processes a core
 WORTH = 10.0  # seconds in one process above which others are started
 NO_WORKER = "the scheduler has no worker yet; waiting until one joins it"
 ALONE = 3.0  # seconds without a sample after which the cluster is checked for workers
@@ -30,13 +30,14 @@ def refuse_many(workers: int) -> None:
     Raises
     ------
     FileError
-        If the number is below one, or above ``MOST`` a core.
+        If the number is below one, or above ``MOST_PER_CORE`` a core.
     """
     if workers < 1:
         raise FileError(f"workers = {workers}; at least one has to do it")
-    if workers > MOST * cores():
+    if workers > MOST_PER_CORE * cores():
         raise FileError(
-            f"workers = {workers}; more than {MOST * cores()} gain nothing on {cores()} cores"
+            f"workers = {workers}; more than {MOST_PER_CORE * cores()} gain nothing "
+            f"on {cores()} cores"
         )
 
 

@@ -19,9 +19,9 @@ from ..dynamics.reduction import beyond
 from ..effects.effect import Effect, FieldChange, MatrixTerm
 from .effect_dofs import own_part, own_positions
 from .field_factors import mass_log, stiffness_log
+from .frequency_dependent_stiffness import UnrisenModes, applied
 from .reduced_model import Reduced, State, evaluate, log_fields, slices
 from .reduced_problem import ReducedProblem
-from .frequency_dependent_stiffness import UnrisenModes, applied
 
 LIMIT = 5e-4  # largest relative frequency error that is accepted of a basis
 RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as rigid
@@ -48,10 +48,10 @@ class Accuracy:
         return float(self.error.max(initial=0.0))
 
     def serves(self, limit: float = LIMIT) -> bool:
-        """True where the basis is accurate enough; otherwise it must be renewed."""
+        """True where the basis is accurate enough; otherwise it must be refined."""
         return self.worst <= limit
 
-    def renewed(self, model: Reduced) -> Reduced:
+    def refined(self, model: Reduced) -> Reduced:
         """The model over a basis that also holds the missing vectors."""
         return model.extended(self.missing)
 

@@ -22,12 +22,12 @@ from .damping_scatter import FEWEST, ModalDamping
 from .discrepancy import RIGID, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
 from .likelihood import SCALE, SCALE_SD, Poles, Responses
-from .map_fit import MassMeasurement, beside, unknowns
+from .map_fit import MassMeasurement, prior_residuals, unknowns
 from .reduced_model import State, evaluate
 from .result import FitStatistic
 from .whitening import Span, Whitening
 
-LEAST = 0.01  # p below which an explanation does not fit
+LEAST_P = 0.01  # p below which an explanation does not fit
 DRAWS = 300
 ALIKE = 0.88  # correlation of noise on neighbouring lines, where no span says it
 BELOW = 0.7  # of the first flexible mode: what rings lower swings on its suspension
@@ -134,7 +134,7 @@ def adequacy(
         return None
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     r, J = data.scaled(state, True)
-    r0, J0 = beside(fit.effects, mass_measurement, fit.x, state)
+    r0, J0 = prior_residuals(fit.effects, mass_measurement, fit.x, state)
     model = _Linear(data.error, data.known, J, J0, data.use, data.values.shape[2])
     seen, square = model.statistics(r, r0)
     rng = np.random.default_rng(20250103)
@@ -149,7 +149,7 @@ def adequacy(
     )
     usual = rows[least].median
     what = NAMES[least].format(seen[least], usual, seen[least] / usual)
-    test = FitTest(better or p >= LEAST, p, what, where, rows, _modes_near(worst, fit.state))
+    test = FitTest(better or p >= LEAST_P, p, what, where, rows, _modes_near(worst, fit.state))
     if damping is not None:
         test = _evenly_damped(test, damping.above(_first(data, fit.state)))
     return test if coupling is None else _coupled_by_damping(test, coupling)
@@ -168,7 +168,7 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
         return test
     p, row = damping.tested()
     test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.p, LEAST):
+    if p >= min(test.p, LEAST_P):
         return test
     what, where, modes = damping.said()
     return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
@@ -178,7 +178,7 @@ def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
     """The test, or that of complex modes where it is the less likely of the two."""
     p, row, what, modes = coupling.tested()
     test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.p, LEAST):
+    if p >= min(test.p, LEAST_P):
         return test
     what += ": something spins, or moves by a drive of its own, or channels lag one another"
     where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
@@ -200,12 +200,12 @@ def of_poles(data: Poles, state: State) -> FitTest:
     if often < closely:
         what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
         where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
-        return FitTest(often >= LEAST, often, what, where)
+        return FitTest(often >= LEAST_P, often, what, where)
     what = (
         f"natural frequencies are met to {data.scale:.1%}; models of one structure differ by about "
         f"{SCALE:.1%}"
     )
-    return FitTest(closely >= LEAST, closely, what, "over all modes")
+    return FitTest(closely >= LEAST_P, closely, what, "over all modes")
 
 
 def at_least(count: int, chance: np.ndarray) -> float:

@@ -31,9 +31,9 @@ class BaseParticipation:
     groups: np.ndarray
     rest: np.ndarray
 
-    def over(self, built: Structure) -> Self:
+    def extended_to(self, built: Structure) -> Self:
         """The participation on a structure with further dofs, which the basis does not move yet."""
-        return replace(self, motion=self.motion.over(built))
+        return replace(self, motion=self.motion.extended_to(built))
 
     def extended(self, shells: ElementGroups, new: np.ndarray) -> Self:
         """The participation over a basis that also holds these vectors (n, m)."""
@@ -44,7 +44,7 @@ class BaseParticipation:
 
 def participation(shells: ElementGroups, basis: Basis, motion: BaseMotion) -> BaseParticipation:
     """Participation of each vector of a basis (n, r) in the motion of the base."""
-    groups = shells.carried(basis, motion.whole)
+    groups = shells.inertia_of_motion(basis, motion.whole)
     return BaseParticipation(motion, groups, basis.projected(motion.force) - groups.sum(axis=0))
 
 

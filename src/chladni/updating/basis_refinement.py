@@ -21,7 +21,7 @@ TRIES = 3  # times the basis is extended by its missing vectors
 
 
 @dataclass(frozen=True, eq=False)
-class Renewal:
+class Refinement:
     """A hypothesis fitted again on a more accurate reduced model.
 
     Attributes
@@ -47,9 +47,9 @@ class Renewal:
         )
 
 
-def renewed(
+def refined(
     question: Question, prepared: Prepared, hypothesis: HypothesisFit, held: bool = False
-) -> Renewal:
+) -> Refinement:
     """Fit a hypothesis again on an accurate reduced model, and report the model's error.
 
     Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
@@ -65,8 +65,8 @@ def renewed(
     for _ in range(TRIES):
         if found.serves():
             break
-        model, begun = found.renewed(hypothesis.model), hypothesis.fit
-        data = hypothesis.data.over(model)
+        model, begun = found.refined(hypothesis.model), hypothesis.fit
+        data = hypothesis.data.rebased(model)
         try:
             if held:
                 state = evaluate(model, begun.effects, begun.x)
@@ -79,7 +79,7 @@ def renewed(
         hypothesis = replace(hypothesis, fit=fit, model=model)
         found = _accuracy(problem, hypothesis)
         note = f"{note}; with what it lacked added to its basis, {found.worst:.2%}"
-    return Renewal(hypothesis, note, found.worst)
+    return Refinement(hypothesis, note, found.worst)
 
 
 def _accuracy(problem: UpdatingProblem, hypothesis: HypothesisFit) -> Accuracy:
@@ -118,7 +118,7 @@ def _on_new_structure(
     fresh = updating_problem(
         changed,
         reduced,
-        data.over(reduced.model),
+        data.rebased(reduced.model),
         [*nuisances(reduced, model, mesh, None if rows else f_max), *of_test],
         f_max,
     )
@@ -131,5 +131,5 @@ def _on_new_structure(
 def _with_valleys(hypothesis: HypothesisFit, old: HypothesisFit) -> HypothesisFit:
     """The hypothesis with its earlier local optima, at the same distance in evidence as before."""
     ahead = hypothesis.neg2_log_evidence - old.neg2_log_evidence
-    valleys = (replace(v, neg2_log_evidence=v.neg2_log_evidence + ahead) for v in old.valleys)
-    return replace(hypothesis, valleys=tuple(valleys))
+    optima = (replace(v, neg2_log_evidence=v.neg2_log_evidence + ahead) for v in old.optima)
+    return replace(hypothesis, optima=tuple(optima))

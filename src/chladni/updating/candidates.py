@@ -8,12 +8,12 @@ from typing import Self
 import numpy as np
 
 from ..effects.effect import Effect
+from ..effects.effect_context import EffectContext, ElementGrids
 from ..effects.joints import Connection
 from ..effects.registry import families
 from ..effects.search_context import APART, Candidate
-from ..effects.effect_context import ElementGrids, Surroundings
 from ..errors import ModelError
-from ..parallel import side_by_side
+from ..parallel import in_parallel
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
@@ -44,7 +44,7 @@ def candidates(
     context = UpdatingContext(problem, null).ready()
     every = [
         c
-        for proposed in side_by_side(lambda family: family.proposed(context), families())
+        for proposed in in_parallel(lambda family: family.proposed(context), families())
         for c in proposed
         if not already_there(problem, c.effect, c.start)
     ]
@@ -116,7 +116,7 @@ class UpdatingContext:
     about: np.ndarray | None = None
 
     @property
-    def where(self) -> Surroundings:
+    def where(self) -> EffectContext:
         """The structure and its test."""
         return self.problem.where
 
@@ -133,7 +133,7 @@ class UpdatingContext:
             return nominal, self.about
         found = [e for e, _ in self.problem.found]
         kinds = [
-            e.kind == "ordinary" or e in found for e in self.problem.base for _ in e.parameters
+            e.kind == "calibration" or e in found for e in self.problem.base for _ in e.parameters
         ]
         return nominal, np.where(kinds, self.null_fit.fit.x, nominal)
 
@@ -186,17 +186,17 @@ class UpdatingContext:
         return tuple((each.joint, each.share) for each in self.loosened)
 
     def scores(
-        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False, about: int = -1
+        self, effect: Effect, starts: Sequence[np.ndarray], extended: bool = False, about: int = -1
     ) -> np.ndarray:
         """Score of an effect at each start about one of ``bases`` (n_ways, n_starts).
 
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
         base, reduced = self.baselines[about], self.problem.reduced
-        wider = carried or effect.lets_go
+        wider = extended or effect.lets_go
         widened = reduced.model_for if wider else reduced.model.split_for
         model = widened(effect, starts[0])
-        data = self.problem.data.over(model)
+        data = self.problem.data.rebased(model)
         ways = WIDE if isinstance(data, Poles) else (0.0,)
         out = np.full((len(ways), len(starts)), np.inf)
         for k, start in enumerate(starts):
@@ -224,7 +224,7 @@ class UpdatingContext:
             [state.phi.T @ model.operator(t.operator) @ state.phi for t in terms]
         )
 
-    def valleys(self, effect: Effect) -> list[np.ndarray]:
+    def optima(self, effect: Effect) -> list[np.ndarray]:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""
         return global_starts(self.problem, effect)
 

@@ -17,28 +17,28 @@ from ..decision.hypothesis_table import (
     Votes,
     Wanted,
     after,
-    renewed,
+    refined,
 )
 from ..decision.reasons import Decision
 from ..effects.effect import Effect
 from ..errors import ModelError
 from .adequacy import FitTest
+from .basis_refinement import Refinement
 from .diagnosis import Diagnosis, fit_test
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Poles, Responses
 from .local_damping_test import heard_of_damping
 from .map_fit import fit
-from .verdict_models import given, scores_of
 from .question import Prepared
 from .reduced_model import evaluate
-from .basis_refinement import Renewal
 from .rows_of_fits import row_of
 from .search_round import taken
 from .several import Several
+from .verdict_models import given, scores_of
 from .written_hypothesis import as_found, as_written, of_mesh
 
-Renew = Callable[[HypothesisFit], Renewal]
+Refine = Callable[[HypothesisFit], Refinement]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Measured:
     Attributes
     ----------
     table : the rows
-    fits, tests, renewals : of its rows, by key
+    fits, tests, refinements : of its rows, by key
     written : rows as a deck can hold them
     sets : several effects, by key
     decks : of a calibration
@@ -60,7 +60,7 @@ class Measured:
     fits: Mapping[str, HypothesisFit]
     tests: Mapping[str, FitTest]
     sets: Mapping[str, Several] = field(default_factory=dict)
-    renewals: Mapping[str, Renewal] = field(default_factory=dict)
+    refinements: Mapping[str, Refinement] = field(default_factory=dict)
     written: Mapping[str, HypothesisFit] = field(default_factory=dict)
     decks: Mapping[CalibratedDeck, HypothesisFit] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
@@ -75,24 +75,24 @@ class Measured:
         return replace(self, table=replace(self.table, decks={**self.table.decks, deck: Q}))
 
 
-def decided(prepared: Prepared, found: Diagnosis, renew: Renew) -> tuple[Decision, Measured]:
+def decided(prepared: Prepared, found: Diagnosis, refine: Refine) -> tuple[Decision, Measured]:
     """Make every fit that a decision requests; return the decision and all the fits.
 
     Parameters
     ----------
-    renew : fits a hypothesis again on a reduced model that is accurate enough for it
+    refine : fits a hypothesis again on a reduced model that is accurate enough for it
     """
     known = begun(prepared, found)
     rules = WITH_KNOWN_NOISE if known.table.known_noise else RULES
-    return decided_by(rules, prepared, found, renew, known)
+    return decided_by(rules, prepared, found, refine, known)
 
 
 def decided_by(
-    rules: DecisionRules, prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured
+    rules: DecisionRules, prepared: Prepared, found: Diagnosis, refine: Refine, known: Measured
 ) -> tuple[Decision, Measured]:
     """Decide by some rules, with every fit that they request beyond those that are known."""
     while isinstance(decision := decide(known.table, rules), Wanted):
-        known = measured(prepared, found, renew, known, decision)
+        known = measured(prepared, found, refine, known, decision)
     return decision, known
 
 
@@ -113,16 +113,16 @@ def begun(prepared: Prepared, found: Diagnosis) -> Measured:
 
 def _set_row(key: str, s: Several) -> SetRow:
     names = tuple(e.name for e in s.own.effects)
-    return SetRow(key, names, s.gains, s.due, s.ahead, s.rivals)
+    return SetRow(key, names, s.gains, s.due, s.ahead, s.alternatives)
 
 
 def measured(
-    prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured, wanted: Wanted
+    prepared: Prepared, found: Diagnosis, refine: Refine, known: Measured, wanted: Wanted
 ) -> Measured:
     """Return the known fits and numbers with the wanted one added."""
     key, problem = wanted.key, prepared.problem
     if wanted.ask is Ask.RENEWAL:
-        return _renewed(prepared, found, renew, known, key)
+        return _refined(prepared, found, refine, known, key)
     if wanted.ask is Ask.DECK:
         return _calibrated(prepared, found, known, CalibratedDeck[key])
     row = known.table.rows[key]
@@ -135,7 +135,7 @@ def measured(
         left = Left(*((a, b) for a, b in scores_of(prepared, own, stages)))
         return replace(known, written={**known.written, key: written}).row(replace(row, left=left))
     if wanted.ask is Ask.AFTER:
-        return _after(prepared, known, row, wanted.beside)
+        return _after(prepared, known, row, wanted.after)
     asked = known.fits.get(key, found.null)
     chances = fit_test(problem, asked)
     tests = {**known.tests, key: chances.test} if chances.test else known.tests
@@ -154,40 +154,42 @@ def _votes(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> V
     return Votes(asked.held_out, asked.sensors, asked.lines)
 
 
-def _renewed(
-    prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured, key: str
+def _refined(
+    prepared: Prepared, found: Diagnosis, refine: Refine, known: Measured, key: str
 ) -> Measured:
     """Fit a row again on an accurate enough model; an alternative first gets its own basis.
 
-    Among earlier renewals only the leader keeps its model, because the others are decided on.
+    Among earlier refinements only the leader keeps its model, because the others are decided on.
     """
-    lead, rival = known.table.singles[:1], known.fits[key]
+    lead, alternative = known.table.singles[:1], known.fits[key]
     try:
         if (key,) != lead and key not in known.sets:
-            rival = on_its_own_basis(prepared, found, rival)
-        whole = renew(rival)
+            alternative = on_its_own_basis(prepared, found, alternative)
+        whole = refine(alternative)
     except ModelError as error:
         if (key,) == lead or key in known.sets:
             raise
-        row = replace(known.table.rows[key], key=renewed(key), fitted=False)
+        row = replace(known.table.rows[key], key=refined(key), fitted=False)
         return replace(known, failed={**known.failed, key: str(error)}).row(row)
-    done = {renewed(k) for k in known.renewals if (k,) != lead and not known.whole}
+    done = {refined(k) for k in known.refinements if (k,) != lead and not known.whole}
     fits, written = (
         {k: t for k, t in every.items() if k not in done} for every in (known.fits, known.written)
     )
     return replace(
-        known, fits={**fits, renewed(key): whole.hypothesis}, written=written,
-        renewals={**known.renewals, key: replace(whole, hypothesis=found.null)},  # no model
-    ).row(row_of(whole.hypothesis, renewed(key)))  # fmt: skip
+        known, fits={**fits, refined(key): whole.hypothesis}, written=written,
+        refinements={**known.refinements, key: replace(whole, hypothesis=found.null)},  # no model
+    ).row(row_of(whole.hypothesis, refined(key)))  # fmt: skip
 
 
-def on_its_own_basis(prepared: Prepared, found: Diagnosis, rival: HypothesisFit) -> HypothesisFit:
+def on_its_own_basis(
+    prepared: Prepared, found: Diagnosis, alternative: HypothesisFit
+) -> HypothesisFit:
     """Fit an alternative again from its result: a diagnosis keeps only its leader's model."""
     null, problem = found.null.data, prepared.problem
     assert isinstance(null, (Responses, Poles))
-    problem = replace(problem, data=null.over(problem.reduced.model))
-    base = taken(problem, rival, ("ordinary", "nuisance"))
-    return problem.fitted_with(rival.effect, rival.fit.of(rival.effect), base)
+    problem = replace(problem, data=null.rebased(problem.reduced.model))
+    base = taken(problem, alternative, ("calibration", "nuisance"))
+    return problem.fitted_with(alternative.effect, alternative.fit.of(alternative.effect), base)
 
 
 def _after(prepared: Prepared, known: Measured, row: Row, leader: str) -> Measured:
@@ -207,7 +209,7 @@ def _calibrated(
 ) -> Measured:
     """Q of a calibration on the fitted data, with the mesh error and without it, as in a deck."""
     null, problem = found.null, prepared.problem
-    data = prepared.score.over(null.model)
+    data = prepared.score.rebased(null.model)
 
     def Q(effects: Sequence[Effect], x: np.ndarray) -> tuple[float, ...]:
         try:
@@ -242,7 +244,7 @@ def numbers(
     if deck is CalibratedDeck.PLAIN:
         return plain
     x = [
-        np.array([p.nominal for p in e.parameters]) if e.kind == "ordinary" else plain.fit.of(e)
+        np.array([p.nominal for p in e.parameters]) if e.kind == "calibration" else plain.fit.of(e)
         for e in plain.fit.effects
     ]
     begun = np.concatenate([np.zeros(0), *x])

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ..decision.hypothesis_table import Row, SetRow, Votes, after, renewed
+from ..decision.hypothesis_table import Row, SetRow, Votes, after, refined
 from ..decision.reasons import ALONE, Decision, Reason, Step
 from ..effects.registry import family
 from ..ema.odds import evidence_in_words
@@ -43,7 +43,7 @@ def concluded(
     )  # fmt: skip
     if not decision.named:
         return replace(said, plain=numbers(prepared, found, known, decision.deck)), ()
-    distrust = (r.distrust for k, r in known.renewals.items() if renewed(k) == first)
+    distrust = (r.distrust for k, r in known.refinements.items() if refined(k) == first)
     return replace(said, written=known.written[first]), next(distrust, ())
 
 
@@ -87,9 +87,9 @@ class DecisionWords:
         if why is Reason.NOT_FITTED:
             return f"it could not be fitted again: {self.known.failed[name]}"
         if why is Reason.DAMPING:
-            return next(t.what for k, t in tests.items() if k.startswith(after(renewed(name), "")))
+            return next(t.what for k, t in tests.items() if k.startswith(after(refined(name), "")))
         if why is Reason.UNFIT:
-            test = tests.get(renewed(name)) or tests[name]
+            test = tests.get(refined(name)) or tests[name]
             return f"what it leaves is not explained: {test.what}"
         return REFUSED[why]
 
@@ -110,9 +110,9 @@ class DecisionWords:
         last = step.key == self.decision.tested and not self.decision.named
         return f"{note}, {test.where}{UNEXPLAINED if last else ''}"
 
-    def _renewed(self, step: Step) -> str:
-        renewal = self.known.renewals.get(step.key)
-        return "" if renewal is None else renewal.note
+    def _refined(self, step: Step) -> str:
+        refinement = self.known.refinements.get(step.key)
+        return "" if refinement is None else refinement.note
 
     def _too_few(self, step: Step) -> str:
         return (
@@ -125,13 +125,14 @@ class DecisionWords:
         row, data = self.row(step.key), "poles" if self.known.table.poles else "data"
         return (
             f"{row.name} gained {self.gain(step.key):.1f} in -2 ln evidence on the {data} that "
-            f"were fitted, and those that no fit saw bring {row.heard().news:.1f}: together more "
+            "were fitted, and those that no fit saw bring "
+            f"{row.held_out_votes().news:.1f}: together more "
             f"than the {self.decision.due:.0f} that are needed"
         )
 
-    def _heard(self, step: Step) -> str:
+    def _held_out(self, step: Step) -> str:
         row = self.row(step.key)
-        return f"{row.name} on data that no fit saw: {votes_in_words(row.heard())}"
+        return f"{row.name} on data that no fit saw: {votes_in_words(row.held_out_votes())}"
 
     def _refused(self, step: Step) -> str:
         row = self.row(step.key)
@@ -139,15 +140,15 @@ class DecisionWords:
         (seen, seen_with), (held, held_with) = left.fitted, left.held_out
         return (
             f"{row.name} gained {self.gain(step.key):.0f} in -2 ln evidence, but "
-            f"{REFUSED[step.reason]} ({votes_in_words(row.heard())}; held-out Q {held:.3g} "
-            f"calibrated, {held_with:.3g} with it; of what was fitted {seen:.3g} and "
-            f"{seen_with:.3g}), so it is not named"
+            f"{REFUSED[step.reason]} ({votes_in_words(row.held_out_votes())}; "
+            f"held-out Q {held:.3g} calibrated, {held_with:.3g} with it; of what was fitted "
+            f"{seen:.3g} and {seen_with:.3g}), so it is not named"
         )
 
     def _refuting(self, step: Step) -> str:
         row, gain = self.row(step.key), self.gain(step.key)
         if step.reason is Reason.ALL_DATA:
-            gain += row.heard().news
+            gain += row.held_out_votes().news
         assert step.why is not None
         return (
             f"{DATA[step.reason]}: {evidence_in_words(gain / 2)} for {row.name} against "
@@ -167,23 +168,23 @@ class DecisionWords:
             f"each gains in -2 ln evidence: {gains} ({s.due:.0f} are needed)"
         )
 
-    def _heard_beside(self, step: Step) -> str:
+    def _held_out_of_set(self, step: Step) -> str:
         s = self.whole(step)
         others = " and ".join(n for k, n in enumerate(s.members) if k != step.member)
-        said = votes_in_words(self.row(s.member(step.member)).heard())
+        said = votes_in_words(self.row(s.member(step.member)).held_out_votes())
         return f"{s.members[step.member]} added to {others}, on data that no fit saw: {said}"
 
     def _set_refused(self, step: Step) -> str:
         assert step.why is not None
         if step.why is Reason.NOT_BORNE:
-            why = f"that is too little for {self._heard_beside(step)}"
+            why = f"that is too little for {self._held_out_of_set(step)}"
         elif step.why is Reason.UNFIT:
-            why = f"what is left is not explained: {self.known.tests[renewed(step.key)].what}"
+            why = f"what is left is not explained: {self.known.tests[refined(step.key)].what}"
         else:
             why = REFUSED[step.why]
         return f"{self._found_together(step)}; but {why}"
 
-    def _perhaps_beside(self, step: Step) -> str:
+    def _perhaps_of_set(self, step: Step) -> str:
         s, k = self.whole(step), step.member
         return (
             f"with {' and '.join(step.names)} in place {s.members[k]} gains {s.gains[k]:.0f} in "
@@ -191,13 +192,13 @@ class DecisionWords:
         )
 
     def _rival_of_member(self, step: Step) -> str:
-        rivals = self.whole(step).rivals[step.member]
-        behind = ", ".join(f"{r.name} by {r.behind:.0f}" for r in rivals)
+        alternatives = self.whole(step).alternatives[step.member]
+        behind = ", ".join(f"{r.name} by {r.behind:.0f}" for r in alternatives)
         note = (
             f"with the others in place these data do not tell {step.names[0]} apart from what is "
             f"behind it in -2 ln evidence: {behind}"
         )
-        odd = [needs_impossible(r.name, r.implausible) for r in rivals if r.implausible]
+        odd = [needs_impossible(r.name, r.implausible) for r in alternatives if r.implausible]
         return _with_check("; ".join([note, *odd]), step.names)
 
     def _usual_left(self, step: Step) -> str:
@@ -245,10 +246,10 @@ class DecisionWords:
 
 _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.TESTED: DecisionWords._tested,
-    Reason.RENEWED: DecisionWords._renewed,
+    Reason.RENEWED: DecisionWords._refined,
     Reason.TOO_FEW: DecisionWords._too_few,
     Reason.BORNE_BY_ALL: DecisionWords._borne_by_all,
-    Reason.HEARD: DecisionWords._heard,
+    Reason.HELD_OUT: DecisionWords._held_out,
     Reason.AGAINST: DecisionWords._refused,
     Reason.TOO_LITTLE: DecisionWords._refused,
     Reason.WORSE: DecisionWords._refused,
@@ -256,9 +257,9 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.ALL_DATA: DecisionWords._unexplained,
     Reason.WHAT_WAS_FITTED: DecisionWords._unexplained,
     Reason.FOUND_TOGETHER: DecisionWords._found_together,
-    Reason.HEARD_BESIDE: DecisionWords._heard_beside,
+    Reason.HELD_OUT_OF_SET: DecisionWords._held_out_of_set,
     Reason.SET_REFUSED: DecisionWords._set_refused,
-    Reason.PERHAPS_BESIDE: DecisionWords._perhaps_beside,
+    Reason.PERHAPS_BESIDE: DecisionWords._perhaps_of_set,
     Reason.RIVAL_OF_MEMBER: DecisionWords._rival_of_member,
     Reason.USUAL_LEFT: DecisionWords._usual_left,
     Reason.NEXT: DecisionWords._next,

@@ -14,7 +14,6 @@ import numpy as np
 
 from ..fem.modelled import modelled
 from .diagnosis import threshold
-from .residual_localisation import bumps
 from .likelihood import LN10, Responses
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .preparation import (
@@ -26,12 +25,13 @@ from .preparation import (
 )
 from .question import Question
 from .reduced_model import evaluate
+from .residual_localisation import bumps
 from .scan import baseline, field_slopes, point_scores
 from .sensor_errors import sensor_errors
 
 NOISE = 0.01  # of |H|, at every line that is compared
 MASSES = np.geomspace(1e-5, 0.3, 40)  # tried, of the structure's mass
-MOST = 0.9  # of stiffness or thickness: a change that would have to be larger is not found
+MOST_CHANGE = 0.9  # of stiffness or thickness: a change that would have to be larger is not found
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Detectable:
     weight: float
 
 
-def detectable(asked: Question, noise: float = NOISE) -> Detectable:
+def detectable(question: Question, noise: float = NOISE) -> Detectable:
     """Smallest changes of the structure that a test with these sensors and shakers would find.
 
     Parameters
@@ -68,22 +68,22 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     asked : without a recording; its band is what will be measured
     noise : of |H|, at every line that is compared
     """
-    low, f_max = asked.band
-    nominal = modelled(asked.searched(asked.assembly), SOLVED * f_max)
+    low, f_max = question.band
+    nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
-    rows = asked.outputs.rows(built), asked.inputs.rows(built)
-    mesh = mesh_hidden(nominal, f_max, measured_on(asked))
-    reduced = ready_for_responses(asked, nominal, f_max)
-    f = equalised_lines((low, f_max), asked.exclude, ZETA)
+    rows = question.outputs.rows(built), question.inputs.rows(built)
+    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    reduced = ready_for_responses(question, nominal, f_max)
+    f = equalised_lines((low, f_max), question.exclude, ZETA)
     s = 2 * np.pi * f * (ZETA + 1j)
-    shape = (len(s), len(asked.outputs.labels), len(asked.inputs.labels))
+    shape = (len(s), len(question.outputs.labels), len(question.inputs.labels))
     unit = Responses(
         np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
-        noise=np.full(shape, noise / LN10), direct=asked.outputs.carried_by(asked.inputs),
-        sensors=sensor_errors(asked.outputs, asked.inputs, built, asked.accuracy),
-    ).over(reduced.model)  # fmt: skip
+        noise=np.full(shape, noise / LN10), direct=question.outputs.carried_by(question.inputs),
+        sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
+    ).rebased(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, mesh)
-    problem = updating_problem(asked, reduced, unit, nuisance, f_max)
+    problem = updating_problem(question, reduced, unit, nuisance, f_max)
     x = problem.mean()
     state = evaluate(reduced.model, problem.base, x)
     data = replace(unit, values=unit.model(state)).allowing_errors(state)
@@ -99,7 +99,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     for field in ("E", "t"):
         columns = field_slopes(base, reduced.model, data, field) @ local
         share = 1 - np.exp(-np.sqrt(due / np.maximum(base.score(columns), 1e-12)))
-        shares.append(np.where(share < MOST, share, np.nan))
+        shares.append(np.where(share < MOST_CHANGE, share, np.nan))
     gained = score - base.score(base.residual[:, None])[0]
     return Detectable(
         places.grids, places.point, weight * _smallest(gained, due), shares[0], shares[1],

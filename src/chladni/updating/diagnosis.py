@@ -1,8 +1,8 @@
 """From a recording to the name of what the model left out.
 
-1. null: ordinary parameters and scatter alone, from several starts;
+1. null: calibration parameters and scatter alone, from several starts;
 2. scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0;
-3. fits: the best places of every family, jointly with the ordinary parameters and the scatter;
+3. fits: the best places of every family, jointly with the calibration parameters and the scatter;
 4. evidence: Laplace, with 2 ln of the number of places tried; leaders restart the null;
 5. verdict;
 6. where an effect is named, or nothing fits: sets of several effects (``several``).
@@ -26,7 +26,7 @@ from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
 from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted, wide_start
-from .implausible_values import leaning
+from .implausible_values import implausible_values
 from .likelihood import Poles, Responses
 from .local_damping_test import heard_of_damping
 from .reduced_model import evaluate
@@ -45,8 +45,8 @@ class Diagnosis:
 
     Attributes
     ----------
-    nominal, null : fits without, and with ordinary parameters free, scatter allowed in both
-    plain : ordinary parameters alone, as any calibration would: what a named effect is compared
+    nominal, null : fits without, and with calibration parameters free, scatter allowed in both
+    plain : calibration parameters alone, as any calibration would: what a named effect is compared
         with; where nothing is named, with the learned error of the model
     hypotheses : best hypothesis of every family, best first
     verdict : one of the public verdicts
@@ -132,7 +132,7 @@ def diagnose(
 ) -> Diagnosis:
     """Name the missing physics, or say that none is missing; without ``effects``, calibrate.
 
-    A calibration alone is also begun from random values of the ordinary parameters; the effects
+    A calibration alone is also begun from random values of the calibration parameters; the effects
     bring starts of their own.
     """
     progress("calibration without new physics", 0.05)
@@ -164,7 +164,7 @@ def _called(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         tuple(t.effect.name for t in found.hypotheses),
         nominal=found.nominal.neg2_log_evidence,
         poles=isinstance(found.null.data, Poles),
-        leaning=bool(leaning(found.plain.fit)),
+        implausible=bool(implausible_values(found.plain.fit)),
         families=len(families()),
         known_noise=getattr(found.null.data, "identified", None) is not None,
     )
@@ -274,9 +274,9 @@ def _calibrated(problem: UpdatingProblem, nominal: HypothesisFit, null: Hypothes
 
 
 def _random_starts(problem: UpdatingProblem, count: int = 4) -> list[np.ndarray]:
-    """Ordinary parameters drawn from their prior, the rest at its mean (a fixed seed)."""
+    """Calibration parameters drawn from their prior, the rest at its mean (a fixed seed)."""
     rng = np.random.default_rng(20250102)
-    own = [e.kind == "ordinary" for e in problem.base for _ in e.parameters]
+    own = [e.kind == "calibration" for e in problem.base for _ in e.parameters]
     sd = np.array([p.sd for e in problem.base for p in e.parameters]) * own
     return [problem.mean() + sd * rng.normal(size=len(sd)) for _ in range(count)]
 
@@ -298,7 +298,7 @@ def _base_fit(
 
 
 def _plain(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
-    """Ordinary parameters alone, no scatter or modal discrepancy: the same starts and the null."""
+    """Calibration parameters alone, no scatter or modal discrepancy: same starts, and the null."""
     kept = [e.writable for e in problem.base]
     chosen = [e for e, k in zip(problem.base, kept, strict=True) if k]
     inside = np.concatenate(
@@ -328,6 +328,6 @@ def _restarted(
     tries = [null]
     for lead in hypotheses[:2]:
         with suppress(ModelError):
-            start = taken(problem, lead, ("ordinary", "nuisance"))
+            start = taken(problem, lead, ("calibration", "nuisance"))
             tries.append(_base_fit(problem, problem.base, [start]))
     return min(tries, key=lambda t: t.neg2_log_evidence)

@@ -24,7 +24,7 @@ from .whitening import Span
 MEDIAN = 0.01  # of δ before it is learned
 REACH = 1.5  # modes up to this many times the highest line take part
 RIGID = 0.02  # of the highest line: below it a mode counts as rigid and is known
-MOST = 2000  # pairs of modes, or samples, that are decomposed
+MOST_PAIRS = 2000  # pairs of modes, or samples, that are decomposed
 CUT = 0.02  # variances below this share of the noise, at the largest δ, are left out
 USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
 LARGEST = 0.006  # the same at most, where δ is learned: of 42 tuning articles without an effect
@@ -180,8 +180,8 @@ class Discrepancy:
 def discrepancy(data: Lines, state: State) -> Discrepancy:
     """How errors of modal stiffness and mass at a state spread over the whitened residual.
 
-    The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST`` strongest pairs. Where
-    the residuals have a span of their own, W is met in its coordinates.
+    The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST_PAIRS``
+    strongest pairs. Where the residuals have a span of their own, W is in its coordinates.
     """
     W = columns(data, state, form(state, float(data.s.imag.max())))
     if data.span is not None:
@@ -193,10 +193,10 @@ def discrepancy(data: Lines, state: State) -> Discrepancy:
 def _decomposed(W: np.ndarray) -> Discrepancy:
     if not W.size:  # no flexible mode of the model is near what was measured
         return Discrepancy(np.zeros((len(W), 0)), np.zeros(0))
-    if len(W) <= MOST:
+    if len(W) <= MOST_PAIRS:
         s, U = sl.eigh(W @ W.T, overwrite_a=True, check_finite=False, driver="evd")
     else:
-        W = W[:, np.argsort(-(W**2).sum(axis=0))[:MOST]]
+        W = W[:, np.argsort(-(W**2).sum(axis=0))[:MOST_PAIRS]]
         s, V = sl.eigh(W.T @ W, overwrite_a=True, check_finite=False, driver="evd")
         U = W @ (V / np.sqrt(np.maximum(s, 1e-300)))
     kept = s > CUT / FORMULATIONS.grid[-1] ** 2

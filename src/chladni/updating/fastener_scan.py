@@ -30,9 +30,9 @@ from .reduced_model import State
 from .reduced_problem import ReducedProblem
 from .scan import Baseline, whitened
 
-MOST = 400  # fasteners that are tried; of more, so many spread over the structure
+MOST_FASTENERS = 400  # fasteners that are tried; of more, so many spread over the structure
 AT_ONCE = 24  # of them are solved for together
-LEAST = 1e-9  # of R: rounding of the solves
+LEAST_CHANGE = 1e-9  # of R: rounding of the solves
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +80,8 @@ def loosened_rows(reduced: ReducedProblem) -> tuple[LoosenedRow, ...]:
     Long lines are divided so that every run of ``MOST_RUN`` fasteners lies in one row.
     """
     joints = fasteners(reduced.structure)
-    if len(joints) > MOST:
-        spread = farthest_point_sample(np.array([j.point for j in joints]), MOST)
+    if len(joints) > MOST_FASTENERS:
+        spread = farthest_point_sample(np.array([j.point for j in joints]), MOST_FASTENERS)
         joints = [joints[k] for k in spread]
     rows = [
         line[begin : begin + AT_ONCE]
@@ -128,9 +128,9 @@ def together(reduced: ReducedProblem, rows: Sequence[Sequence[Connection]]) -> l
 
 
 def _rest(R: np.ndarray) -> np.ndarray:
-    """1 - b P⁻¹ bᵀ, symmetric, between ``LEAST`` and one."""
+    """1 - b P⁻¹ bᵀ, symmetric, between ``LEAST_CHANGE`` and one."""
     w, V = np.linalg.eigh((R + R.T) / 2)
-    return (V * np.clip(w, LEAST, 1.0)) @ V.T
+    return (V * np.clip(w, LEAST_CHANGE, 1.0)) @ V.T
 
 
 def fastener_scores(

@@ -20,7 +20,7 @@ import numpy as np
 from .discrepancy import learned
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, over_scales
 from .likelihood import Poles, Responses
-from .map_fit import beside, unknowns
+from .map_fit import prior_residuals, unknowns
 from .reduced_model import Reduced, evaluate
 from .scan import baseline
 
@@ -67,7 +67,7 @@ def held_out_evidence(
     asked = [e for e in hypothesis.effects if e not in null.effects]
     held = None
     if unseen.any():
-        data = null.data.over(about or null.model)
+        data = null.data.rebased(about or null.model)
         assert isinstance(data, (Responses, Poles))
         both = data.using(data.use | unseen)
         held = _news(problem, null, both) - _news(problem, hypothesis, both)
@@ -91,7 +91,7 @@ def _news(problem: UpdatingProblem, hypothesis: HypothesisFit, both: Responses |
     """
     data = hypothesis.data
     assert isinstance(data, (Responses, Poles))
-    both = both.over(hypothesis.model)
+    both = both.rebased(hypothesis.model)
     return _evidence(problem, hypothesis, both) - _evidence(problem, hypothesis, data)
 
 
@@ -102,7 +102,7 @@ def _evidence(
     fit = hypothesis.fit
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     r, J = data.scaled(state, True)
-    r0, J0 = beside(fit.effects, problem.mass_measurement, fit.x, state)
+    r0, J0 = prior_residuals(fit.effects, problem.mass_measurement, fit.x, state)
     if isinstance(data, Poles):
         return over_scales(data, state, r0, J0)
     if data.error is not None:

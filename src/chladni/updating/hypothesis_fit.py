@@ -7,12 +7,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from ..effects.effect import Effect
-from ..effects.effect_context import Setup, Surroundings
+from ..effects.effect_context import EffectContext, Setup
 from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned
 from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
-from .map_fit import Fit, MassMeasurement, beside, constants, fit
+from .map_fit import Fit, MassMeasurement, constants, fit, prior_residuals
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import ReducedProblem
 
@@ -23,7 +23,7 @@ NEARLY = 6.0  # in -2 ln evidence: what explains poles so much worse still has a
 
 
 @dataclass(frozen=True, eq=False)
-class Valley:
+class LocalOptimum:
     """Another likely place of an effect's parameters (n_p,), with their standard deviations."""
 
     neg2_log_evidence: float
@@ -35,20 +35,20 @@ class Valley:
 class HypothesisFit:
     """One hypothesis after its fit: the effect, the fit and the model used for it.
 
-    ``beside`` are effects found earlier; the hypothesis is all of them together.
-    ``valleys`` are other values of the effect, from another pairing of the same poles.
+    ``found_before`` are effects found earlier; the hypothesis is all of them together.
+    ``optima`` are other values of the effect, from another pairing of the same poles.
     """
 
     effect: Effect
     fit: Fit
     model: Reduced
-    beside: tuple[Effect, ...] = ()
-    valleys: tuple[Valley, ...] = ()
+    found_before: tuple[Effect, ...] = ()
+    optima: tuple[LocalOptimum, ...] = ()
 
     @property
     def effects(self) -> tuple[Effect, ...]:
         """All effects of the hypothesis."""
-        return (self.effect, *self.beside)
+        return (self.effect, *self.found_before)
 
     @property
     def name(self) -> str:
@@ -72,18 +72,18 @@ class HypothesisFit:
         return tuple(c for each in every for c in each) if all(every) else ()
 
     @property
-    def nearly(self) -> tuple[Valley, ...]:
+    def nearly(self) -> tuple[LocalOptimum, ...]:
         """Other valleys that are nearly as probable."""
         most = self.neg2_log_evidence + NEARLY
-        return tuple(v for v in self.valleys if v.neg2_log_evidence < most)
+        return tuple(v for v in self.optima if v.neg2_log_evidence < most)
 
     def among(self, other: "HypothesisFit") -> "HypothesisFit":
         """Keep the values of another fit of the same effect to the same poles as a valley."""
         if not isinstance(self.data, Poles) or other.effect.text != self.effect.text:
             return self
         own = other.fit.of(other.effect), other.fit.sd(other.effect)
-        valley = Valley(other.neg2_log_evidence, *own)
-        return replace(self, valleys=(*self.valleys, valley, *other.valleys))
+        optimum = LocalOptimum(other.neg2_log_evidence, *own)
+        return replace(self, optima=(*self.optima, optimum, *other.optima))
 
     @property
     def data(self) -> Data:
@@ -102,7 +102,7 @@ class UpdatingProblem:
 
     Attributes
     ----------
-    base : ordinary parameters and nuisances, free in every fit
+    base : calibration parameters and nuisances, free in every fit
     nuisance : the nuisances alone
     damping, coupling : of the identified modes, if responses are compared
     found : effects found earlier and now in the base, each with its parameters
@@ -120,11 +120,11 @@ class UpdatingProblem:
     found: tuple[tuple[Effect, np.ndarray], ...] = ()
 
     @property
-    def where(self) -> Surroundings:
+    def where(self) -> EffectContext:
         """The structure and its test, as effects see them."""
         reduced = self.reduced
         shapes = reduced.shapes
-        return Surroundings(
+        return EffectContext(
             reduced.groups, reduced.grids, reduced.candidates, self.setup,
             reduced.frequency[: shapes.shape[1]], shapes,
         )  # fmt: skip
@@ -157,7 +157,7 @@ class UpdatingProblem:
             model = problem.reduced.model_for(effect, x)
             problem = replace(
                 problem, reduced=replace(problem.reduced, model=model),
-                data=problem.data.over(model), base=(*problem.without(effect), effect),
+                data=problem.data.rebased(model), base=(*problem.without(effect), effect),
                 found=(*problem.found, (effect, x)),
             )  # fmt: skip
         return problem
@@ -177,7 +177,7 @@ class UpdatingProblem:
     ) -> HypothesisFit:
         """Fit one effect together with the base, from these starts."""
         model = self.reduced.model_for(effect, start)
-        data = self.data.over(model)
+        data = self.data.rebased(model)
         kept = self.without(effect)
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
         x0 = np.concatenate([base[inside.astype(bool)], start])
@@ -240,7 +240,7 @@ def _fit_responses(
     assert data.error is not None
     for _ in range(ROUNDS):
         found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
-        r0, J0 = beside(effects, mass_measurement, found.x, found.state)
+        r0, J0 = prior_residuals(effects, mass_measurement, found.x, found.state)
         likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
         change = abs(np.log(likely.delta / data.error.delta))
         data = replace(data, error=data.error.with_delta(likely.delta))
@@ -288,7 +288,9 @@ def _settled(
     for _ in range(4):
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
         now = fit(model, effects, replace(data, scale=scale), mass_measurement, x)
-        S = over_scales(data, now.state, *beside(effects, mass_measurement, now.x, now.state))
+        S = over_scales(
+            data, now.state, *prior_residuals(effects, mass_measurement, now.x, now.state)
+        )
         S += constants(effects)
         now = replace(now, neg2_log_evidence=S)
         if best is not None and now.neg2_log_evidence > best.neg2_log_evidence - 0.05:

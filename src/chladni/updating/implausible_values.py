@@ -7,17 +7,17 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..effects.effect import Effect
-from ..effects.user_parameters import Freed
 from ..effects.model_families import FAR, JOINTS, ModelFamily
+from ..effects.user_parameters import UserParameter
 from .map_fit import Fit
 
 
-def leaning(fit: Fit) -> list[str]:
+def implausible_values(fit: Fit) -> list[str]:
     """Sentences, one for every calibrated number on a bound or far from the deck's value."""
     return [
         said
         for effect in fit.effects
-        if effect.kind == "ordinary" and (said := _said(effect, fit.of(effect)))
+        if effect.kind == "calibration" and (said := _said(effect, fit.of(effect)))
     ]
 
 
@@ -29,7 +29,7 @@ def in_doubt(plain: Fit, null: Fit) -> tuple[str, ...]:
     although each alone is plausible.  For example, the frequencies of a strip determine only one
     combination of E, rho and t.
     """
-    own = leaning(plain) or _far_together(plain)
+    own = implausible_values(plain) or _far_together(plain)
     far = list(dict.fromkeys((*own, *strained(null))))
     if not far:
         return ()
@@ -66,7 +66,7 @@ def _far_together(fit: Fit) -> list[str]:
     With z = (x - μ)/σ, |z|² is χ² where the deck is right.  Its degrees of freedom are the number
     of directions that the data determine: the prior's trace less that of the covariance of z.
     """
-    own = [e for e in fit.effects if e.kind == "ordinary" and e.parameters]
+    own = [e for e in fit.effects if e.kind == "calibration" and e.parameters]
     if not own:
         return []
     z = np.concatenate([(fit.of(e) - _each(e, "mean")) / _each(e, "sd") for e in own])
@@ -87,7 +87,7 @@ def _each(effect: Effect, name: str) -> np.ndarray:
 
 
 def _said(effect: Effect, x: np.ndarray) -> str:
-    if isinstance(effect, Freed) and effect.on_bound(x):
+    if isinstance(effect, UserParameter) and effect.on_bound(x):
         return f"{effect.text} ended on a bound, so it may stand for something else"
     if is_strained(effect, x):
         return _more(effect, x)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from .hypothesis_fit import HypothesisFit
-from .map_fit import MassMeasurement, beside, descend
+from .map_fit import MassMeasurement, descend, prior_residuals
 from .reduced_model import State, evaluate
 
 SharedKey = tuple[str, str, int]  # an effect's name, where it acts, number of the parameter
@@ -87,7 +87,7 @@ def _weighed(
     one: HypothesisFit, mass: MassMeasurement | None, x: np.ndarray, state: State
 ) -> tuple[np.ndarray, np.ndarray]:
     """The residual and slope of the weighing alone."""
-    r, J = beside(one.fit.effects, mass, x, state)
+    r, J = prior_residuals(one.fit.effects, mass, x, state)
     return r[len(x) :], J[len(x) :]
 
 
@@ -124,7 +124,7 @@ def _positions(
 def of_the_object(effect: Effect) -> bool:
     """True where an effect belongs to the object in all its states, not to one test of it."""
     idle = effect.outputs(np.zeros(len(effect.parameters)))
-    return effect.kind in ("ordinary", "nuisance") and idle is None
+    return effect.kind in ("calibration", "nuisance") and idle is None
 
 
 def _of_state(
@@ -158,10 +158,10 @@ def _informed(effect: Effect, posterior: Posterior) -> Effect:
 
 def with_priors(effects: Sequence[Effect], known: Sequence[Effect]) -> list[Effect]:
     """The effects with the priors of the calibration parameters of the same name in ``known``."""
-    priors = {(e.name, e.text): e.parameters for e in known if e.kind == "ordinary"}
+    priors = {(e.name, e.text): e.parameters for e in known if e.kind == "calibration"}
     return [
         replace(e, parameters=priors.get((e.name, e.text), e.parameters))
-        if e.kind == "ordinary"
+        if e.kind == "calibration"
         else e
         for e in effects
     ]

@@ -23,5 +23,5 @@ def too_little(modes: int, channels: int) -> str:
     due = max(MODES, int(np.ceil(NUMBERS / (1 + channels))))
     return (
         f"{modes} mode{'s' * (modes != 1)}{seen} cannot bear a name: {due} modes are the least, "
-        "for three ordinary numbers, an effect of three and two that can contradict it"
+        "for three calibration parameters, an effect of three and two that can contradict it"
     )

@@ -16,7 +16,7 @@ CLAIM = {
     "joint-friction": "a joint slips as it moves: less stiffness and more damping at higher levels",
     "rattle": "two parts meet once they move far enough: a clearance that closes",
 }
-NEAR = 0.2  # of ln f: a mode of the deck farther away is not the one that was measured
+NEAR_LN_F = 0.2  # of ln f: a mode of the deck farther away is not the one that was measured
 HOLDS = 0.05  # of the strain energy: parts with less are not named
 JOINTS = "springs and bushes"
 NOWHERE = "levels alone do not say where"
@@ -134,7 +134,7 @@ def energy_shares(model: Modelled, frequency: Sequence[float]) -> list[dict[str,
     if not len(frequency):
         return []
     away = np.abs(np.log(np.maximum(model.modes.frequency, 1e-9)[:, None] / frequency))
-    nearest, near = away.argmin(axis=0), away.min(axis=0) <= NEAR
+    nearest, near = away.argmin(axis=0), away.min(axis=0) <= NEAR_LN_F
     share = part_energies(model.structure, model.modes.shapes[:, nearest]).T
     told = near & np.isfinite(share).all(axis=1)
     return [_named(model, one) if t else {} for one, t in zip(share, told, strict=True)]

@@ -37,7 +37,7 @@ class Data(Protocol):
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """Residuals divided by the spread of each sample, with their dependence still present."""
 
-    def over(self, model: Reduced) -> Self:
+    def rebased(self, model: Reduced) -> Self:
         """Return the data with rows in another basis."""
 
 
@@ -84,10 +84,10 @@ class Responses:
         """Power of s by which the receptance is multiplied."""
         return DERIVATIVES[self.quantity]
 
-    def over(self, model: Reduced) -> Self:
+    def rebased(self, model: Reduced) -> Self:
         """Rows of sensors and shakers in the basis of this model."""
-        sensors = None if self.sensors is None else self.sensors.over(model)
-        wide = None if self.wide is None else self.wide.over(model)
+        sensors = None if self.sensors is None else self.sensors.rebased(model)
+        wide = None if self.wide is None else self.wide.rebased(model)
         a, b = model.rows(self.outputs), model.rows(self.inputs)  # type: ignore[arg-type]
         return replace(self, a=a, b=b, sensors=sensors, wide=wide)
 
@@ -306,7 +306,7 @@ class Poles:
     a: np.ndarray | None = None
     b: np.ndarray | None = None
 
-    def over(self, model: Reduced) -> Self:
+    def rebased(self, model: Reduced) -> Self:
         """Rows for the visibility of modes in the basis of this model."""
         if self.outputs is None or self.inputs is None:
             return self

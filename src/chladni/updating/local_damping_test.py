@@ -12,12 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from .adequacy import LEAST, FitTest
+from .adequacy import LEAST_P, FitTest
 from .damping_scatter import FEWEST, ModalDamping
 from .hypothesis_fit import HypothesisFit
 from .reduced_model import evaluate
 
-NEAR = 0.05  # largest relative distance of natural frequencies between a pole and its model mode
+NEAR_MODE = (
+    0.05  # largest relative distance of natural frequencies between a pole and its model mode
+)
 
 
 def heard_of_damping(
@@ -28,16 +30,16 @@ def heard_of_damping(
     if damping is None or not elastic:
         return test
     lowest = float(damping.frequency.min(initial=np.inf))
-    frequency, shift = shifted(hypothesis, (1 - NEAR) * lowest)
+    frequency, shift = shifted(hypothesis, (1 - NEAR_MODE) * lowest)
     off = np.abs(frequency / damping.frequency[:, None] - 1)
-    own = off.min(axis=1, initial=np.inf) < NEAR
+    own = off.min(axis=1, initial=np.inf) < NEAR_MODE
     if own.sum() < FEWEST:
         return test
     kept = damping.of(own)
     near = shift[off[own].argmin(axis=1)]
     p, row = kept.following(np.abs(near))
     test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.p, LEAST):
+    if p >= min(test.p, LEAST_P):
         return test
     gives = "gives and dissipates, as a joint that slips or a viscous layer does"
     holds = "holds and dissipates, as foam or rubber does"

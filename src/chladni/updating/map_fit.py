@@ -85,7 +85,7 @@ def unknowns(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
     return tuple(p for effect in effects for p in effect.parameters)
 
 
-def beside(
+def prior_residuals(
     effects: Sequence[Effect], mass_measurement: MassMeasurement | None, x: np.ndarray, state: State
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whitened residuals and slopes of information besides the data: priors and the weighing."""
@@ -109,7 +109,7 @@ def _by_effects(
     if lost is None:
         return
     for effect, at in slices(effects):
-        known = effect.beside(x[at], state.lam, lost.ratio)
+        known = effect.auxiliary_residual(x[at], state.lam, lost.ratio)
         if known is None:
             continue
         slope = np.zeros((len(known.r), len(x)))
@@ -152,14 +152,14 @@ def fit(
     def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, State]:
         state = evaluate(model, effects, x, gradient)
         r, J = data.residual(state, gradient)
-        r0, J0 = beside(effects, mass_measurement, x, state)
+        r0, J0 = prior_residuals(effects, mass_measurement, x, state)
         return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
 
     x, r, J, state, status = descend(objective, start, limit, max_steps, tol)
     cost = float(r @ r)
     A = J.T @ J
     S = cost + np.linalg.slogdet(A)[1] + constants(effects)
-    own = r[: len(r) - len(beside(effects, mass_measurement, x, state)[0])]
+    own = r[: len(r) - len(prior_residuals(effects, mass_measurement, x, state)[0])]
     return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
 
 

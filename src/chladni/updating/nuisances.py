@@ -2,11 +2,11 @@
 
 import scipy.sparse as sp
 
+from ..effects.calibration_parameters import random_field
 from ..effects.discretisation import MeshError, Places, mesh_errors, modal_discrepancy
 from ..effects.effect import Effect
 from ..effects.fold_bending import fold_bending
 from ..effects.model_families import model_families
-from ..effects.calibration_parameters import random_field
 from ..fem.assemble import Structure
 from ..fem.modelled import Modelled
 from ..sparse.freed_memory import give_back_freed_memory

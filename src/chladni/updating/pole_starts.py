@@ -44,7 +44,7 @@ def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> li
     sd = np.array([p.sd for p in effect.parameters])
     mean = np.array([p.mean for p in effect.parameters])
     model = problem.reduced.model.split_for(effect, mean)
-    seen = data.over(model)
+    seen = data.rebased(model)
 
     def cost(x: np.ndarray, scales: np.ndarray) -> float:
         try:

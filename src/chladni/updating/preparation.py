@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.effect import Effect
-from ..effects.user_parameters import UNITS, defaults_of_solids, freed, freed_effect
-from ..effects.model_families import joint_nuisances
 from ..effects.calibration_parameters import channel_gain, defaults
+from ..effects.effect import Effect
+from ..effects.effect_context import EffectContext, Setup
+from ..effects.model_families import joint_nuisances
 from ..effects.registry import family
-from ..effects.effect_context import Setup, Surroundings
+from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
@@ -113,7 +113,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
             identified=error,
             direct=question.outputs.carried_by(question.inputs), sensors=wrong,
         )  # fmt: skip
-        data.append(read.over(reduced.model))
+        data.append(read.rebased(reduced.model))
     nuisance = nuisances(reduced, nominal, mesh)
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
@@ -169,13 +169,13 @@ def _modes_seen(found: Identified, low: float, high: float) -> int:
     return int((inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2)).sum())
 
 
-NEAR = 1.3  # factor on the band within which a mode of the deck may be a measured one
+NEAR_BAND = 1.3  # factor on the band within which a mode of the deck may be a measured one
 
 
 def _own_modes(nominal: Modelled, low: float, high: float) -> int:
     """Number of flexible modes of the deck that may have been measured between two frequencies."""
     f = nominal.modes.frequency
-    return int(((f > max(low / NEAR, 1e-3 * high)) & (f < NEAR * high)).sum())
+    return int(((f > max(low / NEAR_BAND, 1e-3 * high)) & (f < NEAR_BAND * high)).sum())
 
 
 def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
@@ -272,7 +272,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepar
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
         spurious=SPURIOUS_LISTED if question.frf is None else share_spurious(strength),
-    ).over(reduced.model)  # fmt: skip
+    ).rebased(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, mesh, f_max)
     problem = updating_problem(question, reduced, data, nuisance, f_max)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
@@ -324,7 +324,7 @@ def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[
         return [_freed(question, reduced, f_max, p) for p in question.parameters]
     if len(reduced.groups):
         return list(defaults(reduced.groups))
-    return [freed(reduced.groups, p) for p in defaults_of_solids(question.assembly)]
+    return [user_parameter(reduced.groups, p) for p in defaults_of_solids(question.assembly)]
 
 
 def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreeParameter) -> Effect:
@@ -336,11 +336,11 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
         If deck and test do not determine the place of the effect.
     """
     if p.field in UNITS:
-        return freed(reduced.groups, p)
+        return user_parameter(reduced.groups, p)
     placed = family(p.field).placed
     assert placed is not None
     setup = setup_of(question, f_max)
-    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
     names = {question.assembly.parts[k].name for k in p.positions}
     found = [e for e in placed(where) if not names or set(e.parts) <= names]
     if not found:

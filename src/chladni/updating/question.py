@@ -15,7 +15,7 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
-from ..model.point_masses import with_masses
+from ..model.point_masses import with_mass_pairs
 from .hypothesis_fit import UpdatingProblem
 from .likelihood import Poles, Responses
 from .map_fit import MassMeasurement
@@ -62,7 +62,7 @@ class Question:
     held_band: tuple[float, float] | None = None
     gain_known: bool = True
     parameters: tuple[FreeParameter, ...] = ()  # freed by the user; none: a default set
-    carried: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
+    sensor_masses: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
     others: tuple[OtherRecording, ...] = ()
     level: float | None = None  # of the recording that is fitted [N], [m/s²]
     control: Control = "force"  # quantity that was kept at the level
@@ -71,10 +71,7 @@ class Question:
 
     def tested(self, assembly: Assembly) -> Assembly:
         """The article with the sensors of known mass on it, as it was measured."""
-        if not self.carried:
-            return assembly
-        grids, m = zip(*self.carried, strict=True)
-        return with_masses(assembly, grids, np.array(m))
+        return with_mass_pairs(assembly, self.sensor_masses)
 
     def searched(self, assembly: Assembly) -> Assembly:
         """The tested article with springs in its rigid ties, stiff enough to act as rigid."""
@@ -94,7 +91,7 @@ class Question:
         """The weighed mass of the article plus the sensors' masses, as the model has them."""
         if self.mass_measurement is None:
             return None
-        mass = self.mass_measurement.mass + sum(m for _, m in self.carried)
+        mass = self.mass_measurement.mass + sum(m for _, m in self.sensor_masses)
         return replace(self.mass_measurement, mass=mass)
 
 

@@ -25,9 +25,9 @@ from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import own_part, own_positions, row, with_own
 from .field_factors import mass_log, stiffness_log
+from .frequency_dependent_stiffness import Dissipated, Rising
 from .matrix_stack import MatrixStack, Whole, add_slopes, bordered
 from .real_modes import real_modes
-from .frequency_dependent_stiffness import Dissipated, Rising
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,8 @@ class Reduced:
         return replace(
             self, groups=replace(self.groups, structure=built), following=following,
             vectors=self.vectors.padded(more),
-            base=None if self.base is None else self.base.over(built), _seen={}, _within=self,
+            base=None if self.base is None else self.base.extended_to(built),
+            _seen={}, _within=self,
         )  # fmt: skip
 
     def extended(self, vectors: np.ndarray) -> Self:

@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.effect import Effect
-from ..effects.element_groups import ElementGroups, element_groups
 from ..effects.effect_context import ElementGrids, element_grids
+from ..effects.element_groups import ElementGroups, element_groups
 from ..fem.assemble import Structure
 from ..fem.base_motion import base_motion
 from ..fem.modelled import Modelled, modelled

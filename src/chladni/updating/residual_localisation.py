@@ -19,11 +19,11 @@ from .scan import baseline, direction_scores, field_slopes
 
 RADIUS = 0.1  # of a sheet's size, the square root of its area
 BLIND = 0.5  # relative change of stiffness and of mass that the data would not detect
-NEAR = 0.5  # of the best gain: parts that reach it are named too
+NEAR_BEST = 0.5  # of the best gain: parts that reach it are named too
 
 
 @dataclass(frozen=True, eq=False)
-class LeftWhere:
+class ResidualLocalisation:
     """Gain of a small local change of stiffness or mass, by place.
 
     Attributes
@@ -48,9 +48,9 @@ class LeftWhere:
         return float(np.isnan(np.concatenate([self.gain, self.on_beams])).mean())
 
 
-def left_where(
+def residual_localisation(
     hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
-) -> LeftWhere | None:
+) -> ResidualLocalisation | None:
     """The map of one hypothesis; None where frequencies were compared or all places are blind."""
     data, fit, groups = hypothesis.data, hypothesis.fit, hypothesis.model.groups
     if not isinstance(data, Responses) or data.error is None or not len(groups):
@@ -78,17 +78,17 @@ def bumps(groups: ElementGroups) -> np.ndarray:
     return np.where(sheet[:, None] == sheet[None], near, 0.0)
 
 
-def _told(groups: ElementGroups, gain: np.ndarray) -> LeftWhere:
+def _told(groups: ElementGroups, gain: np.ndarray) -> ResidualLocalisation:
     assembly = groups.structure.assembly
     best = int(np.nanargmax(gain))
     known = np.where(np.isnan(gain), -np.inf, gain)
-    order = [k for k in np.argsort(-known) if known[k] >= NEAR * known[best]]
+    order = [k for k in np.argsort(-known) if known[k] >= NEAR_BEST * known[best]]
     parts = tuple(dict.fromkeys(assembly.parts[int(groups.part[k])].name for k in order))
     rows = np.unique(groups.nodes[groups.group == best])
     d = np.linalg.norm(assembly.points[rows] - groups.centre[best], axis=1)
     row = int(rows[np.argmin(d)])
     x, y, z = (float(v) for v in assembly.points[row])
     of_shells, of_beams = np.split(gain[groups.group], [len(assembly.shells)])
-    return LeftWhere(
+    return ResidualLocalisation(
         of_shells, of_beams, parts, int(assembly.ids[row]), (x, y, z), float(gain[best])
     )

@@ -40,7 +40,7 @@ class Scores:
     Attributes
     ----------
     nominal : the deck as it was given
-    calibrated : the deck with ordinary parameters fitted, no effect in it
+    calibrated : the deck with calibration parameters fitted, no effect in it
     with_effect : the updated deck
     floor : what the noise of the recording alone leaves
     calibrated_with_mesh_error, with_mesh_error : the same two decks with the mesh error (and the
@@ -104,7 +104,7 @@ class Agreement:
 
 @dataclass(frozen=True)
 class CalibratedParameter:
-    """An ordinary parameter that was fitted, beside the values of the decks.
+    """A calibration parameter that was fitted, beside the values of the decks.
 
     Attributes
     ----------

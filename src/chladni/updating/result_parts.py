@@ -14,7 +14,6 @@ from .diagnosis import Diagnosis
 from .hypothesis_fit import HypothesisFit
 from .joint_fit import JointFit
 from .likelihood import LN10, Poles
-from .verdict_models import real_poles
 from .question import Prepared
 from .result import (
     Agreement,
@@ -25,6 +24,7 @@ from .result import (
     Scores,
 )
 from .rows_of_fits import row_of
+from .verdict_models import real_poles
 
 STRUCTURED = 5.0  # times the standard deviation of the recording: more than that is not noise
 HEAVIER = 0.02  # of the deck's mass: paint and sealant, which no deck of sheets contains
@@ -79,8 +79,8 @@ def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
         return ()
     effect, said = found.effect, []
     own = effect.reported(found.fit.of(effect), found.fit.sd(effect))
-    for valley in found.nearly:
-        rows = effect.reported(valley.x, valley.sd)
+    for optimum in found.nearly:
+        rows = effect.reported(optimum.x, optimum.sd)
         apart = [
             f"{new.name} {new.value:.3g} {new.unit}".strip()
             for new, row in zip(rows, own, strict=True)
@@ -206,7 +206,7 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
     whole = (diagnosis.found or diagnosis.null).fit
     changed = diagnosis.verdict != "nothing missing"
     out = []
-    for effect in (e for e in deck.effects if e.kind == "ordinary"):
+    for effect in (e for e in deck.effects if e.kind == "calibration"):
         fit = whole if effect in whole.effects else deck
         found = deck if diagnosis.shared else fit
         rows = effect.reported(found.of(effect), fit.sd(effect))
@@ -223,7 +223,7 @@ def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
     """Calibrated parameters that several states share, fitted to all of them at once."""
     seen: dict[tuple[str, str], CalibratedParameter] = {}
     for one in joint.fits:
-        for effect in (e for e in one.fit.effects if e.kind == "ordinary"):
+        for effect in (e for e in one.fit.effects if e.kind == "calibration"):
             rows = effect.reported(one.fit.of(effect), one.fit.sd(effect))
             for parameter, row in zip(effect.parameters, rows, strict=True):
                 given = parameter.value(parameter.nominal)
@@ -245,14 +245,14 @@ def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:
         known = 100 * float(np.median(prepared.score.sd[real]))
         text = f"{left:.2g} % rms of the frequencies, which are known to {known:.1g} %"
     else:
-        data = prepared.score.over(plain.model)
+        data = prepared.score.rebased(plain.model)
         left = float(np.sqrt(data.Q(plain.fit.state, prepared.score.use)))
         chi = 1.0 if prepared.identified is None else prepared.identified.chi
         known = 0.01 * chi / LN10
         text = f"{left:.2g} decades rms, the recording is known to about {known:.1g}"
     far = left > STRUCTURED * known
     structured = bool(far and diagnosis.found is not None)
-    sentence = f"ordinary parameters alone leave {text}: {_meaning(diagnosis, far, structured)}"
+    sentence = f"calibration parameters alone leave {text}: {_meaning(diagnosis, far, structured)}"
     return Remainder(structured, left, known, sentence)
 
 

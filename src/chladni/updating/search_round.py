@@ -15,7 +15,7 @@ from ..effects.effect import Effect
 from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..errors import ModelError
-from ..parallel import side_by_side
+from ..parallel import in_parallel
 from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
@@ -47,7 +47,7 @@ def search_round(
     later = least is not None  # the bases of the first round are still there
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
     progress(f"trying {len(tried)} candidates", 0.0)
-    every = side_by_side(lambda c: _tried(problem, null, c.effect, c.start, c.base), tried)
+    every = in_parallel(lambda c: _tried(problem, null, c.effect, c.start, c.base), tried)
     for k, (c, fits) in enumerate(zip(tried, every, strict=True)):
         progress(f"tried {c.effect.name} {c.effect.text}", 0.8 * (k + 1) / len(tried))
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
@@ -57,11 +57,11 @@ def search_round(
     progress("closing in on the place", 0.8)
     running = running if later else max(running, _in_the_running(hypotheses[:whole]))
     ahead, rest = hypotheses[:running], hypotheses[running:]
-    finished = list(side_by_side(lambda t: _settled(problem, _finished(problem, t, True)), ahead))
+    finished = list(in_parallel(lambda t: _settled(problem, _finished(problem, t, True)), ahead))
     rest = rest if later else [_finished(problem, t, False) for t in rest]
     hypotheses = by_family([*finished, *rest])
     give_back_freed_memory()
-    closer = side_by_side(lambda t: _closer(problem, null, t), hypotheses[:running])
+    closer = in_parallel(lambda t: _closer(problem, null, t), hypotheses[:running])
     best = by_family([*hypotheses, *(t for fits in closer for t in fits)])
     best = by_family([*best, *_of_the_same_lump(problem, best)])
     return simplest_first(best, null.neg2_log_evidence)
@@ -130,7 +130,7 @@ def _lighter(
 def on_common_basis(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisFit:
     """A hypothesis that keeps its fit, not the vectors that were added to the basis for it."""
     model = problem.reduced.model
-    fit = replace(hypothesis.fit, data=hypothesis.data.over(model))
+    fit = replace(hypothesis.fit, data=hypothesis.data.rebased(model))
     return replace(hypothesis, fit=fit, model=model)
 
 
@@ -191,7 +191,7 @@ def _of_the_same_lump(
     lump = None if lead is None else lead.effect.lump(lead.fit.of(lead.effect))
     if lead is None or lump is None or not isinstance(problem.data, Responses):
         return []
-    base, out = taken(problem, lead, ("ordinary", "nuisance")), list[HypothesisFit]()
+    base, out = taken(problem, lead, ("calibration", "nuisance")), list[HypothesisFit]()
     for family in families():
         begun = family.effect.of_lump(problem.where, *lump)
         if begun is not None and not already_there(problem, *begun):
@@ -202,7 +202,7 @@ def _of_the_same_lump(
 
 def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -> Candidate | None:
     """The leader about the place it moved to, or at a better one next to its own; None: at rest."""
-    x, base = lead.fit.of(lead.effect), taken(problem, lead, ("ordinary",))
+    x, base = lead.fit.of(lead.effect), taken(problem, lead, ("calibration",))
     again = lead.effect.recentred(x, problem.where)
     if again is not None:
         return Candidate(*again, base)

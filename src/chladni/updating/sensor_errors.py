@@ -46,7 +46,7 @@ class Side:
     carried: np.ndarray
     modal: np.ndarray
 
-    def over(self, model: Reduced) -> Self:
+    def rebased(self, model: Reduced) -> Self:
         """The rows in the basis of this model."""
         return replace(self, modal=np.stack([model.rows(rows) for rows in self.rows]))
 
@@ -71,9 +71,9 @@ class SensorErrors:
     outputs: Side
     inputs: Side
 
-    def over(self, model: Reduced) -> Self:
+    def rebased(self, model: Reduced) -> Self:
         """The errors with their rows in the basis of this model."""
-        return replace(self, outputs=self.outputs.over(model), inputs=self.inputs.over(model))
+        return replace(self, outputs=self.outputs.rebased(model), inputs=self.inputs.rebased(model))
 
 
 def sensor_errors(

@@ -20,7 +20,7 @@ from itertools import combinations
 import numpy as np
 
 from ..decision.decision_rules import GOOD_PART, TIED
-from ..decision.hypothesis_table import Rival
+from ..decision.hypothesis_table import AlternativeRow
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
 from ..errors import ModelError
@@ -32,7 +32,7 @@ from .map_fit import unknowns
 from .reduced_model import Reduced, evaluate
 from .search_round import search_round, taken
 
-MOST = 3  # effects in one answer
+MOST_EFFECTS = 3  # effects in one answer
 FITTED = 6  # candidates of a later round that are fitted
 WORTH = 0.25  # of the gain due, by rough fits: a round whose best is below it is dropped
 PAIRED = 4  # leading families that are tried in pairs
@@ -62,7 +62,7 @@ class Several:
     own: HypothesisFit
     gains: tuple[float, ...]
     without: tuple[HypothesisFit, ...]
-    rivals: tuple[tuple[Rival, ...], ...]
+    alternatives: tuple[tuple[AlternativeRow, ...], ...]
     due: float
     about: Reduced
     ahead: float = np.inf
@@ -144,7 +144,7 @@ def _begun_with(
     for k in range(ATTEMPTS):
         progress(f"what {current.name} leaves", k / ATTEMPTS)
         size = len(current.effects) + 1
-        if size > MOST:
+        if size > MOST_EFFECTS:
             break
         try:
             more, note = _grown(problem, current, price(due, size))
@@ -197,20 +197,20 @@ def _holding(
     """The problem with some effects of a hypothesis in its base, and the hypothesis's data."""
     held = problem.holding([(e, lead.fit.of(e)) for e in effects])
     assert isinstance(lead.data, Responses)
-    return replace(held, data=lead.data.over(held.reduced.model))
+    return replace(held, data=lead.data.rebased(held.reduced.model))
 
 
 @dataclass(frozen=True, eq=False)
 class _More:
     """A set with one further effect.
 
-    ``rivals`` are hypotheses that explain as much in the place of a member.  ``without`` are the
-    best fits without a member.  Both are keyed by the id of the member, as far as known. Errors of
-    form spread from a state of the model ``about``.
+    ``alternatives`` are hypotheses that explain as much in the place of a member.
+    ``without`` are the best fits without a member.  Both are keyed by the id of the member, as
+    far as known.  Errors of form spread from a state of the model ``about``.
     """
 
     hypothesis: HypothesisFit
-    rivals: dict[int, list[HypothesisFit]]
+    alternatives: dict[int, list[HypothesisFit]]
     without: dict[int, HypothesisFit]
     about: Reduced
 
@@ -271,17 +271,17 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
     rest = _without(problem, lead, member)
     held = _holding(problem, rest, rest.effects)
     null = _in_order(held, rest)
-    itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("ordinary", "nuisance")))
+    itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("calibration", "nuisance")))
     found = _round(held, null, [itself, *candidates(held.begun_wide(), null, FITTED)], 0.0)
     if not found:
         return more
     best = found[0]
     if not _preferred(best, lead, member):
         known, others = {**more.without, id(member): rest}, [t for t in found if _other(t, member)]
-        return replace(more, rivals={**more.rivals, id(member): others}, without=known)
+        return replace(more, alternatives={**more.alternatives, id(member): others}, without=known)
     new = id(best.effect)
-    rivals = {**more.rivals, new: [t for t in found[1:] if _other(t, best.effect)]}
-    return replace(more, hypothesis=best, rivals=rivals, without={new: rest})
+    alternatives = {**more.alternatives, new: [t for t in found[1:] if _other(t, best.effect)]}
+    return replace(more, hypothesis=best, alternatives=alternatives, without={new: rest})
 
 
 def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
@@ -310,7 +310,7 @@ def _without(problem: UpdatingProblem, lead: HypothesisFit, member: Effect) -> H
     first, *rest = (e for e in lead.effects if e is not member)
     held = _holding(problem, lead, rest)
     tries = []
-    for kinds in (("ordinary", "nuisance"), ("ordinary",)):
+    for kinds in (("calibration", "nuisance"), ("calibration",)):
         with suppress(ModelError):
             base = taken(held, lead, kinds)
             tries.append(held.fitted_with(first, lead.fit.of(first), base))
@@ -332,28 +332,30 @@ def _paying(problem: UpdatingProblem, more: _More, due: float, part: float) -> S
             break
         lead, known = without[weakest], {}
     order = sorted(lead.effects, key=lambda e: -gain[id(e)])
-    own = replace(lead, effect=order[0], beside=tuple(order[1:]))
+    own = replace(lead, effect=order[0], found_before=tuple(order[1:]))
     return Several(
         _as_alone(problem, own), own, tuple(gain[id(e)] for e in order),
         tuple(without[id(e)] for e in order),
-        tuple(_close(more.rivals.get(id(e), []), lead) for e in order), due, more.about,
+        tuple(_close(more.alternatives.get(id(e), []), lead) for e in order), due, more.about,
     )  # fmt: skip
 
 
 def _as_alone(problem: UpdatingProblem, own: HypothesisFit) -> HypothesisFit:
     """The set fitted with the errors of the model's form that single effects were compared with."""
-    data = problem.data.over(own.model)
+    data = problem.data.rebased(own.model)
     fit = fitted(own.model, own.fit.effects, data, problem.mass_measurement, own.fit.x)
     return replace(own, fit=fit)
 
 
-def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[Rival, ...]:
+def _close(
+    alternatives: Sequence[HypothesisFit], lead: HypothesisFit
+) -> tuple[AlternativeRow, ...]:
     """Other families that explain as much as a member in its place."""
     every = [
-        Rival(t.effect.name, _gain(t, lead), t.effect.implausible(t.fit.of(t.effect)))
-        for t in rivals
+        AlternativeRow(t.effect.name, _gain(t, lead), t.effect.implausible(t.fit.of(t.effect)))
+        for t in alternatives
     ]
-    return tuple(rival for rival in every if rival.behind < TIED)
+    return tuple(alternative for alternative in every if alternative.behind < TIED)
 
 
 def _in_pairs(
@@ -365,13 +367,13 @@ def _in_pairs(
     tries = []
     for one, other in combinations(singles, 2):
         held = problem.holding([(one.effect, one.fit.of(one.effect))])
-        held = replace(held, data=data.over(held.reduced.model))
+        held = replace(held, data=data.rebased(held.reduced.model))
         start = other.fit.of(other.effect)
         if repeats(held, other.effect, start):
             continue
         with suppress(ModelError):
             tries.append(
-                held.fitted_with(other.effect, start, taken(held, one, ("ordinary",)), ROUGH)
+                held.fitted_with(other.effect, start, taken(held, one, ("calibration",)), ROUGH)
             )
     best = min([alone, *tries], key=lambda t: t.neg2_log_evidence)
     if _gain(alone, best) < WORTH * due:

@@ -73,7 +73,7 @@ def scores_of(
     """Q of some states, one list for the fitted data and one for the held-out data."""
     real = real_poles(prepared, winner)
     return [
-        [prepared.score.over(fit.model).Q(state, use, real) for fit, state in stages]
+        [prepared.score.rebased(fit.model).Q(state, use, real) for fit, state in stages]
         for use in (prepared.score.use, held_out(prepared, winner))
     ]
 
@@ -101,7 +101,7 @@ def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
     """Poles of the test with a partner in the winning model (n,) bool; the rest are spurious."""
     if not isinstance(prepared.score, Poles):
         return None
-    data = prepared.score.over(winner.model)
+    data = prepared.score.rebased(winner.model)
     fitted = winner.fit.data
     wide = Poles(**{**vars(data), "scale": max(3 * getattr(fitted, "scale", 0.01), 0.02)})
     real = np.zeros(len(data.frequency), bool)
@@ -119,7 +119,7 @@ def given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
     x, at = problem.mean(), 0
     for e in problem.base:
         n = len(e.parameters)
-        if e.kind == "ordinary":
+        if e.kind == "calibration":
             x[at : at + n] = [p.nominal for p in e.parameters]
         elif e.writable:
             x[at : at + n] = null.fit.of(e)

@@ -20,7 +20,7 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import node_points, solved
 from ..geometry.facets import tangents, unit
 from ..model.assembly import Assembly
-from .loaded_model import LEAST
+from .loaded_model import LEAST_MODES
 
 ABOVE = 2.0  # modes reach so many times the highest line, residual vectors stand for the rest
 SAME_PLACE = 1e-3  # nearer than this the sensor at the driving point is meant [m]
@@ -114,7 +114,7 @@ def benched(
 def _modes(built: Structure, band: float) -> ModalModel:
     """Return modes up to a frequency [Hz], at least as many as include an elastic one."""
     found = solved(built, band).modes
-    least = min(LEAST, len(built.system.dofs))
+    least = min(LEAST_MODES, len(built.system.dofs))
     if len(found) >= least:
         return found
     return normal_modes(built.system, least, points=node_points(built))

@@ -1,9 +1,9 @@
-"""Fit the ordinary parameters of a deck alone."""
+"""Fit the calibration parameters of a deck alone."""
 
 from ..case import Case
 from ..progress import Progress, silent
 from .diagnosis_result import DiagnosisResult
-from .states import answered
+from .states import diagnose_states
 
 
 def calibrate(case: Case, progress: Progress = silent) -> DiagnosisResult:
@@ -14,4 +14,4 @@ def calibrate(case: Case, progress: Progress = silent) -> DiagnosisResult:
     FileError
         If the recordings hold nothing to compare, or the deck's unit system cannot be right.
     """
-    return answered(case, False, progress)
+    return diagnose_states(case, False, progress)

@@ -10,8 +10,8 @@ from ..errors import ChladniError, FileError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
-from ..progress import Progress, silent, within
 from ..parallel import one_blas_thread
+from ..progress import Progress, silent, within
 from .case_draft import said_of
 from .correlate import correlate
 from .loaded_model import as_model
@@ -136,7 +136,7 @@ def _dofs(case: Case, at: MeasuredDofs, role: str) -> list[CheckedDof]:
     off = np.zeros(len(at.labels))
     free = np.flatnonzero((at.grids <= 0) & ~at.base)
     if len(free) and len(case.assembly.shells):
-        off[free] = ShellSurface.whole(case.assembly).feet(at.points[free]).distance
+        off[free] = ShellSurface.whole(case.assembly).closest_points(at.points[free]).distance
     rows = zip(
         at.labels, at.grids.tolist(), at.points.tolist(), at.directions.tolist(), at.base.tolist(),
         off.tolist(), at.mass.tolist(), strict=True,

@@ -20,7 +20,7 @@ from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..units import Units
 from ..units import units as unit_system
-from .loaded_model import beside, load_deck
+from .loaded_model import load_deck, similar_names
 from .matched_dofs import MatchedDof, matched
 from .unit_guess import guessed_units
 
@@ -135,7 +135,7 @@ def _as_given(made: Assembly, name: str, system: Units) -> str:
 
 def _recordings(path: Path, quantity: str | None) -> tuple[Recording, ...]:
     if not path.is_file():
-        raise FileError(f"no file {path}{beside(path)}")
+        raise FileError(f"no file {path}{similar_names(path)}")
     try:
         return read_recordings(path, quantity)
     except FileError as error:

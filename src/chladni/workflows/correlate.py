@@ -17,8 +17,8 @@ from ..ema.screening_lines import screening_lines
 from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
 from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
-from ..progress import Progress, silent
 from ..parallel import one_blas_thread
+from ..progress import Progress, silent
 from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf

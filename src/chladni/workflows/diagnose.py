@@ -3,7 +3,7 @@
 from ..case import Case
 from ..progress import Progress, silent
 from .diagnosis_result import DiagnosisResult
-from .states import answered
+from .states import diagnose_states
 
 
 def diagnose(case: Case, progress: Progress = silent) -> DiagnosisResult:
@@ -14,4 +14,4 @@ def diagnose(case: Case, progress: Progress = silent) -> DiagnosisResult:
     FileError
         If the recordings hold nothing to compare, or the deck's unit system cannot be right.
     """
-    return answered(case, True, progress)
+    return diagnose_states(case, True, progress)

@@ -2,7 +2,7 @@
 
 1. The recording is read and the held-out data are chosen (``prepare``).
 2. Hypotheses are fitted and compared by evidence (``updating.diagnosis``).
-3. The reported fit is repeated if it left the reduced model's range of validity (``renewed``).
+3. The reported fit is repeated if it left the reduced model's range of validity (``refined``).
 4. The decision is made on rows of numbers, and requests the fits that it needs (``decided``).
 5. The result is written into the deck, and every number is taken from the decks as written.
 """
@@ -23,22 +23,21 @@ from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..sparse.freed_memory import give_back_freed_memory
+from ..updating.basis_refinement import Refinement, refined
 from ..updating.deciding import decided
 from ..updating.decision_in_words import concluded
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.hypothesis_fit import HypothesisFit
+from ..updating.implausible_values import implausible_values, in_doubt, strained
 from ..updating.joint_fit import Posterior, informed
-from ..updating.implausible_values import in_doubt, leaning, strained
-from ..updating.residual_localisation import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
 from ..updating.measured_modes import MeasuredModes, measured_modes
 from ..updating.other_recordings import scored_others
-from ..updating.verdict_models import fitted_scores, held_out, models, real_poles, with_deck
 from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
-from ..updating.basis_refinement import Renewal, renewed
+from ..updating.residual_localisation import ResidualLocalisation, residual_localisation
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..updating.result_parts import (
     agreement,
@@ -50,12 +49,13 @@ from ..updating.result_parts import (
     otherwise,
     remainder,
 )
+from ..updating.verdict_models import fitted_scores, held_out, models, real_poles, with_deck
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .over_levels import over_levels
-from .question_of_case import question
+from .question_of_case import question_of
 from .screening_of_case import (
     RecordingAtFault,
     instead_of_effects,
@@ -72,7 +72,7 @@ class Explained:
     """A case with its explanation, before anything is written."""
 
     case: Case
-    asked: Question
+    question: Question
     prepared: Prepared
     found: Diagnosis
     distrust: tuple[str, ...]
@@ -84,14 +84,14 @@ class Searched:
     """A case whose hypotheses are fitted, before any decision."""
 
     case: Case
-    asked: Question
+    question: Question
     prepared: Prepared
     found: Diagnosis
     screening: Screening | None
 
-    def renew(self, hypothesis: HypothesisFit) -> Renewal:
+    def refine(self, hypothesis: HypothesisFit) -> Refinement:
         """Fit a hypothesis again on a reduced model that can represent it."""
-        return renewed(self.asked, self.prepared, hypothesis)
+        return refined(self.question, self.prepared, hypothesis)
 
 
 def searched(
@@ -114,9 +114,9 @@ def searched(
             f"{case.path}: the deck has neither shells nor beams, and what diagnose looks for sits "
             "on these; calibrate and correlate take any deck"
         )
-    asked = question(case)
+    question = question_of(case)
     try:
-        prepared = prepare(asked, within(progress, 0.0, 0.1))
+        prepared = prepare(question, within(progress, 0.0, 0.1))
     except FileError:  # a recording at fault may hold nothing to fit, and says so itself
         alone = screened_unprepared(case)
         if alone is None or not alone.faults:
@@ -132,7 +132,7 @@ def searched(
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
     found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
-    return Searched(case, asked, prepared, found, screening)
+    return Searched(case, question, prepared, found, screening)
 
 
 def explained(
@@ -140,23 +140,23 @@ def explained(
 ) -> Explained:
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
     made = searched(case, diagnosing, progress, known)
-    asked, prepared, screening = made.asked, made.prepared, made.screening
+    question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _judged(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
-    return Explained(case, asked, prepared, found, distrust, screening)
+    return Explained(case, question, prepared, found, distrust, screening)
 
 
-def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
+def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
     """Write an explanation into decks and compute every number of the result from them."""
-    case, asked, prepared = known.case, known.asked, known.prepared
+    case, question, prepared = known.case, known.question, known.prepared
     found = with_deck(prepared, known.found)
     give_back_freed_memory()
     progress("the updated deck", 0.85)
-    stages, lost = _updated(case, asked, prepared, found)
+    stages, lost = _updated(case, question, prepared, found)
     progress("scores", 0.95)
-    result = _result(asked, prepared, found, stages)
-    result = over_levels(asked, prepared, stages, result, diagnosing)
+    result = _result(question, prepared, found, stages)
+    result = over_levels(question, prepared, stages, result, diagnosing)
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
         distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit))
@@ -177,13 +177,13 @@ def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...
     prepared = made.prepared
     if not diagnosing:  # nothing is to be named
         prepared = replace(prepared, too_little="")
-    decision, known = decided(prepared, made.found, made.renew)
+    decision, known = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, decision, known)
     if decision.named:  # it is compared with what calibrate answers
         alone = made.found.without_effects
-        calibration = concluded(prepared, alone, *decided(prepared, alone, made.renew))[0]
+        calibration = concluded(prepared, alone, *decided(prepared, alone, made.refine))[0]
         found = replace(found, plain=calibration.plain)
-    plain = renewed(made.asked, prepared, found.plain, held=found.as_the_null)
+    plain = refined(made.question, prepared, found.plain, held=found.as_the_null)
     found = replace(found, plain=plain.hypothesis)
     if found.found is not None:
         return found, distrust
@@ -191,33 +191,33 @@ def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...
 
 
 def _updated(
-    case: Case, asked: Question, prepared: Prepared, found: Diagnosis
+    case: Case, question: Question, prepared: Prepared, found: Diagnosis
 ) -> tuple[UpdatedModels, list[str]]:
     """Return the structures before and after, each solved once, as their decks describe them."""
-    stages, nominal = models(asked, found), as_it_is(asked, prepared.nominal)
-    calibrated, lost = _deck(case, asked, nominal, stages.calibrated)
+    stages, nominal = models(question, found), as_it_is(question, prepared.nominal)
+    calibrated, lost = _deck(case, question, nominal, stages.calibrated)
     final = calibrated
     if stages.final is not stages.calibrated:
-        final, lost = _deck(case, asked, nominal, stages.final)
+        final, lost = _deck(case, question, nominal, stages.final)
         final = _commented(final, found.as_deck)
     test = measured_modes(prepared)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared), test=test)
     return replace(made, curves=_curves(case, made, test)), lost
 
 
-def as_it_is(asked: Question, searched: Modelled) -> Modelled:
+def as_it_is(question: Question, searched: Modelled) -> Modelled:
     """Return the deck's own structure; the searched one has stiff springs in place of rigid ties.
 
     Scores use the structure that a user of the deck obtains.
     """
-    given = asked.tested(asked.assembly)
+    given = question.tested(question.assembly)
     if len(given.points) == len(searched.assembly.points):
         return searched
     return modelled(given, searched.band)
 
 
 def _deck(
-    case: Case, asked: Question, nominal: Modelled, changed: Assembly
+    case: Case, question: Question, nominal: Modelled, changed: Assembly
 ) -> tuple[ChangedDeck, list[str]]:
     """Return edits of the deck with its new structure, or a sentence if no card can hold them."""
     if changed is case.as_deck:
@@ -226,9 +226,9 @@ def _deck(
         edits = tuple(changes(case.deck, case.as_deck, changed, case.units))
         written = written_assembly(case.deck, edits, case.units)
     except (FileError, LabelError, ModelError) as error:
-        known = modelled(asked.tested(changed), nominal.band)
+        known = modelled(question.tested(changed), nominal.band)
         return ChangedDeck(known, None), [f"no updated deck was written: {error}"]
-    return ChangedDeck(modelled(asked.tested(written), nominal.band), edits), []
+    return ChangedDeck(modelled(question.tested(written), nominal.band), edits), []
 
 
 def _commented(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
@@ -273,7 +273,7 @@ def _curves(case: Case, made: UpdatedModels, modes: MeasuredModes) -> dict[str, 
 
 
 def _result(
-    asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels
+    question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels
 ) -> DiagnosisResult:
     """Collect all numbers and words, from the decks as written."""
     last, deck = found.found or found.null, found.as_deck or found.plain
@@ -283,30 +283,30 @@ def _result(
         ("calibrated", stages.calibrated.model),
         ("after", stages.final.model),
     )
-    rows = frequency_rows(asked, prepared, stages.test, every, real)
-    fitted, held = _scores(asked, prepared, found, stages, real)
+    rows = frequency_rows(question, prepared, stages.test, every, real)
+    fitted, held = _scores(question, prepared, found, stages, real)
     left, away = (
         remainder(prepared, found),
-        dict.fromkeys((*leaning(deck.fit), *strained(last.fit))),
+        dict.fromkeys((*implausible_values(deck.fit), *strained(last.fit))),
     )
-    spot = left_where(last, asked.mass_measurement)
-    weighed = None if asked.mass_measurement is None else asked.mass_measurement.mass
+    spot = residual_localisation(last, question.mass_measurement)
+    weighed = None if question.mass_measurement is None else question.mass_measurement.mass
     return DiagnosisResult(
         verdict=found.verdict,
         effects=named_effects(found),
         alternatives=alternatives(found),
         agreement=agreement(prepared, found, fitted, held),
         calibrated=calibrated(found),
-        mass=MassComparison(weighed, _article_mass(asked, stages, deck)),
+        mass=MassComparison(weighed, _article_mass(question, stages, deck)),
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,
         adequate=_adequate(found, spot),
-        left_where=spot,
+        residual_localisation=spot,
         notes=(
             *prepared.notes,
             *found.notes,
-            *laid_on_sheets(found, weighed, mass_properties(asked.assembly)[0]),
+            *laid_on_sheets(found, weighed, mass_properties(question.assembly)[0]),
             *otherwise(found),
             *away,
             left.sentence,
@@ -315,11 +315,11 @@ def _result(
         one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
         models=stages,
-        recordings=scored_others(asked, prepared, [model for _, model in every]),
+        recordings=scored_others(question, prepared, [model for _, model in every]),
     )
 
 
-def _adequate(found: Diagnosis, spot: LeftWhere | None) -> Adequacy | None:
+def _adequate(found: Diagnosis, spot: ResidualLocalisation | None) -> Adequacy | None:
     """Return the absolute test of fit in the form of the page."""
     test = found.adequacy
     if test is None:
@@ -331,19 +331,19 @@ def _adequate(found: Diagnosis, spot: LeftWhere | None) -> Adequacy | None:
     return Adequacy(test.passes, test.p, test.what, where, test.statistics)
 
 
-def _article_mass(asked: Question, stages: UpdatedModels, deck: HypothesisFit) -> float:
+def _article_mass(question: Question, stages: UpdatedModels, deck: HypothesisFit) -> float:
     """Return the mass of the updated deck: the structure as tested minus its sensors [kg].
 
     Sensor masses that were found are subtracted too: they were not weighed either.
     """
-    sensors = sum(m for _, m in asked.carried)
+    sensors = sum(m for _, m in question.sensor_masses)
     if stages.final.model is not stages.nominal:
         fit = deck.fit
         sensors += sum(e.off_the_scales(fit.of(e)) for e in fit.effects if e.writable)
     return mass_properties(stages.final.model.assembly)[0] - sensors
 
 
-def _blind(spot: LeftWhere | None) -> tuple[str, ...]:
+def _blind(spot: ResidualLocalisation | None) -> tuple[str, ...]:
     """Return a warning if the sensors are blind to local losses on much of the structure."""
     if spot is None or spot.blind < BLIND_SHARE:
         return ()
@@ -354,19 +354,19 @@ def _blind(spot: LeftWhere | None) -> tuple[str, ...]:
 
 
 def _scores(
-    asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
+    question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
     real: np.ndarray | None,
 ) -> tuple[Scores, Scores]:  # fmt: skip
     """Return Q of the three decks on fitted and held-out data, of noise, and of nuisances."""
     winner = found.found or found.null
     sets = prepared.score.use, held_out(prepared, winner)
     named = found.found
-    nominal = written_Q(asked, prepared, stages.nominal, sets, real)
+    nominal = written_Q(question, prepared, stages.nominal, sets, real)
     calibrated = final = nominal
     if stages.calibrated.model is not stages.nominal:
-        final = calibrated = written_Q(asked, prepared, stages.calibrated.model, sets, real)
+        final = calibrated = written_Q(question, prepared, stages.calibrated.model, sets, real)
     if named is not None or stages.final is not stages.calibrated:
-        final = written_Q(asked, prepared, stages.final.model, sets, real, named)
+        final = written_Q(question, prepared, stages.final.model, sets, real, named)
     fits = fitted_scores(prepared, found)
     first, second = (
         (q[0], q[1], q[2], noise_Q(prepared, use, real), fit.calibrated, fit.effect, fit.scatter)

@@ -14,9 +14,9 @@ from ..ema.level_table import LevelTable
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
-from ..updating.residual_localisation import LeftWhere
 from ..updating.level_effects import LinearJoint
 from ..updating.measured_modes import MeasuredModes
+from ..updating.residual_localisation import ResidualLocalisation
 from ..updating.result import (
     Adequacy,
     Agreement,
@@ -81,7 +81,7 @@ class DiagnosisResult:
     notes : how the recording was read, what was done and why
     distrust : reasons not to trust the result; the command then exits with 3
     compared : whether responses or natural frequencies were compared
-    searched : False where only ordinary parameters were fitted
+    searched : False where only calibration parameters were fitted
     screening : faults that the recording itself reveals; None without an FRF
     files : {what: name} of the files written with it
     models : the structures; None if the result was read from a file
@@ -111,7 +111,7 @@ class DiagnosisResult:
     screening: Screening | None = None
     files: dict[str, str | None] = field(default_factory=dict)
     models: UpdatedModels | None = None
-    left_where: LeftWhere | None = None
+    residual_localisation: ResidualLocalisation | None = None
     recordings: tuple[RecordingScore, ...] = ()
     levels: tuple[LevelTable, ...] = ()
     joints: tuple[LinearJoint, ...] = ()

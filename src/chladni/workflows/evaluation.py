@@ -15,8 +15,8 @@ from ..ema.ring_down import RingDown, ring_downs
 from ..ema.setup import Recording
 from ..errors import ChladniError, FileError
 from ..fem.modelled import modelled
-from ..progress import Progress, silent
 from ..parallel import one_blas_thread
+from ..progress import Progress, silent
 from .case_model import REACH
 from .identify import without_window
 from .screening_of_case import screened_by_model

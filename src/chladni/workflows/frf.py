@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
-from ..case.sensor_places import ROLES, carried, carried_said, placed
+from ..case.sensor_places import ROLES, placed, sensor_masses, weight_of_sensors
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift, transfer
@@ -19,13 +19,16 @@ from ..fem.solve import base_response, inertia_load
 from ..io.tables.sensor_table import exciter, read_layout
 from ..model.analysis import Analysis, Subcase
 from ..model.point_masses import with_masses
-from ..progress import Progress, silent
 from ..parallel import one_blas_thread
+from ..progress import Progress, silent
 from .case_model import REACH, model_frf
-from .loaded_model import DeckModels, Model, as_model, beside
+from .loaded_model import DeckModels, Model, as_model, similar_names
 
 Side = Sequence[str] | MeasuredDofs  # outputs, or inputs
-MOST, NAMED = 1200, 12  # dofs a deck may ask for at once; loaded ones taken in their stead
+MOST_DOFS, MOST_NAMED = (
+    1200,
+    12,
+)  # dofs a deck may ask for at once; loaded ones taken in their stead
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +101,10 @@ def placed_layout(
     if driven:
         said = f"Driven at {', '.join(driven)} (--input); the sensors are those of {path.name}."
         model = replace(model, notes=(*model.notes, said))
-    if not (masses := carried(model.assembly, outputs, inputs)):
+    if not (masses := sensor_masses(model.assembly, outputs, inputs)):
         return model, outputs, inputs
     grids, m = zip(*masses, strict=True)
-    said = f"{carried_said(model.assembly, outputs, inputs, path.name)}."
+    said = f"{weight_of_sensors(model.assembly, outputs, inputs, path.name)}."
     loaded = with_masses(model.assembly, grids, np.array(m))
     return replace(model, assembly=loaded, notes=(*model.notes, said)), outputs, inputs
 
@@ -122,7 +125,7 @@ def layout_places(
         If the file is not a layout, or a place is not on the model.
     """
     if not path.is_file():
-        raise FileError(f"no file {path}{beside(path)}")
+        raise FileError(f"no file {path}{similar_names(path)}")
     sensors = read_layout(path, [exciter(label, "--input") for label in driven])
     outputs, inputs = (
         placed(
@@ -302,7 +305,7 @@ def _wanted(model: Model, asked: Analysis, cases: Sequence[Subcase]) -> tuple[li
         named |= (ids >= first) & (ids <= last)
     if not named.any():
         return _loaded(model, asked), []
-    if 6 * named.sum() > MOST:
+    if 6 * named.sum() > MOST_DOFS:
         note = (
             f"The deck asks for the motion of {named.sum()} points; of so many only the "
             "loaded ones were taken, others with --output."
@@ -322,4 +325,4 @@ def _loaded(model: Model, asked: Analysis) -> list[str]:
         for load in loads
         for row, c in zip(load.rows, load.components, strict=True)
     }
-    return [label(point, c) for point, c in sorted(ends)[:NAMED]]
+    return [label(point, c) for point, c in sorted(ends)[:MOST_NAMED]]

@@ -7,21 +7,21 @@ import numpy as np
 
 from ..case import Case
 from ..case.mended_recordings import with_frf
+from ..ema.coincident_poles import peak_notes
 from ..ema.finding import Screening, notes_of_all, which
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import LevelStudy, level_study
 from ..ema.level_words import level_notes
-from ..ema.coincident_poles import peak_notes
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import ALIKE, RELEASE, responses, ringing
 from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
 from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
 from ..errors import AccuracyError, FileError
-from ..progress import Progress, silent, within
 from ..parallel import one_blas_thread
+from ..progress import Progress, silent, within
 from ..updating.measured_frequencies import LEAST_DELTA_CHI2
 
 TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted

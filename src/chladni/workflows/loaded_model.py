@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from ..io.nastran import Deck
 
 
-LEAST = 7  # modes; they separate six rigid motions of a free structure from the first elastic mode
+LEAST_MODES = (
+    7  # modes; they separate six rigid motions of a free structure from the first elastic mode
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ def load_model(
     """
     source = Path(source)
     if not source.exists():
-        raise FileError(f"no file or folder {source}{beside(source)}")
+        raise FileError(f"no file or folder {source}{similar_names(source)}")
     if is_case(source):
         from ..case import load_case
 
@@ -167,7 +169,7 @@ def load_deck(
     if source.is_dir():
         raise FileError(f"{source} is a folder; give a deck")
     if not source.is_file():
-        raise FileError(f"no file {source}{beside(source)}")
+        raise FileError(f"no file {source}{similar_names(source)}")
     system = None if units is None else unit_system(units)
     return DeckModels(source, read_deck(source, allow), system)
 
@@ -184,7 +186,7 @@ def is_case(source: Path) -> bool:
     return source.is_dir() or source.suffix == ".toml"
 
 
-def beside(source: Path) -> str:
+def similar_names(source: Path) -> str:
     """List names similar to a missing one, else files and cases with the same ending."""
     if not source.parent.is_dir():
         return f"; there is no folder {source.parent} either"

@@ -14,7 +14,7 @@ from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
 
 SAME_PLACE = 0.002  # of the structure's size: a place this near to a grid is that grid
-Way = Literal["grid", "place", "nearest", "base", "table", "missing"]
+MatchedBy = Literal["grid", "place", "nearest", "base", "table", "missing"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class MatchedDof:
 
     label: str
     role: Role
-    way: Way
+    way: MatchedBy
     grid: int | None = None
     place: np.ndarray | None = None
     distance: float = np.nan
@@ -131,8 +131,8 @@ def _by_place(
     away = np.linalg.norm(made.points - place, axis=1)
     near = int(away.argmin())
     if away[near] <= SAME_PLACE * size or not len(made.shells):
-        way: Way = "place" if away[near] <= SAME_PLACE * size else "nearest"
+        way: MatchedBy = "place" if away[near] <= SAME_PLACE * size else "nearest"
         grid = int(made.ids[near])
         return MatchedDof(label, role, way, grid, distance=float(away[near]), axis=axis)
-    off = float(ShellSurface.whole(made).feet(place).distance[0])
+    off = float(ShellSurface.whole(made).closest_points(place).distance[0])
     return MatchedDof(label, role, "nearest", None, place, off, axis)

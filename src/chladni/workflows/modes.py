@@ -8,9 +8,9 @@ from ..case import Case
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..fem.energy import mass_properties, part_energies
 from ..fem.loose_parts import loose_grids
-from ..progress import Progress, silent
 from ..parallel import one_blas_thread
-from .loaded_model import LEAST, Model, as_model
+from ..progress import Progress, silent
+from .loaded_model import LEAST_MODES, Model, as_model
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ def modes(source: Case | Model, count: int = 20, progress: Progress = silent) ->
     structure = model.structure
     size = len(structure.system.dofs)
     progress(f"modes of {size} degrees of freedom", 0.2)
-    whole = model.modes(max(count, LEAST))
+    whole = model.modes(max(count, LEAST_MODES))
     modal, still = whole.sel(slice(count)), rigid_modes(whole)
     progress("energies", 0.8)
     phi, rigid = modal.shapes, still[:count]

@@ -14,14 +14,14 @@ from ..io.nastran import read_op2_modes, read_punch_modes
 from ..io.nastran.results.punch import PunchModes
 from ..io.uff.read_uff import read_uff
 from ..model.assembly import Assembly
-from ..progress import Progress, silent
 from ..parallel import one_blas_thread
-from .loaded_model import Model, beside
+from ..progress import Progress, silent
+from .loaded_model import Model, similar_names
 
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both
 CLOSE = 0.01  # relative distance of frequencies within which shapes may mix
 MORE = 1.5  # modes that are solved for every one of the file, so that all of them find theirs
-LEAST = 3  # grids in common: on fewer all shapes look similar
+LEAST_GRIDS = 3  # grids in common: on fewer all shapes look similar
 READERS = (".op2", ".pch", ".punch", ".unv", ".uff", ".uf")
 
 
@@ -67,7 +67,7 @@ def read_modes(path: Path) -> PunchModes:
         If it is another kind of file, or holds no shapes.
     """
     if not path.is_file():
-        raise FileError(f"no file {path}{beside(path)}")
+        raise FileError(f"no file {path}{similar_names(path)}")
     suffix = path.suffix.lower()
     if suffix not in READERS:
         raise FileError(f"{path}: modes are read of {', '.join(READERS)}, not {suffix or '?'}")
@@ -115,7 +115,7 @@ def other_modes(model: Model, path: Path, progress: Progress = silent) -> OtherM
     near = (modal.frequency > least) & (modal.frequency <= 1.3 * top)
     own = model.motion(modal.shapes[:, near])[rows]
     held = np.isfinite(values[:, :, elastic]).all(axis=2)
-    if held.sum() < LEAST:
+    if held.sum() < LEAST_GRIDS:
         raise FileError(f"{path} moves {held.sum()} translations of the model; shapes need more")
     phi, psi = own[held], values[:, :, elastic][held]
     f_model, f_other = modal.frequency[near], read.frequency[elastic]
@@ -134,7 +134,7 @@ def other_modes(model: Model, path: Path, progress: Progress = silent) -> OtherM
 def _on_model(made: Assembly, read: PunchModes, path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return rows of the model's points in the file, and translations there (basic frame)."""
     known = np.isin(read.ids, made.ids)
-    if known.sum() < LEAST:
+    if known.sum() < LEAST_GRIDS:
         raise FileError(
             f"{path} holds {known.sum()} grids of the model (its {len(read.ids)} run from "
             f"{read.ids.min()} to {read.ids.max()}, the deck's from {made.ids[0]} to "

@@ -1,10 +1,10 @@
 """Where to put sensors and shakers, and which lines to measure."""
 
 from ..case import Case
+from ..parallel import one_blas_thread
 from ..planning import Plan, PlanSettings
 from ..planning import plan as planned
 from ..progress import Progress, silent
-from ..parallel import one_blas_thread
 from .loaded_model import Model, as_model
 
 

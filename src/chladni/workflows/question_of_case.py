@@ -23,7 +23,7 @@ def nothing_measured(case: Case) -> FileError:
     return FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
 
 
-def question(case: Case) -> Question:
+def question_of(case: Case) -> Question:
     """Build the question of a case.
 
     Raises
@@ -48,7 +48,7 @@ def question(case: Case) -> Question:
         held_band=case.held_band,
         gain_known=case.gain_known,
         parameters=case.parameters,
-        carried=case.carried,
+        sensor_masses=case.sensor_masses,
         accuracy=case.setup.accuracy,
     )
     if frfs:
@@ -83,4 +83,4 @@ def _others(case: Case) -> tuple[OtherRecording, ...]:
 
 def prepared(case: Case) -> Prepared:
     """Prepare a case for updating: identify, reduce, and choose the held-out data."""
-    return prepare(question(case))
+    return prepare(question_of(case))

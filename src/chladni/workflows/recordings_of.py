@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ..ema.setup import Recording
 from ..errors import FileError
-from .loaded_model import beside, is_case
+from .loaded_model import is_case, similar_names
 
 
 def load_recordings(source: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
@@ -19,7 +19,7 @@ def load_recordings(source: str | Path, quantity: str | None = None) -> tuple[Re
 
     source = Path(source)
     if not source.exists():
-        raise FileError(f"no file or folder {source}{beside(source)}")
+        raise FileError(f"no file or folder {source}{similar_names(source)}")
     if is_case(source):
         from ..case import load_case
 

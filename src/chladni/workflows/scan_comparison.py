@@ -64,7 +64,7 @@ def compare_with_scan(
     fit = align_scan(assembly, formed) if aligned else None
     points = scan.points if fit is None else moved(formed, fit).points
     middle = assembly.points[assembly.shells.nodes].mean(axis=1)
-    away = ShellSurface.over("the scan", points, scan.cells).feet(middle).distance
+    away = ShellSurface.over("the scan", points, scan.cells).closest_points(middle).distance
     off = np.abs(away - assembly.thickness() / 2)
     size = float(np.linalg.norm(np.ptp(middle, axis=0)))
     if off.min() > REACH * size:

@@ -11,7 +11,7 @@ from ..ema.recording_screening import screened
 from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
-from ..model.point_masses import with_masses
+from ..model.point_masses import with_mass_pairs
 from ..updating.chain_hypotheses import explains, smoothed
 from ..updating.channel_screening import against_model
 from ..updating.question import Prepared
@@ -55,26 +55,26 @@ def screened_by_model(
 
 def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Finding]:
     """Report sensors in grams and a weighing in pounds, if the responses show it."""
-    deck, carried = float(mass_properties(case.assembly)[0]), sum(m for _, m in case.carried)
+    deck = float(mass_properties(case.assembly)[0])
+    sensor_masses = sum(m for _, m in case.sensor_masses)
     found, weighed = [], case.setup.mass
     seen = smoothed(frf, lines, model, case.outputs, case.inputs)
     Q, level = (np.nan, np.nan) if seen is None else seen.as_declared()
-    if carried > HEAVY * deck:
-        grids, m = zip(*case.carried, strict=True)
-        light = modelled(with_masses(case.assembly, grids, 1e-3 * np.array(m)), model.band)
+    if sensor_masses > HEAVY * deck:
+        light = modelled(with_mass_pairs(case.assembly, case.sensor_masses, 1e-3), model.band)
         other = smoothed(frf, lines, light, case.outputs, case.inputs)
         less = np.nan if other is None else other.as_declared()[0]
         grams = explains(less, Q)
-        said = f"the sensors weigh {carried:.3g} kg in all, the structure {deck:.3g} kg"
+        said = f"the sensors weigh {sensor_masses:.3g} kg in all, the structure {deck:.3g} kg"
         if grams:
             said += (
                 f"; of a thousandth of that, Q against the model is {less:.2g}, as it is {Q:.2g}"
             )
-        if grams or carried > deck:
-            heaviest = max(m)
+        if grams or sensor_masses > deck:
+            heaviest = max(m for _, m in case.sensor_masses)
             mend = f"mass in sensors.csv is in kg: write {heaviest / 1e3:.3g} for {heaviest:.3g} g"
             severity: Severity = "fault" if grams else "warning"
-            found.append(Finding("sensor mass", f"{said}.", severity, (), mend, carried))
+            found.append(Finding("sensor mass", f"{said}.", severity, (), mend, sensor_masses))
     if weighed and in_pounds(deck, weighed) and not found:
         said = (
             f"the article weighs {weighed:.4g} kg, the deck {deck:.4g} kg, and the responses are "

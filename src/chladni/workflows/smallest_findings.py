@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from ..case.sensor_places import carried
+from ..case.sensor_places import sensor_masses
 from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..progress import Progress, silent
@@ -45,7 +45,7 @@ def smallest_findings(
         raise FileError(f"{layout}: what a force finds is foretold, not what a moving base does")
     asked = Question(
         model.assembly, outputs, inputs, band=band,
-        carried=carried(model.assembly, outputs, inputs),
+        sensor_masses=sensor_masses(model.assembly, outputs, inputs),
     )  # fmt: skip
     mass = float(mass_properties(model.assembly)[0])
     weighed = MassMeasurement(mass, MASS_SD * mass)

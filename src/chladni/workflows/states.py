@@ -10,29 +10,29 @@ from dataclasses import replace
 
 from ..case import Case
 from ..case.recording_groups import of_state, states
-from ..progress import Progress, within
 from ..parallel import one_blas_thread
+from ..progress import Progress, within
 from ..updating.diagnosis import Diagnosis
 from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import JointFit, joint_fit
 from ..updating.result import CalibratedParameter
 from ..updating.result_parts import shared_values
 from ..updating.written_hypothesis import as_written
-from .diagnosis_pipeline import Explained, explained, told
+from .diagnosis_pipeline import Explained, build_result, explained
 from .diagnosis_result import DiagnosisResult, StateResult
 from .effects_by_state import by_state
 from .output_only import with_natural_frequencies
 from .screening_of_case import RecordingAtFault, at_fault
 
 
-def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
+def diagnose_states(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
     """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread."""
     with one_blas_thread():
         case = with_natural_frequencies(case)
         names = states(case.recordings)
         try:
             if len(names) < 2 or ("test", "use") in case.given:
-                return told(explained(case, diagnosing, progress), diagnosing, progress)
+                return build_result(explained(case, diagnosing, progress), diagnosing, progress)
             return _in_states(case, names, diagnosing, progress)
         except RecordingAtFault as fault:
             return at_fault(case, fault.screening, diagnosing)
@@ -53,7 +53,9 @@ def _in_states(
     results = []
     for k, (name, one) in enumerate(zip(names, every, strict=True)):
         stage = within(progress, 0.8 + 0.2 * k / len(names), 0.8 + 0.2 * (k + 1) / len(names))
-        results.append(StateResult(name, _said(told(one, diagnosing, stage), name, names, shared)))
+        results.append(
+            StateResult(name, _said(build_result(one, diagnosing, stage), name, names, shared))
+        )
     first = results[0].result
     distrust = tuple(f"state {s.name!r}: {why}" for s in results for why in s.result.distrust)
     notes = (*first.notes, *by_state(results))

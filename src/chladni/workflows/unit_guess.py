@@ -22,7 +22,7 @@ MATERIALS = {  # E [Pa], rho [kg/m³]: what decks are made of
     "an adhesive or rubber": (6.0e6, 1050.0),
 }
 SIZE, MASS = (0.005, 50.0), (1e-3, 1e5)  # [m], [kg] of what is tested in one piece
-NEAR = 0.5  # decades: farther from every material a system is not believed
+NEAR_DECADES = 0.5  # decades: farther from every material a system is not believed
 CLEAR = 1.0  # decades the next system must be worse by
 
 
@@ -58,7 +58,7 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
     ranked = sorted((_misfit(pairs, size, mass, u), k, u) for k, u in enumerate(UNITS.values()))
     (best, _, units), (second, *_) = ranked[:2]
     E, rho = pairs[0]
-    if best > NEAR:
+    if best > NEAR_DECADES:
         raise FileError(
             f"{source}: E = {E:g} and rho = {rho:g} are usual in no unit system "
             f"({', '.join(UNITS)}); look at the materials, or give --units"
@@ -76,9 +76,9 @@ def doubt_of_units(made: Assembly, source: str, units: Units) -> str:
     """
     pairs, (size, mass) = _materials(made, units), _size_and_mass(made, units)
     seen = f"in {units.name} {_seen(size, mass, units)}"
-    if pairs and _off_materials(pairs, units) > NEAR:
+    if pairs and _off_materials(pairs, units) > NEAR_DECADES:
         better = min(UNITS.values(), key=lambda u: _off_materials(pairs, u))
-        if _off_materials(pairs, better) <= NEAR:
+        if _off_materials(pairs, better) <= NEAR_DECADES:
             raise FileError(
                 f"{source}: give --units {better.name}, not {units.name}: "
                 f"{_why(pairs[0], size, mass, better)}; {seen}, and its materials are no known ones"
@@ -161,4 +161,4 @@ def _distance(E: float, rho: float) -> tuple[float, str]:
 
 def _named(E: float, rho: float) -> str:
     away, name = _distance(E, rho)
-    return name if away < NEAR / 2 else f"nearest to {name}"
+    return name if away < NEAR_DECADES / 2 else f"nearest to {name}"

@@ -32,8 +32,8 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.refine import refined
 from ..geometry.sampling import nearest_points
 from ..io.file_size import OVERRIDE, most_gigabytes
-from ..progress import Progress, silent, within
 from ..parallel import one_blas_thread
+from ..progress import Progress, silent, within
 from .benched_article import benched, true_places
 from .loaded_model import as_model
 from .local_sites import LOCAL, local_site
@@ -42,7 +42,7 @@ NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 BALANCE = 5e-4  # error of the weighing, relative
 MODES = 20  # elastic modes of the band where nobody names one
 BELOW, BEYOND = 0.6, 1.05  # of the lowest and of the highest frequency of interest: the test's band
-LEAST = 5.0  # [Hz]
+LEAST_FREQUENCY = 5.0  # [Hz]
 ABOVE_BAND = 1.5  # articles differ in their modes up to so many times the highest line
 
 
@@ -266,10 +266,10 @@ def _band(case: Case) -> tuple[float, float]:
     named = [b for b in (case.band, case.held_band) if b is not None]
     if named:
         low, high = min(b[0] for b in named), max(b[1] for b in named)
-        return max(LEAST, BELOW * low), BEYOND * high
+        return max(LEAST_FREQUENCY, BELOW * low), BEYOND * high
     modal = as_model(case).modes(MODES + 6)
     f = modal.frequency[~rigid_modes(modal)]
-    return max(LEAST, BELOW * float(f[0])), BEYOND * float(f[-1])
+    return max(LEAST_FREQUENCY, BELOW * float(f[0])), BEYOND * float(f[-1])
 
 
 def _article(

@@ -52,7 +52,7 @@ def rim(surface: ShellSurface, place: np.ndarray, radius: float) -> np.ndarray:
     near = edge[np.linalg.norm(surface.points[edge] - place, axis=1) <= radius]
     if len(near) >= 3:
         return near
-    return np.unique(surface.nodes[surface.feet(place[None]).shell[0]])
+    return np.unique(surface.nodes[surface.closest_points(place[None]).shell[0]])
 
 
 def _loop(points: np.ndarray, sides: np.ndarray, place: np.ndarray, radius: float) -> np.ndarray:
@@ -96,7 +96,7 @@ def screw(
     """
     place = np.asarray(place, dtype=float)
     surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
-    feet = [s.feet(place[None]) for s in surfaces]
+    feet = [s.closest_points(place[None]) for s in surfaces]
     for surface, foot in zip(surfaces, feet, strict=True):
         surface.within(foot, place[None], reach)
     rims = [rim(s, f.place[0], diameter) for s, f in zip(surfaces, feet, strict=True)]
@@ -179,7 +179,7 @@ def tied_hole(
     """One RBE2 over the rims of an empty hole in all its sheets, which has no real counterpart."""
     place = np.asarray(place, dtype=float)
     surfaces = [ShellSurface.of(assembly, s) for s in sheets]
-    feet = [s.feet(place[None]) for s in surfaces]
+    feet = [s.closest_points(place[None]) for s in surfaces]
     for surface, foot in zip(surfaces, feet, strict=True):
         surface.within(foot, place[None], reach)
     rows = np.unique(
@@ -215,7 +215,7 @@ def grip(
     surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
     ends, far = [], np.zeros(len(places))
     for surface in surfaces:
-        feet = surface.feet(places)
+        feet = surface.closest_points(places)
         surface.within(feet, places, reach)
         far = np.maximum(far, feet.distance)
         assembly, rows = tied(assembly, places, cell_carriers(surface, feet))
@@ -294,8 +294,8 @@ def hem(
 def _inboard(surface: ShellSurface, edge: np.ndarray, inset: float) -> np.ndarray:
     """The edge moved into the sheet along its surface."""
     tangent, _ = along_line(edge, 1.0)
-    side = np.cross(surface.feet(edge).normal, tangent)
+    side = np.cross(surface.closest_points(edge).normal, tangent)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
-    left, right = (surface.feet(edge + s * inset * side) for s in (1, -1))
+    left, right = (surface.closest_points(edge + s * inset * side) for s in (1, -1))
     sign = np.where(left.distance.sum() <= right.distance.sum(), 1.0, -1.0)
-    return surface.feet(edge + sign * inset * side).place
+    return surface.closest_points(edge + sign * inset * side).place

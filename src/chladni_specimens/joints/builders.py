@@ -13,7 +13,7 @@ import numpy as np
 
 from chladni.errors import ModelError
 from chladni.geometry.facets import tangents
-from chladni.geometry.nearest import Feet, ShellChoice, ShellSurface, nearest_parts
+from chladni.geometry.nearest import ClosestPoints, ShellChoice, ShellSurface, nearest_parts
 from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import Assembly, Average, Solids
 from chladni.model.properties import Isotropic, Part, Section, SolidSection
@@ -93,7 +93,9 @@ def tied(
     return replace(grown, rigid=(*grown.rigid, *means)), rows
 
 
-def cell_carriers(surface: ShellSurface, feet: Feet) -> list[tuple[np.ndarray, np.ndarray]]:
+def cell_carriers(
+    surface: ShellSurface, feet: ClosestPoints
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """The nodes of the nearest shell, all of weight one (Echaniz Granado 2015, figure 1)."""
     return [(nodes, np.ones(len(nodes))) for nodes in surface.cells(feet)]
 
@@ -160,7 +162,7 @@ def _carriers(
     far = np.zeros(len(places))
     for k, surface in enumerate(sheets):
         mine = np.flatnonzero(side == k)
-        feet = surface.feet(places[mine])
+        feet = surface.closest_points(places[mine])
         surface.within(feet, places[mine], reach)
         far[mine] = feet.distance
         if patch:
@@ -189,8 +191,8 @@ def _facing(
     Sheets that touch have no distance.  The axis is then the normal of a, and the distance half
     the sum of the thicknesses.
     """
-    foot = a.feet(places)
-    other = b.feet(foot.place)
+    foot = a.closest_points(places)
+    other = b.closest_points(foot.place)
     t = assembly.thickness()
     contact = (t[a.rows[foot.shell]] + t[b.rows[other.shell]]) / 2
     gap = np.linalg.norm(other.place - foot.place, axis=1)
@@ -242,7 +244,7 @@ def spot_welds(
         these = next(p for p in pairs if _key(p) == pair)
         a, b = (ShellSurface.of(assembly, s) for s in these)
         for surface in (a, b):
-            surface.within(surface.feet(places[mine]), places[mine], reach)
+            surface.within(surface.closest_points(places[mine]), places[mine], reach)
         corners = _nuggets(*_centred(*_facing(assembly, places[mine], a, b), height), side)
         assembly, joints = hexahedra(
             assembly,
@@ -291,7 +293,7 @@ def adhesive_bead(
     a, b = (ShellSurface.of(assembly, s) for s in sheets)
     line = followed(np.asarray(line, dtype=float), pitch)
     for surface in (a, b):
-        surface.within(surface.feet(line), line, reach)
+        surface.within(surface.closest_points(line), line, reach)
     start, axis, h = _centred(*_facing(assembly, line, a, b), height)
     along = _tangent(line)
     across = np.cross(axis, along)

@@ -23,7 +23,7 @@ STEP = 2.5e-3  # of the grid on which curvature is taken [m]
 BENT, STRETCHED = 40.0, 0.35  # scales of κ [1/m] and of stretch in the indicator
 COARSEST = 22e-3  # size of the forming mesh where the sheet is flat [m]
 FINE_AT = 30.0  # curvature at which the forming mesh has its finest size [1/m]
-MOST = 0.38  # thinning at which a sheet would tear
+MOST_THINNING = 0.38  # thinning at which a sheet would tear
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class Forming:
     def thickness(self, plan: np.ndarray) -> np.ndarray:
         """Thickness t(y, s) = t₀ (1 - min(a i, 0.38)) [m] at planform points (n, 2 or 3)."""
         thinning = self.strength * self.indicator.at(self._stored(plan))
-        return self.gauge * (1 - np.minimum(thinning, MOST))
+        return self.gauge * (1 - np.minimum(thinning, MOST_THINNING))
 
     def size(self, plan: np.ndarray, finest: float) -> np.ndarray:
         """Size of the forming mesh [m]: 22 mm where flat, down to `finest` where κ > 30 1/m."""

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from chladni.effects.effect import PointTerm
+from chladni.effects.effect_context import EffectContext
 from chladni.effects.family import Article, Family
 from chladni.effects.points import MassEffect, strength
-from chladni.effects.effect_context import Surroundings
 from chladni.model.assembly import Assembly
 from chladni.model.point_masses import with_masses
 
@@ -55,7 +55,7 @@ def edge(assembly: Assembly, part: int) -> tuple[np.ndarray, np.ndarray]:
     return rows, each[rows] / each.sum()
 
 
-def edge_masses(where: Surroundings) -> list[EdgeMass]:
+def edge_masses(where: EffectContext) -> list[EdgeMass]:
     """One of every part of shells."""
     assembly, out = where.groups.structure.assembly, []
     parts = np.unique(assembly.shells.part)

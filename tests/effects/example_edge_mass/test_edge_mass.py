@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from chladni.cli.app import application
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.effect_context import Setup, Surroundings
+from chladni.effects.effect_context import EffectContext, Setup
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck
 from chladni.units import UNITS
@@ -54,7 +54,7 @@ def test_reduced_model_agrees_with_the_changed_structure(edge_mass):
     deck = small_plate(1)
     reduced = reduced_problem(deck, 420.0)
     setup = Setup((), (), 0.5, 420.0)
-    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
     (effect,) = edge_mass.edge_masses(where)
     x = np.array([0.5])
     lam = evaluate(reduced.model_for(effect, x), [effect], x, False).lam[6:14]

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.element_groups import element_groups
-from chladni.effects.user_parameters import freed
+from chladni.effects.user_parameters import user_parameter
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_deck
 from chladni.io.nastran.edit.model_changes import changes
@@ -77,7 +77,7 @@ def rewritten(deck, before, after):
     return assembly(read_deck(path), UNITS["mm-t-s"]), gone
 
 
-KINDS = {  # what is freed, and the cards whose lines change
+KINDS = {  # what is user_parameter, and the cards whose lines change
     "E of both solids": (dict(field="E", parts=(2, 3)), ["MAT1"]),
     "E of one solid": (dict(field="E", parts=(2,)), ["PSOLID"]),
     "nu of one solid": (dict(field="nu", parts=(3,)), ["PSOLID"]),
@@ -98,7 +98,7 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
     at = tuple(position(before, id) for id in given.get("parts", ()))
     groups = element_groups(structure(before), 4)
     what = {k: v for k, v in given.items() if k != "parts"}
-    effect = freed(groups, FreeParameter(kind, positions=at, **what))
+    effect = user_parameter(groups, FreeParameter(kind, positions=at, **what))
     after = effect.apply(before, np.array([0.05]))
     got, gone = rewritten(found, before, after)
     due, was, is_now = (structure(a).system for a in (after, before, got))
@@ -113,7 +113,9 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
 def test_a_bush_that_changed_alone_gets_a_property_of_its_own(deck):
     """The other bush of PBUSH 7 keeps the card as it was; a short field holds seven digits."""
     found, before = deck
-    effect = freed(element_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
+    effect = user_parameter(
+        element_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,))
+    )
     after = effect.apply(before, np.array([0.2]))
     got, _ = rewritten(found, before, after)
     due, is_now = (structure(a).system.K.toarray() for a in (after, got))

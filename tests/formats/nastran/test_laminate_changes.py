@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.element_groups import element_groups
-from chladni.effects.calibration_parameters import ordinary
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
@@ -56,7 +56,7 @@ def repaired(deck, before, after):
 def calibrated(before, quantities, positions):
     groups = element_groups(structure(before), 8)
     for quantity, x in quantities.items():
-        before = ordinary(groups, quantity, positions).apply(before, np.array([x]))
+        before = calibration_parameter(groups, quantity, positions).apply(before, np.array([x]))
     return before
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.element_groups import element_groups
-from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.points import with_masses, with_springs
 from chladni.errors import ModelError
@@ -73,7 +73,7 @@ def test_nothing_to_repair(deck):
 def test_ordinary_value_of_all_parts(deck, quantity, card):
     """One line a card: a shared material is one line, thickness is one a part."""
     made, before, units = deck
-    effect = ordinary(element_groups(structure(before), 8), quantity, (0, 1))
+    effect = calibration_parameter(element_groups(structure(before), 8), quantity, (0, 1))
     after = effect.apply(before, np.array([0.0712345678]))
     found, _, gone = repaired(made, before, after, units)
     same(found, after, before)
@@ -85,7 +85,7 @@ def test_ordinary_value_of_all_parts(deck, quantity, card):
 def test_ordinary_value_of_one_part(deck, quantity):
     """A material two parts share is changed for the one that changed, not for the other."""
     made, before, units = deck
-    effect = ordinary(element_groups(structure(before), 8), quantity, (1,))
+    effect = calibration_parameter(element_groups(structure(before), 8), quantity, (1,))
     after = effect.apply(before, np.array([-0.2]))
     found, _, gone = repaired(made, before, after, units)
     same(found, after, before)
@@ -178,7 +178,7 @@ def test_material_a_bar_shares(tmp_path):
     made = replace(made, parts=(*made.parts, bar), beams=beams)
     deck, before, units = opened(made, tmp_path)
     k = next(k for k, p in enumerate(before.parts) if isinstance(p.section, ShellSection))
-    effect = ordinary(element_groups(structure(before), 4), "E", (k,))
+    effect = calibration_parameter(element_groups(structure(before), 4), "E", (k,))
     after = effect.apply(before, np.array([0.2]))
     found, _, _ = repaired(deck, before, after, units)
     same(found, after, before)
@@ -237,7 +237,7 @@ def test_plane_stiffness(tmp_path, quantity):
     made = plate(0.3, 0.2, 4, 3, 1e-3, Anisotropic(Q, rho=7850.0))
     made = made.with_parts((made.parts[0].with_section(rigid_shear=True),))
     deck, before, units = opened(made, tmp_path)
-    effect = ordinary(element_groups(structure(before), 4), quantity, (0,))
+    effect = calibration_parameter(element_groups(structure(before), 4), quantity, (0,))
     after = effect.apply(before, np.array([0.1]))
     found, _, _ = repaired(deck, before, after, units)
     same(found, after, before)
@@ -281,7 +281,7 @@ def test_the_wall_of_a_tube_stands_in_its_card(tmp_path, kind):
     before = assembly(found, units)
     tube = before.part(7)
     groups = element_groups(structure(before))
-    stiff, wall = (ordinary(groups, q, [tube]) for q in ("E", "wall"))
+    stiff, wall = (calibration_parameter(groups, q, [tube]) for q in ("E", "wall"))
     after = wall.apply(stiff.apply(before, np.array([0.1])), np.array([-0.2]))
     again, fresh, gone = repaired(found, before, after, units)
     same(again, after, before)

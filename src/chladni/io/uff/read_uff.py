@@ -16,8 +16,8 @@ from ...ema.response_correlations import responses
 from ...ema.setup import Function, Recording, Shapes
 from ...errors import ChladniError, FileError, named
 from .estimate_stamp import read_stamp, with_variance
+from .uff_accumulator import Channel, Pair, Shape, TimeSignal, UffAccumulator, dataset_name
 from .uff_frf import frf_matrix
-from .uff_accumulator import Channel, Pair, Pile, Shape, TimeSignal, dataset_name
 from .uff_sets import (
     SILENT,
     USED,
@@ -59,35 +59,35 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
         frequency, values in volts.
     """
     path = Path(path)
-    pile = Pile(path)
-    sets = list(_sets(pile))
+    uff = UffAccumulator(path)
+    sets = list(_sets(uff))
     for one in sets:  # units first: 164 need not be at the top
         if isinstance(one, UnitsSet):
-            pile.units = file_units(one)
+            uff.units = file_units(one)
     for one in sets:
         try:
-            _take(pile, one, quantity)
+            _take(uff, one, quantity)
         except ChladniError:
             raise
         except _BROKEN as error:
             raise _damaged(path, one.number, one.code, error) from error
-    frf, (averages, added) = frf_matrix(pile, quantity), read_stamp(pile.title)
-    time = time_record(pile) if frf is None else None
-    _name_unused(pile, frf is None and time is None)
+    frf, (averages, added) = frf_matrix(uff, quantity), read_stamp(uff.title)
+    time = time_record(uff) if frf is None else None
+    _name_unused(uff, frf is None and time is None)
     if frf is not None and averages:
         frf = with_variance(frf, averages)
-        pile.notes.append(f"{path.name}: its noise is that of {averages:g} averages, as it says")
+        uff.notes.append(f"{path.name}: its noise is that of {averages:g} averages, as it says")
     return Recording(
         name=path.name,
         frf=frf,
-        shapes=_shapes(pile),
-        nodes=pile.nodes,
-        axes=_axes(pile),
-        elements=tuple(pile.elements),
-        functions=tuple(pile.functions),
+        shapes=_shapes(uff),
+        nodes=uff.nodes,
+        axes=_axes(uff),
+        elements=tuple(uff.elements),
+        functions=tuple(uff.functions),
         time=time,
         added_damping=added,
-        notes=tuple(pile.notes),
+        notes=tuple(uff.notes),
     )
 
 
@@ -102,20 +102,20 @@ def _damaged(path: Path, number: int, code: int, error: Exception) -> FileError:
     )
 
 
-def _sets(pile: Pile) -> Iterator[UffSet]:
+def _sets(uff: UffAccumulator) -> Iterator[UffSet]:
     """Every dataset that is of use."""
-    for number, dataset in _datasets(pile):
+    for number, dataset in _datasets(uff):
         try:
             yield typed(number, dataset)
         except _BROKEN as error:
-            raise _damaged(pile.path, number, int(dataset["type"]), error) from error
+            raise _damaged(uff.path, number, int(dataset["type"]), error) from error
 
 
-def _datasets(pile: Pile) -> Iterator[tuple[int, Mapping[str, Any]]]:
+def _datasets(uff: UffAccumulator) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """(number from 1, dataset) of every dataset that is of use; others are noted, not read."""
     import pyuff
 
-    path, idle = pile.path, set()
+    path, idle = uff.path, set()
     with readable(path) as source:
         file = pyuff.UFF(str(source))
         for k, kind in enumerate(file.get_set_types()):
@@ -129,7 +129,7 @@ def _datasets(pile: Pile) -> Iterator[tuple[int, Mapping[str, Any]]]:
                 raise FileError(f"{where}: cannot be read ({_why(error)})") from error
             yield k + 1, dataset
     if idle:
-        pile.notes.append(
+        uff.notes.append(
             f"{path.name}: datasets {named([str(k) for k in sorted(idle)])} are not used"
         )
 
@@ -148,25 +148,25 @@ def _dof(node: int, direction: int) -> str:
     return f"{node}:n" if direction == 0 else label(node, abs(direction), direction)
 
 
-def _take(pile: Pile, one: UffSet, quantity: str | None) -> None:
+def _take(uff: UffAccumulator, one: UffSet, quantity: str | None) -> None:
     """One dataset put on the pile."""
     match one:
         case FunctionSet():
-            _take_function(pile, one, quantity)
+            _take_function(uff, one, quantity)
         case NodeSet():
-            _take_nodes(pile, one)
+            _take_nodes(uff, one)
         case ElementSet():
-            pile.elements += one.elements
+            uff.elements += one.elements
         case TraceSet():
-            _take_lines(pile, one)
+            _take_lines(uff, one)
         case SystemSet():
-            _take_systems(pile, one)
+            _take_systems(uff, one)
         case ShapeSet():
-            _take_shape(pile, one)
+            _take_shape(uff, one)
 
 
-def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> None:
-    where, kind = pile.where(record), record.function
+def _take_function(uff: UffAccumulator, record: FunctionSet, quantity: str | None) -> None:
+    where, kind = uff.where(record), record.function
     record = _complete(record, where)
     node, way = record.reference
     if kind in _REAL and (np.iscomplexobj(record.y) or (kind == 1 and record.abscissa.kind == 18)):
@@ -182,42 +182,42 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
     if kind in (4, 5, 6) and node == 0 and way != 0:
         input = label(0, abs(way), way).replace("0:", "base:")
     if kind in (4, 5) or (kind == 0 and np.iscomplexobj(record.y) and node):
-        _take_frf(pile, record, (output, input), quantity)
+        _take_frf(uff, record, (output, input), quantity)
     elif kind in (6, 26):
         pair = output, input if kind == 6 else ""
-        if pair in pile.coherence:
+        if pair in uff.coherence:
             raise FileError(f"{where}: the coherence of {output} / {input} is there twice")
-        pile.coherence[pair] = np.real(record.y)
+        uff.coherence[pair] = np.real(record.y)
     else:
         called = _KINDS.get(kind, f"function type {kind}")
         reference = input if node else ""
         try:
             x = hertz(record, where) if kind in _SPECTRA else record.x
         except FileError as error:  # nothing compares it: the rest of the file is of use
-            pile.notes.append(f"left out: {error}")
+            uff.notes.append(f"left out: {error}")
             return
         found = Function(called, output, reference, x, record.y, record.ordinate.unit)
-        pile.functions.append(found)
+        uff.functions.append(found)
         if kind == 1:
-            pile.time.append(TimeSignal(output, record.ordinate.kind, found))
+            uff.time.append(TimeSignal(output, record.ordinate.kind, found))
 
 
-def _name_unused(pile: Pile, alone: bool) -> None:
+def _name_unused(uff: UffAccumulator, alone: bool) -> None:
     """Note the records nothing is made of; ``alone``: the file holds neither FRFs nor a test."""
-    used = {id(f) for f in responses(pile.functions)} if alone else set()
+    used = {id(f) for f in responses(uff.functions)} if alone else set()
     left = [
         f"{f.output}{f' / {f.input}' if f.input else ''} ({f.kind})"
-        for f in pile.functions
+        for f in uff.functions
         if id(f) not in used
     ]
     left += [
         f"{i}{f' / {j}' if j else ''} (coherence)"
-        for i, j in pile.coherence
-        if not any(i == output and j in ("", input) for output, input in pile.frf)
+        for i, j in uff.coherence
+        if not any(i == output and j in ("", input) for output, input in uff.frf)
     ]
     if left:
-        pile.notes.append(
-            f"{pile.path.name}: {len(left)} records that are no FRFs are not used: {named(left)}"
+        uff.notes.append(
+            f"{uff.path.name}: {len(left)} records that are no FRFs are not used: {named(left)}"
         )
 
 
@@ -242,74 +242,74 @@ def _complete(record: FunctionSet, where: str) -> FunctionSet:
     return replace(record, x=x, y=y)
 
 
-def _take_frf(pile: Pile, record: FunctionSet, dofs: Pair, quantity: str | None) -> None:
-    where = pile.where(record)
+def _take_frf(uff: UffAccumulator, record: FunctionSet, dofs: Pair, quantity: str | None) -> None:
+    where = uff.where(record)
     if not np.iscomplexobj(record.y):
         raise FileError(f"{where}: a frequency response without phase (real values) is of no use")
-    if dofs in pile.frf:
+    if dofs in uff.frf:
         raise FileError(
-            f"{where}: repeats {dofs[0]} / {dofs[1]} of dataset {pile.frf[dofs].number}; "
+            f"{where}: repeats {dofs[0]} / {dofs[1]} of dataset {uff.frf[dofs].number}; "
             "put each run into a file of its own"
         )
     check_calibrated(record, where)
     try:
-        said = meaning(record, pile.units, where)
+        said = meaning(record, uff.units, where)
     except FileError as error:
         if quantity is None:
             raise
-        said = Meaning(quantity, pile.units.length / pile.units.force)
+        said = Meaning(quantity, uff.units.length / uff.units.force)
         why = str(error).partition(";")[0]
-        if not any(why.partition(": ")[2] in note for note in pile.notes):
-            pile.notes.append(f"{why}: read as {quantity} in the units of the file, as asked")
+        if not any(why.partition(": ")[2] in note for note in uff.notes):
+            uff.notes.append(f"{why}: read as {quantity} in the units of the file, as asked")
     if quantity is None and said.quantity is None:
         raise FileError(
             f"{where}: neither data type nor unit label says what was measured; "
             "state quantity = receptance, mobility, accelerance or transmissibility"
         )
     f = hertz(record, where)
-    pile.title = pile.title or record.title
-    pile.frf[dofs] = Channel(record.number, f, record.y * said.factor, said.quantity)
+    uff.title = uff.title or record.title
+    uff.frf[dofs] = Channel(record.number, f, record.y * said.factor, said.quantity)
 
 
-def _take_nodes(pile: Pile, one: NodeSet) -> None:
-    xyz = one.places * pile.units.length
+def _take_nodes(uff: UffAccumulator, one: NodeSet) -> None:
+    xyz = one.places * uff.units.length
     if not np.isfinite(xyz).all():
-        raise FileError(f"{pile.where(one)}: a coordinate is not a number")
+        raise FileError(f"{uff.where(one)}: a coordinate is not a number")
     apart = _SAME_PLACE * np.abs(xyz).max(initial=0.0)
     for node, place, system in zip(one.nodes, xyz, one.systems, strict=True):
-        other = pile.nodes.get(int(node), place)
+        other = uff.nodes.get(int(node), place)
         if np.abs(other - place).max() > apart:
             raise FileError(
-                f"{pile.where(one)}: node {node} is there twice, at {_at(other)} and {_at(place)} m"
+                f"{uff.where(one)}: node {node} is there twice, at {_at(other)} and {_at(place)} m"
             )
-        pile.nodes[int(node)] = place
-        pile.turned[int(node)] = int(system)
+        uff.nodes[int(node)] = place
+        uff.turned[int(node)] = int(system)
 
 
 def _at(place: np.ndarray) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in place) + ")"
 
 
-def _take_lines(pile: Pile, one: TraceSet) -> None:
+def _take_lines(uff: UffAccumulator, one: TraceSet) -> None:
     """Trace lines; a zero lifts the pen."""
     line: list[int] = []
     for node in [*one.nodes, 0]:
         if node:
             line.append(node)
         elif line:
-            pile.elements.append(tuple(line))
+            uff.elements.append(tuple(line))
             line = []
 
 
-def _take_systems(pile: Pile, one: SystemSet) -> None:
+def _take_systems(uff: UffAccumulator, one: SystemSet) -> None:
     for system, kind, axes in one.systems:
         if kind == 0:
-            pile.systems[system] = axes
+            uff.systems[system] = axes
         else:
-            pile.notes.append(f"coordinate system {system} is not Cartesian: read as global")
+            uff.notes.append(f"coordinate system {system} is not Cartesian: read as global")
 
 
-def _take_shape(pile: Pile, one: ShapeSet) -> None:
+def _take_shape(uff: UffAccumulator, one: ShapeSet) -> None:
     if one.analysis == 2:
         f, zeta = one.frequency, one.viscous or one.hysteretic / 2
     elif one.analysis in (3, 7):
@@ -322,20 +322,20 @@ def _take_shape(pile: Pile, one: ShapeSet) -> None:
         for i, node in enumerate(one.nodes)
         for k, component in enumerate(one.components)
     }
-    pile.shapes.append(Shape(f, zeta, values))
+    uff.shapes.append(Shape(f, zeta, values))
 
 
-def _axes(pile: Pile) -> dict[int, np.ndarray]:
+def _axes(uff: UffAccumulator) -> dict[int, np.ndarray]:
     """The nodes whose directions are not those of the global axes."""
-    turned = {n: pile.systems[s] for n, s in pile.turned.items() if s in pile.systems}
+    turned = {n: uff.systems[s] for n, s in uff.turned.items() if s in uff.systems}
     return {n: A for n, A in turned.items() if not np.allclose(A, np.eye(3), atol=1e-6)}
 
 
-def _shapes(pile: Pile) -> Shapes | None:
-    if not pile.shapes:
+def _shapes(uff: UffAccumulator) -> Shapes | None:
+    if not uff.shapes:
         return None
-    dofs = tuple(dict.fromkeys(dof for shape in pile.shapes for dof in shape.values))
-    table = np.array([[shape.values.get(dof, 0.0) for shape in pile.shapes] for dof in dofs])
-    f = np.array([shape.frequency for shape in pile.shapes], float)
-    zeta = np.array([shape.damping for shape in pile.shapes], float)
+    dofs = tuple(dict.fromkeys(dof for shape in uff.shapes for dof in shape.values))
+    table = np.array([[shape.values.get(dof, 0.0) for shape in uff.shapes] for dof in dofs])
+    f = np.array([shape.frequency for shape in uff.shapes], float)
+    zeta = np.array([shape.damping for shape in uff.shapes], float)
     return Shapes(f, zeta, table, dofs)

@@ -41,7 +41,7 @@ class TimeSignal:
 
 
 @dataclass
-class Pile:
+class UffAccumulator:
     """What has been read so far; filled dataset by dataset."""
 
     path: Path

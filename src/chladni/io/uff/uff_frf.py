@@ -8,40 +8,40 @@ import numpy as np
 
 from ...dynamics.frf import FRF
 from ...errors import ChladniError, FileError, named
-from .uff_accumulator import Channel, Pair, Pile
+from .uff_accumulator import Channel, Pair, UffAccumulator
 
 _SAME_LINE = 1e-5  # single precision abscissas: relative
 
 
-def frf_matrix(pile: Pile, quantity: str | None) -> FRF | None:
+def frf_matrix(uff: UffAccumulator, quantity: str | None) -> FRF | None:
     """The FRF matrix of all records, or None where the file holds none."""
-    if not pile.frf:
+    if not uff.frf:
         return None
-    called = _one_sign(pile)
+    called = _one_sign(uff)
     channels: dict[Pair, Channel] = {}
-    for pair, channel in pile.frf.items():
+    for pair, channel in uff.frf.items():
         name = called[pair]
         flips = sum(a != b for a, b in zip(pair, name, strict=True))
         if name in channels:
             raise FileError(
-                f"{pile.path.name}, dataset {channel.number}: repeats {name[0]} / {name[1]} of "
+                f"{uff.path.name}, dataset {channel.number}: repeats {name[0]} / {name[1]} of "
                 f"dataset {channels[name].number} with the other sign"
             )
         channels[name] = replace(channel, values=(-1) ** flips * channel.values)
-    outputs, inputs = _rectangle(pile, list(channels))
+    outputs, inputs = _rectangle(uff, list(channels))
     kept = {(i, j): channels[i, j] for j in inputs for i in outputs}
-    frequency = _axis(pile, kept)
-    kind = _quantity(pile, kept, quantity)
+    frequency = _axis(uff, kept)
+    kind = _quantity(uff, kept, quantity)
     values = np.array([[kept[i, j].values for j in inputs] for i in outputs]).transpose(2, 0, 1)
     if not values.any():
-        raise FileError(f"{pile.path.name}: the FRFs are empty (every value is zero)")
+        raise FileError(f"{uff.path.name}: the FRFs are empty (every value is zero)")
     order = slice(None, None, -1) if frequency[0] > frequency[-1] else slice(None)
     if np.any(np.diff(frequency[order]) <= 0):
         k = int(np.argmin(np.diff(frequency[order])))
         raise FileError(
-            f"{pile.path.name}: the frequencies do not increase near {frequency[order][k]:g} Hz"
+            f"{uff.path.name}: the frequencies do not increase near {frequency[order][k]:g} Hz"
         )
-    coherence = _coherence(pile, {v: k for k, v in called.items()}, outputs, inputs, len(frequency))
+    coherence = _coherence(uff, {v: k for k, v in called.items()}, outputs, inputs, len(frequency))
     try:
         return FRF(
             values[order],
@@ -52,37 +52,37 @@ def frf_matrix(pile: Pile, quantity: str | None) -> FRF | None:
             coherence=None if coherence is None else coherence[order],
         )
     except ChladniError as error:
-        raise FileError(f"{pile.path.name}: {error}") from error
+        raise FileError(f"{uff.path.name}: {error}") from error
 
 
-def _one_sign(pile: Pile) -> dict[Pair, Pair]:
+def _one_sign(uff: UffAccumulator) -> dict[Pair, Pair]:
     """Each pair -> the pair it is called by, where a dof occurs with both signs."""
     bare = lambda dof: re.sub(r":[+-]", ":", dof)  # noqa: E731
     first: dict[tuple[int, str], str] = {}
-    for pair in pile.frf:
+    for pair in uff.frf:
         for role, dof in enumerate(pair):
             first.setdefault((role, bare(dof)), dof)
-    return {(i, j): (first[0, bare(i)], first[1, bare(j)]) for i, j in pile.frf}
+    return {(i, j): (first[0, bare(i)], first[1, bare(j)]) for i, j in uff.frf}
 
 
-def _rectangle(pile: Pile, pairs: list[Pair]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _rectangle(uff: UffAccumulator, pairs: list[Pair]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Outputs measured for every input, in the order of the file; the rest goes into a note."""
     inputs = tuple(dict.fromkeys(j for _, j in pairs))
     everyone = tuple(dict.fromkeys(i for i, _ in pairs))
     outputs = tuple(i for i in everyone if all((i, j) in pairs for j in inputs))
     if not outputs:
         raise FileError(
-            f"{pile.path.name}: no output was measured for all of the inputs {named(inputs)}; "
+            f"{uff.path.name}: no output was measured for all of the inputs {named(inputs)}; "
             "put each reference into a file of its own"
         )
     if left := [i for i in everyone if i not in outputs]:
-        pile.notes.append(
+        uff.notes.append(
             f"{len(left)} outputs not measured for every input left out: {named(left)}"
         )
     return outputs, inputs
 
 
-def _axis(pile: Pile, kept: Mapping[Pair, Channel]) -> np.ndarray:
+def _axis(uff: UffAccumulator, kept: Mapping[Pair, Channel]) -> np.ndarray:
     """The one frequency axis of all channels [Hz]."""
     first = next(iter(kept.values()))
     f = first.frequency
@@ -90,43 +90,43 @@ def _axis(pile: Pile, kept: Mapping[Pair, Channel]) -> np.ndarray:
         other = channel.frequency
         if len(other) != len(f) or not np.allclose(other, f, rtol=_SAME_LINE, atol=1e-9):
             raise FileError(
-                f"{pile.path.name}, dataset {channel.number}: its {len(other)} frequencies from "
+                f"{uff.path.name}, dataset {channel.number}: its {len(other)} frequencies from "
                 f"{other[0]:g} to {other[-1]:g} Hz are not the {len(f)} from {f[0]:g} to "
                 f"{f[-1]:g} Hz of dataset {first.number}"
             )
     return f
 
 
-def _quantity(pile: Pile, kept: Mapping[Pair, Channel], quantity: str | None) -> str:
+def _quantity(uff: UffAccumulator, kept: Mapping[Pair, Channel], quantity: str | None) -> str:
     """What all channels are."""
     if quantity is not None:
         if any(channel.quantity not in (None, quantity) for channel in kept.values()):
-            pile.notes.append(f"read as {quantity} as asked, whatever the file says")
+            uff.notes.append(f"read as {quantity} as asked, whatever the file says")
         return quantity
     said = {channel.quantity: channel.number for channel in kept.values()}
     if len(said) > 1:
         mixed = " and ".join(f"{q} (dataset {n})" for q, n in said.items())
-        raise FileError(f"{pile.path.name}: holds {mixed}; one quantity a file")
+        raise FileError(f"{uff.path.name}: holds {mixed}; one quantity a file")
     return str(next(iter(said)))
 
 
 def _coherence(
-    pile: Pile,
+    uff: UffAccumulator,
     spelt: Mapping[Pair, Pair],
     outputs: tuple[str, ...],
     inputs: tuple[str, ...],
     n_lines: int,
 ) -> np.ndarray | None:
     """(n_f, n_out, n_in), or None unless every channel has it."""
-    if not pile.coherence:
+    if not uff.coherence:
         return None
     gamma = np.empty((n_lines, len(outputs), len(inputs)))
     for i, output in enumerate(outputs):
         for j, input in enumerate(inputs):
             i_said, j_said = spelt[output, input]
-            found = pile.coherence.get((i_said, j_said), pile.coherence.get((i_said, "")))
+            found = uff.coherence.get((i_said, j_said), uff.coherence.get((i_said, "")))
             if found is None or len(found) != n_lines:
-                pile.notes.append(f"no coherence for {output} / {input}: none is used")
+                uff.notes.append(f"no coherence for {output} / {input}: none is used")
                 return None
             gamma[:, i, j] = found
     return gamma

@@ -5,37 +5,37 @@ import numpy as np
 from ...ema.time_record import TimeRecord
 from ...errors import FileError
 from ..time.time_channels import TimeChannel, assembled, rate_of
-from .uff_accumulator import Pile, TimeSignal
+from .uff_accumulator import TimeSignal, UffAccumulator
 
 _SI = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N", 9: "N"}  # data types, where no unit is written
 
 
-def time_record(pile: Pile) -> TimeRecord | None:
+def time_record(uff: UffAccumulator) -> TimeRecord | None:
     """All time histories together; None, with a note of the reason, where they make no test.
 
     A dof recorded several times was recorded in blocks: the hits of a hammer, bursts. Those that
     were put together are no longer among the functions of the pile.
     """
-    if not pile.time:
+    if not uff.time:
         return None
     blocks: dict[str, list[TimeSignal]] = {}
-    for one in pile.time:
+    for one in uff.time:
         blocks.setdefault(f"{one.label} {'force' if one.kind in (9, 13) else ''}", []).append(one)
     try:
-        record, notes = _record(pile, list(blocks.values()))
+        record, notes = _record(uff, list(blocks.values()))
     except FileError as error:
-        pile.notes.append(f"no FRF can be estimated from the time data: {error}")
+        uff.notes.append(f"no FRF can be estimated from the time data: {error}")
         return None
     if not record.inputs:  # responses alone: natural frequencies are taken from the functions
         return None
-    used = {id(one.function) for one in pile.time}
-    pile.functions[:] = [f for f in pile.functions if id(f) not in used]
-    pile.notes += notes
+    used = {id(one.function) for one in uff.time}
+    uff.functions[:] = [f for f in uff.functions if id(f) not in used]
+    uff.notes += notes
     return record
 
 
-def _record(pile: Pile, channels: list[list[TimeSignal]]) -> tuple[TimeRecord, list[str]]:
-    name = pile.path.name
+def _record(uff: UffAccumulator, channels: list[list[TimeSignal]]) -> tuple[TimeRecord, list[str]]:
+    name = uff.path.name
     rates, made = [], []
     for signals in channels:
         sizes = {(len(s.function.values), len(channels[0])) for s in signals}
