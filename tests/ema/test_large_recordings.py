@@ -11,8 +11,9 @@ from chladni.ema.condensed_lines import condensed
 from chladni.ema.identification import identify, kept_lines, pole_data
 from chladni.ema.outer_poles import outside, with_outer_poles
 from chladni.ema.pole_fitting import PoleData, linear, normal_matrices, polish, solve
+from chladni.ema.pole_search import selected
 from chladni.ema.pole_search_by_parts import core_bands, few_channels, searched_by_parts
-from chladni.ema.pole_selection import ORDERS, Rule, uncertainty
+from chladni.ema.pole_selection import ORDERS, Rule, shared_noise, uncertainty
 from chladni_evidence.identification_evidence import held_against, recording, structure
 
 
@@ -122,6 +123,25 @@ def test_bands_that_are_polished_apart_do_not_worsen_the_whole(
     inside = ~outside(data, right.fit.p)
     apart = np.abs(found.fit.p[:, None] - right.fit.p[inside]).min(axis=0)
     assert (apart < 10 * right.spread[0][inside]).all()
+
+
+def test_noise_that_all_channels_share_is_no_mode() -> None:
+    """Noise of the force is in all channels: it costs as much as one channel's, and looks sharp."""
+    known = structure(594, 5, 20)
+    frf, _ = recording(known, "share", 594, lines=1500)
+    data, omega_max = pole_data(frf, kept_lines(frf))
+    inner = known.inside / omega_max
+    A = linear(data.s, inner, data.q)
+    clean = A @ np.linalg.lstsq(A, data.y, rcond=None)[0].real
+    rng = np.random.default_rng(594)
+    own, common = (rng.normal(size=(len(data.s), n, 2)) @ [1, 1j] for n in (20, 1))
+    noise = np.sqrt(0.1) * own + np.sqrt(0.9) * common
+    noisy = PoleData(data.s, clean + noise / data.w, data.w, data.q)
+    fit, _ = selected(noisy, ORDERS, Rule(20, len(data.s)), 12)
+    inside = ~outside(noisy, fit.p)
+    assert inside.sum() == len(inner)
+    assert shared_noise(own) == pytest.approx(1.0, abs=0.01)
+    assert shared_noise(np.repeat(common, 20, axis=1)) == pytest.approx(20.0, rel=0.01)
 
 
 def test_noise_that_nobody_states_goes_with_all_that_rings(monkeypatch: pytest.MonkeyPatch) -> None:
