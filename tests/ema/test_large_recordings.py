@@ -1,5 +1,6 @@
 """Many channels or lines: band by band is as good as all at once."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,8 +11,9 @@ from chladni.ema.condensed_lines import condensed
 from chladni.ema.identification import identify, kept_lines, pole_data
 from chladni.ema.out_of_band_poles import outside, with_outer_poles
 from chladni.ema.pole_fitting import PoleData, linear, normal_matrices, polish, solve
-from chladni.ema.pole_search_by_parts import core_bands, few_channels
-from chladni.ema.pole_selection import Rule, uncertainty
+from chladni.ema.pole_search import selected
+from chladni.ema.pole_search_by_parts import core_bands, few_channels, searched_by_parts
+from chladni.ema.pole_selection import ORDERS, Rule, shared_noise, uncertainty
 from chladni_evidence.identification_evidence import held_against, recording, structure
 
 
@@ -79,6 +81,67 @@ def test_many_lines_are_as_sure_as_they_say() -> None:
         scores += [told.z_frequency, told.z_damping]
     z = np.concatenate(scores)
     assert np.sqrt((z**2).mean()) < 1 + 3 / np.sqrt(2 * len(z))
+
+
+def test_a_pole_that_is_significant_in_its_band_only_is_removed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each band returns a pole too many; all lines together show that it explains nothing."""
+    monkeypatch.setattr(pole_search_by_parts, "PER_BAND", 400)
+    known = structure(588, 6, 3)
+    frf, _ = recording(known, "share", 588, lines=1200)
+    data, _ = pole_data(frf, kept_lines(frf))
+    part = pole_search_by_parts._part
+
+    def with_one_more(*given):
+        found = part(*given)
+        middle = 0.5 * (found.begin + min(found.end, 1.0))
+        return replace(found, poles=np.append(found.poles, middle * (1j - 1e-4)))
+
+    monkeypatch.setattr(pole_search_by_parts, "_part", with_one_more)
+    found = searched_by_parts(data, Rule(3, len(data.s)), True, ORDERS, 4)
+    assert not (np.abs(found.fit.p.real) < 5e-4 * np.abs(found.fit.p)).any()
+
+
+def test_bands_that_are_polished_apart_do_not_worsen_the_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """If separate polishing moves the poles to a poorer fit, the joint fit is the answer."""
+    known = structure(588, 6, 3)
+    frf, _ = recording(known, "share", 588, lines=1200)
+    data, _ = pole_data(frf, kept_lines(frf))
+    given = data, Rule(3, len(data.s)), True, ORDERS, 4
+    polished, right = pole_search_by_parts._polished, searched_by_parts(*given)
+
+    def astray(*given):
+        p, *rest = polished(*given)
+        return 1.01 * p, *rest
+
+    monkeypatch.setattr(pole_search_by_parts, "_polished", astray)
+    found = searched_by_parts(*given)
+    assert found.chi == pytest.approx(right.chi, rel=1e-2)
+    inside = ~outside(data, right.fit.p)
+    apart = np.abs(found.fit.p[:, None] - right.fit.p[inside]).min(axis=0)
+    assert (apart < 10 * right.spread[0][inside]).all()
+
+
+def test_noise_that_all_channels_share_is_no_mode() -> None:
+    """Noise of the force is in all channels: it costs as much as one channel's, and looks sharp."""
+    known = structure(594, 5, 20)
+    frf, _ = recording(known, "share", 594, lines=1500)
+    data, omega_max = pole_data(frf, kept_lines(frf))
+    inner = known.inside / omega_max
+    A = linear(data.s, inner, data.q)
+    clean = A @ np.linalg.lstsq(A, data.y, rcond=None)[0].real
+    rng = np.random.default_rng(594)
+    own, common = (rng.normal(size=(len(data.s), n, 2)) @ [1, 1j] for n in (20, 1))
+    noise = np.sqrt(0.1) * own + np.sqrt(0.9) * common
+    noisy = PoleData(data.s, clean + noise / data.w, data.w, data.q)
+    fit, _ = selected(noisy, ORDERS, Rule(20, len(data.s)), 12)
+    inside = ~outside(noisy, fit.p)
+    assert inside.sum() == len(inner)
+    assert shared_noise(own) == pytest.approx(1.0, abs=0.01)
+    assert shared_noise(np.repeat(common, 20, axis=1)) == pytest.approx(20.0, rel=0.01)
 
 
 def test_noise_that_nobody_states_goes_with_all_that_rings(monkeypatch: pytest.MonkeyPatch) -> None:

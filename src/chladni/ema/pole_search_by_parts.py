@@ -26,7 +26,7 @@ from .pole_search import (
     selected,
     with_noise_left,
 )
-from .pole_selection import Rule, extended, uncertainty, with_neighbours
+from .pole_selection import Rule, extended, paid, uncertainty, with_neighbours
 
 CHANNELS, LINES = 48, 2000  # up to here all are fitted at once; beyond, outer modes become visible
 PER_BAND = 1200  # lines of a band: some ten modes of a structure, a hundred lines each
@@ -80,13 +80,17 @@ def searched_by_parts(
         np.flatnonzero(~beside & (one.begin <= np.abs(whole.p)) & (np.abs(whole.p) < one.end))
         for one in parts
     ]
-    p, delta_chi2, spread = whole.p.copy(), whole.delta_chi2.copy(), np.array(whole_spread)
+    fit, delta_chi2, spread = solve(data, whole.p)[0], whole.delta_chi2, np.array(whole_spread)
     for k in range(PASSES):
         progress(f"identifying {size}: every band again", 0.9 + 0.1 * k / PASSES)
-        fit, _ = solve(lines, p)
+        others, _ = solve(lines, fit.p)
+        p, rise, sd = fit.p.copy(), delta_chi2.copy(), spread.copy()
         for part, own in zip(parts, of_part, strict=True):
-            p[own], delta_chi2[own], spread[:, own] = _polished(data, fit, part, own, rule, stated)
-    fit, _ = solve(data, p)
+            p[own], rise[own], sd[:, own] = _polished(data, others, part, own, rule, stated)
+        closer, _ = solve(data, p)
+        if closer.chi2 > fit.chi2:
+            break
+        fit, delta_chi2, spread = closer, rise, sd
     return Solution(replace(fit, delta_chi2=delta_chi2), (spread[0], spread[1]), chi_of(data, fit))
 
 
@@ -95,6 +99,7 @@ def _with_outer(
 ) -> tuple[PoleData, PoleFit, Spread]:
     """Polish the poles of all bands and outside them together, on condensed lines and few channels.
 
+    A pole that was significant in its band only is removed: there it stood for outer modes.
     The first result is the condensed lines of all channels.
     """
     p = np.concatenate([one.poles for one in parts])
@@ -103,7 +108,9 @@ def _with_outer(
     few = few_channels(lines)
     if not stated and chi_of(data, fit) > ROUNDING:
         few = few_channels(condensed(with_noise_left(data, data, fit), fit))
-    fit, slope = with_outer_poles(few, p, replace(rule, channels=few.y.shape[1]))
+    rule = replace(rule, channels=few.y.shape[1])
+    fit, _ = with_outer_poles(few, p, rule)
+    fit, slope = paid(few, fit.p, rule)
     return lines, fit, uncertainty(fit.p, slope, max(1.0, chi_of(few, fit)) ** 2)
 
 

@@ -64,7 +64,20 @@ class Rule:
 
     def after(self, data: PoleData, fit: PoleFit) -> Self:
         """Rule with the misfit of this fit as noise: a systematic error justifies no poles."""
-        return replace(self, noise=max(self.noise, noise_left(data, fit)))
+        return replace(self, noise=max(self.noise, noise_left(data, fit) * shared_noise(fit.e)))
+
+
+def shared_noise(e: np.ndarray) -> float:
+    """Return n Σ λ² / (Σ λ)² of the channels' covariance, λ its eigenvalues; 1 if independent.
+
+    χ² that one pole removes from noise is Σ λ χ²_2.  Noise of the force is in all channels, so that
+    a single line may be off in all of them and look like a very sharp mode.  The residual ``e``
+    (n_f, n) has ‖C‖² too large by (tr C)² / n_f, which is subtracted.
+    """
+    n_f, n = e.shape
+    C = e.conj().T @ e
+    trace = max(float(np.trace(C).real), 1e-300)
+    return max(1.0, n * (float(np.vdot(C, C).real) / trace**2 - 1 / n_f))
 
 
 def compressed(data: PoleData, most: int = 8) -> PoleData:
