@@ -68,7 +68,7 @@ def in_parallel(
     many as :func:`threads` says; with one, the thread that asks does it all. Meanwhile BLAS has one
     thread for each.
 
-    >>> list(side_by_side(abs, [-1, 2, -3], 2))
+    >>> list(in_parallel(abs, [-1, 2, -3], 2))
     [1, 2, 3]
     """
     count = threads() if at_once is None else at_once
