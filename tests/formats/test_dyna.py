@@ -239,6 +239,10 @@ def scaled(data):
         '<!DOCTYPE x [<!ENTITY a "1">]><VTKFile type="UnstructuredGrid">&a;</VTKFile>',
         '<VTKFile type="UnstructuredGrid"><UnstructuredGrid/></VTKFile>',
         "",
+        '<VTKFile type="UnstructuredGrid" byte_order="LittleEndian"><UnstructuredGrid><Piece '
+        'NumberOfPoints="1" NumberOfCells="0"><Points><DataArray type="Float64" Name="Points" '
+        'NumberOfComponents="3" format="ascii">0 0</DataArray></Points></Piece>'
+        "</UnstructuredGrid></VTKFile>",
     ],
 )
 def test_a_damaged_mesh_is_one_sentence(tmp_path, capsys, text):

@@ -64,7 +64,7 @@ class Rule:
 
     def after(self, data: PoleData, fit: PoleFit) -> Self:
         """Rule with the misfit of this fit as noise: a systematic error justifies no poles."""
-        return replace(self, noise=max(self.noise, noise_left(data, fit) * shared_noise(fit.e)))
+        return replace(self, noise=max(self.noise * shared_noise(fit.e), noise_left(data, fit)))
 
 
 def shared_noise(e: np.ndarray) -> float:

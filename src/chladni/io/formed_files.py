@@ -87,6 +87,7 @@ def _read_mesh(path: Path, unit: Units) -> FormedMesh:
 def _meshio(path: Path) -> Any:
     """A mesh by meshio, which prints the reason and ends the process where it cannot read one."""
     import meshio
+    from meshio._exceptions import CorruptionError  # no ReadError, and not exported
 
     said = io.StringIO()
     try:
@@ -95,7 +96,7 @@ def _meshio(path: Path) -> Any:
     except SystemExit:
         why = " ".join(said.getvalue().split())
         raise FileError(f"{path} cannot be read as a mesh: {why or 'it is damaged'}") from None
-    except (*DAMAGED, meshio.ReadError) as error:
+    except (*DAMAGED, meshio.ReadError, CorruptionError) as error:
         why = f"there is no {error}" if isinstance(error, KeyError) else str(error)
         raise FileError(f"{path} cannot be read as a mesh: {why}") from error
 
