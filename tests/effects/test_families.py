@@ -30,7 +30,8 @@ from chladni.model.assembly import Assembly
 from chladni.units import UNITS
 from chladni.updating.candidates import UpdatingContext
 from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
-from chladni.updating.likelihood import Poles, Responses
+from chladni.updating.likelihood import Responses
+from chladni.updating.pole_data import Poles
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import ReducedProblem, reduced_problem
 from chladni_specimens.plates import plate

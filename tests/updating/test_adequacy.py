@@ -11,8 +11,8 @@ from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect
 from chladni.updating.adequacy import _drawn, _Linear, adequacy, at_least, of_poles, ranked
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
-from chladni.updating.likelihood import Poles
 from chladni.updating.map_fit import MassMeasurement, prior_residuals
+from chladni.updating.pole_data import Poles
 from chladni.updating.reduced_model import State, evaluate
 
 SCALES = MassMeasurement(1.413, 1.4e-3)

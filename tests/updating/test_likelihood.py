@@ -14,7 +14,7 @@ from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.fem.modelled import solved
 from chladni.updating.hypothesis_fit import over_scales
-from chladni.updating.likelihood import Poles
+from chladni.updating.pole_data import Poles
 from chladni.updating.reduced_model import evaluate
 
 

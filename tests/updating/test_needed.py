@@ -11,7 +11,8 @@ from chladni.effects.orthotropic_material import orthotropic
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
 from chladni.updating.diagnosis import Diagnosis, threshold
-from chladni.updating.likelihood import Poles, Responses
+from chladni.updating.likelihood import Responses
+from chladni.updating.pole_data import Poles
 from chladni_specimens.plates import plate
 
 DATA = object.__new__(Poles), object.__new__(Responses)

@@ -21,8 +21,9 @@ from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
 from .discrepancy import RIGID, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
-from .likelihood import SCALE, SCALE_SD, Poles, Responses
+from .likelihood import Responses
 from .map_fit import MassMeasurement, prior_residuals, unknowns
+from .pole_data import SCALE, SCALE_SD, Poles
 from .reduced_model import State, evaluate
 from .result import FitStatistic
 from .whitening import Span, Whitening

@@ -10,8 +10,9 @@ from ..fem.modelled import modelled
 from .accuracy import LIMIT, Accuracy, accuracy
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from .joint_fit import with_priors
-from .likelihood import Poles, Responses
+from .likelihood import Responses
 from .nuisances import measured_on, mesh_hidden, nuisances
+from .pole_data import Poles
 from .preparation import SOLVED, updating_problem
 from .question import Prepared, Question
 from .reduced_model import evaluate

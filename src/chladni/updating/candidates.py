@@ -16,7 +16,8 @@ from ..errors import ModelError
 from ..parallel import in_parallel
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
-from .likelihood import Poles, Responses
+from .likelihood import Responses
+from .pole_data import Poles
 from .pole_starts import global_starts
 from .reduced_model import evaluate
 from .scan import (

@@ -27,9 +27,10 @@ from .basis_refinement import Refinement
 from .diagnosis import Diagnosis, fit_test
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
-from .likelihood import Poles, Responses
+from .likelihood import Responses
 from .local_damping_test import heard_of_damping
 from .map_fit import fit
+from .pole_data import Poles
 from .question import Prepared
 from .reduced_model import evaluate
 from .rows_of_fits import row_of

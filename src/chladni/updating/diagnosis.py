@@ -27,8 +27,9 @@ from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
 from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted, wide_start
 from .implausible_values import implausible_values
-from .likelihood import Poles, Responses
+from .likelihood import Responses
 from .local_damping_test import heard_of_damping
+from .pole_data import Poles
 from .reduced_model import evaluate
 from .rows_of_fits import row_of, row_of_null
 from .search_round import on_common_basis, search_round, taken

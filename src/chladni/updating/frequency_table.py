@@ -8,8 +8,8 @@ import numpy as np
 
 from ..dynamics.modes import ModalModel
 from ..fem.modelled import Modelled
-from .likelihood import Poles
 from .measured_modes import MeasuredModes
+from .pole_data import Poles
 from .question import Prepared, Question
 from .result import FrequencyError, FrequencyRow
 from .written_scores import seen

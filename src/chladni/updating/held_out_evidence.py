@@ -19,8 +19,9 @@ import numpy as np
 
 from .discrepancy import learned
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, over_scales
-from .likelihood import Poles, Responses
+from .likelihood import Responses
 from .map_fit import prior_residuals, unknowns
+from .pole_data import Poles
 from .reduced_model import Reduced, evaluate
 from .scan import baseline
 

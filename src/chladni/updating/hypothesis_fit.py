@@ -11,8 +11,9 @@ from ..effects.effect_context import EffectContext, Setup
 from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned
-from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
+from .likelihood import Data, Responses
 from .map_fit import Fit, MassMeasurement, constants, fit, prior_residuals
+from .pole_data import SCALE, SCALE_SD, Poles
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import ReducedProblem
 

@@ -1,10 +1,8 @@
 """Compare a recording with a state of the reduced model: whitened residuals and their slopes.
 
-Two kinds of data share one interface:
-
-- :class:`Responses`: complex log10 deviation of the damping-equalised FRF on s = ω (ζ + i). This
-  is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides;
-- :class:`Poles`: ln of natural frequencies, used if gain or places are unknown.
+:class:`Responses` are the complex log10 deviation of the damping-equalised FRF on s = ω (ζ + i).
+This is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides. The same
+interface serves natural frequencies alone (:class:`.pole_data.Poles`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,8 +15,8 @@ from ..ema.correlation import wrapped
 from ..ema.identification import DERIVATIVES
 from ..ema.recording_noise import EqualisedError
 from .discrepancy import LARGEST, MEDIAN, USUAL, Discrepancy, curvature, discrepancy
-from .matrix_stack import along, each_times
-from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
+from .likely_sensor_errors import LikelyErrors, likely_errors
+from .matrix_stack import each_times
 from .reduced_model import Reduced, State
 from .sensor_errors import SensorErrors, columns, variance
 from .whitening import Span, Whitening, by_input, spanned, whitening
@@ -76,6 +74,8 @@ class Responses:
     about: State | None = None  # from which the errors of form spread
     direct: np.ndarray | float = 0.0
     sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
+    likely: LikelyErrors | None = None  # those errors about which log10 H is linearised
+    raw: np.ndarray | None = None  # values as measured, where ``values`` are linear in the errors
     known: Whitening | None = None  # of what those errors do to the lines and channels in use
     wide: "Responses | None" = None  # the same with independent noise: fits begin there
 
@@ -155,6 +155,12 @@ class Responses:
             curved = USUAL if plain.identified is None else min(delta, LARGEST)
         bent = curvature(plain, state, curved)
         data = replace(plain, bent=bent, about=state, curved=curved)
+        if plain.identified is not None and plain.sensors is not None:
+            slopes, _ = columns(plain.sensors, plain, state, np.ones(plain.values.shape))
+            sd = LN10 * replace(plain, identified=None).std()
+            errors = likely_errors(slopes, plain, 10 ** -plain.deviation(state), sd)
+            values = plain.values * 10**-errors.excess
+            data = replace(data, likely=errors, raw=plain.values, values=values)
         return data._spread(state, delta)
 
     def _spread(self, about: State, delta: float) -> Self:
@@ -173,6 +179,8 @@ class Responses:
         own, common, scale = [], [], LN10 * self.std()
         if self.sensors is not None:
             outputs, inputs = columns(self.sensors, self, about, scale)
+            if self.likely is not None:
+                outputs = outputs / self.likely.factor
             own, common = [outputs], [inputs]
         if (known := self.identified) is not None:
             every = np.concatenate([known.own, LOCAL * known.upper[None]])
@@ -187,13 +195,20 @@ class Responses:
 
     def exactly(self) -> Self:
         """Return these responses for a model and a test without errors of form."""
-        return replace(self, bent=None, error=None, about=None, known=None, wide=None)
+        values = self.values if self.raw is None else self.raw
+        return replace(
+            self, values=values, bent=None, error=None, about=None, likely=None, raw=None,
+            known=None, wide=None,
+        )  # fmt: skip
 
     def using(self, use: np.ndarray) -> Self:
         """Return other lines and channels, with the same errors of the model's form."""
         data = replace(self, use=use)
         if self.error is None or self.about is None:
             return data
+        if self.likely is not None:
+            again = data.allowing_errors(self.about, self.error.delta, self.curved)
+            return replace(again, wide=self.wide)
         return data._spread(self.about, self.error.delta)
 
     @property
@@ -272,127 +287,3 @@ class Responses:
         if not use.any():
             return float("nan")
         return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
-
-
-SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes
-SCALE_SD = 0.6  # of its logarithm
-
-
-@dataclass(frozen=True, eq=False)
-class Poles:
-    """Natural frequencies, each with the standard deviation of its logarithm.
-
-    Attributes
-    ----------
-    frequency : (n,) Hz       increasing
-    sd : (n,)                 of ln f, from the identification
-    use : (n,) bool           poles the fit may see
-    strength : (n,)           peak height relative to the highest
-    band : (low, high) Hz     in which the test would have shown a mode
-    scale : float             irreducible spread of ln f; learned with every hypothesis
-    spurious : (n,) or float  chance of each pole to belong to no mode of the structure
-    outputs, inputs           rows at the likely places of sensors and shakers, or None
-    """
-
-    frequency: np.ndarray
-    sd: np.ndarray
-    use: np.ndarray
-    strength: np.ndarray
-    band: tuple[float, float]
-    scale: float = SCALE
-    outputs: object = None
-    inputs: object = None
-    spurious: np.ndarray | float = SPURIOUS
-    a: np.ndarray | None = None
-    b: np.ndarray | None = None
-
-    def rebased(self, model: Reduced) -> Self:
-        """Rows for the visibility of modes in the basis of this model."""
-        if self.outputs is None or self.inputs is None:
-            return self
-        return replace(self, a=model.rows(self.outputs), b=model.rows(self.inputs))  # type: ignore[arg-type]
-
-    def std(self) -> np.ndarray:
-        """Standard deviation of ln f of every pole (n,)."""
-        return np.sqrt(self.sd**2 + self.scale**2)
-
-    def pairs(
-        self, state: State, among: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return positions (test pole, model mode) of each pair, and the price of other modes."""
-        poles = np.flatnonzero(self.use if among is None else among)
-        if not len(poles):
-            return poles, poles, 0.0
-        f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
-        f_max = self.frequency[poles[-1]]
-        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * f_max))
-        missed = price_missed(self.visibility(state, modes))
-        ends = (f[modes] < self.band[0]) | (f[modes] > min(self.band[1], f_max * (1 + 1e-9)))
-        test, model, unpaired = paired(
-            self.frequency[poles], f[modes], self.std()[poles], self._price_unpaired()[poles],
-            np.where(ends, 0.0, missed),
-        )  # fmt: skip
-        return poles[test], modes[model], unpaired
-
-    def _price_unpaired(self) -> np.ndarray:
-        """Price of an unpaired pole, on a scale where a pair costs δ²/σ²."""
-        price = np.where(np.isinf(self.strength), 1e4, price_spurious(self.spurious))
-        return price - 2 * np.log(self.std())
-
-    def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:
-        """Visibility of each mode, 1 for the strongest: rms residue over likely places."""
-        if self.a is None or self.b is None or not len(modes):
-            return np.ones(len(modes))
-        seen = np.sqrt(((self.a @ state.phi[:, modes]) ** 2).mean(axis=0))
-        hit = np.sqrt(((self.b @ state.phi[:, modes]) ** 2).mean(axis=0))
-        both = seen * hit
-        return np.asarray(both / both.max()) if both.any() else np.ones(len(modes))
-
-    def deviation(
-        self, state: State, among: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """ln(f_model / f_test) of every pair, with the pairs."""
-        test, model, _ = self.pairs(state, among)
-        f = np.sqrt(state.lam[model]) / (2 * np.pi)
-        return np.log(f / self.frequency[test]), test, model
-
-    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """ln(f_model / f_test) over its spread; unpaired poles and modes at their price."""
-        test, model, unpaired = self.pairs(state)
-        lam = state.lam[model]
-        delta = np.log(np.sqrt(lam) / (2 * np.pi) / self.frequency[test])
-        sd = self.std()
-        r = np.append(np.sqrt(self._price_unpaired()), np.sqrt(unpaired))
-        r[test] = delta / sd[test]
-        use = np.append(self.use, True)
-        if not gradient:
-            return r[use], np.zeros((int(use.sum()), 0))
-        assert state.dK is not None
-        assert state.dM is not None
-        J, phi = np.zeros((len(r), len(state.dK))), state.vectors[:, model]
-        dlam = along(state.dK, phi) - lam * along(state.dM, phi)
-        J[test] = (dlam / (2 * lam) / sd[test]).T
-        return r[use], J[use]
-
-    scaled = residual  # poles are independent
-
-    def only(self, use: np.ndarray) -> Self:
-        """Return these poles with others in use."""
-        return replace(self, use=use)
-
-    using = only  # poles are independent
-
-    def forced(self, state: State, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """ln(f_model / f_test) and the model mode of every real pole (n,); all are paired."""
-        wide = replace(self, scale=0.1, strength=np.full(len(self.strength), np.inf))
-        delta, mode = np.full(len(real), np.nan), np.full(len(real), -1)
-        d, test, model = wide.deviation(state, real)
-        delta[test], mode[test] = d, model
-        return delta, mode
-
-    def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
-        """Mean |log10(f_model / f_test)|² over the real poles in use."""
-        real = np.ones(len(use), bool) if real is None else real
-        delta = self.forced(state, real)[0][use & real]
-        known = np.isfinite(delta)
-        return float(np.mean((delta[known] / LN10) ** 2)) if known.any() else float("nan")

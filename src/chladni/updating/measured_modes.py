@@ -10,7 +10,7 @@ from ..ema.correlation import mac
 from ..ema.mode_pairing import ModePairs, pair
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
-from .likelihood import Poles
+from .pole_data import Poles
 from .question import Prepared
 
 BEYOND = 2.0  # times the highest frequency of the test: as far as a partner is looked for

@@ -14,7 +14,7 @@ from scipy.stats import norm, qmc
 from ..effects.effect import Effect
 from ..errors import ModelError
 from .hypothesis_fit import SCALES, UpdatingProblem, neg2_log_mixture
-from .likelihood import Poles
+from .pole_data import Poles
 from .reduced_model import evaluate
 
 DRAWS = 4096

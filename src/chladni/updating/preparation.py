@@ -31,12 +31,13 @@ from .complex_modes import mode_coupling
 from .damping_scatter import modal_damping
 from .hypothesis_fit import UpdatingProblem
 from .least_data import too_little
-from .likelihood import LN10, Poles, Responses
+from .likelihood import LN10, Responses
 from .map_fit import fit
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .pole_assignment import SPURIOUS_LISTED, share_spurious
+from .pole_data import Poles
 from .question import Prepared, Question
 from .reduced_problem import ReducedProblem, reduced_problem
 from .sensor_errors import sensor_errors

@@ -17,8 +17,9 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
 from .hypothesis_fit import UpdatingProblem
-from .likelihood import Poles, Responses
+from .likelihood import Responses
 from .map_fit import MassMeasurement
+from .pole_data import Poles
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,8 @@ from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
 from .hypothesis_fit import HypothesisFit
 from .joint_fit import JointFit
-from .likelihood import LN10, Poles
+from .likelihood import LN10
+from .pole_data import Poles
 from .question import Prepared
 from .result import (
     Agreement,

@@ -9,7 +9,7 @@ from ..effects.effect import Effect
 from ..model.assembly import Assembly
 from .diagnosis import Diagnosis
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
-from .likelihood import Poles
+from .pole_data import Poles
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
 from .written_hypothesis import as_foretold, as_written

@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..fem.modelled import Modelled, node_points
 from .hypothesis_fit import HypothesisFit
-from .likelihood import LN10, Poles, Responses
+from .likelihood import LN10, Responses
+from .pole_data import Poles
 from .question import Prepared, Question
 from .reduced_model import State
 from .reduced_problem import REACH

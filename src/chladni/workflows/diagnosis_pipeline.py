@@ -32,9 +32,10 @@ from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.implausible_values import implausible_values, in_doubt, strained
 from ..updating.joint_fit import Posterior, informed
-from ..updating.likelihood import Poles, Responses
+from ..updating.likelihood import Responses
 from ..updating.measured_modes import MeasuredModes, measured_modes
 from ..updating.other_recordings import scored_others
+from ..updating.pole_data import Poles
 from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
 from ..updating.residual_localisation import ResidualLocalisation, residual_localisation
