@@ -54,16 +54,16 @@ def test_what_the_command_writes(copied, tmp_path):
     assert json.loads((out / "check.json").read_text()) == plain(to_json(chladni.check(case)))
     assert (out / "sensors.png").stat().st_size > 10_000
     page = (out / "report.html").read_text(encoding="utf-8")
-    for word in ("sensors.png", "What will be used", *case.outputs.labels):
+    for word in ("sensors.png", "Data and settings in use", *case.outputs.labels):
         assert word in page
 
 
 @pytest.mark.parametrize(
     ("faults", "rest", "said"),
     [
-        (1, 0, "1 thing is to be mended first."),
-        (2, 1, "2 things are to be mended first, 1 thing is worth a look."),
-        (0, 2, "2 things are worth a look."),
+        (1, 0, "1 thing is to be corrected first."),
+        (2, 1, "2 things are to be corrected first, 1 thing is to be checked."),
+        (0, 2, "2 things are to be checked."),
         (0, 0, "Nothing looks wrong with the case."),
     ],
 )
@@ -78,7 +78,7 @@ def test_a_case_without_a_recording_is_told_where_to_name_one(copied, tmp_path, 
     rewritten(copied, 'recordings = ["frf.npz"]\n', "")
     done = call(command, copied, "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)
-    assert "names no recording to compare the model with; give it as recordings = [" in done.stderr
+    assert "has no recording to compare with the model; give it as recordings = [" in done.stderr
 
 
 def test_words_nobody_reads_are_told_by_command(copied):
@@ -218,7 +218,7 @@ def test_a_case_without_a_recording_is_told_what_that_means(copied):
     text = (copied / "case.toml").read_text()
     (copied / "case.toml").write_text(text[: text.index("[test]")])
     facts = dict(chladni.check(chladni.load_case(copied)).facts)
-    assert "all other commands do" in facts["recording"]
+    assert "all commands need one except modes" in facts["recording"]
 
 
 def test_of_a_long_recording_few_lines_are_identified(case, monkeypatch):
