@@ -65,6 +65,8 @@ def _known(found: Identifiability) -> list[Block]:
 def _verdict(p: ParameterKnowledge) -> str:
     if p.frozen:
         return "frozen"
+    if p.sd_after**2 > p.prior_sd**2 / 2:
+        return "its prior: not known at the deck's values"
     return "known by the weighed mass" if p.why else "known"
 
 

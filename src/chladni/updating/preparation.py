@@ -16,6 +16,8 @@ from ..effects.effect_context import EffectContext, Setup
 from ..effects.model_families import joint_nuisances
 from ..effects.registry import family
 from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
+from ..effects.weld_patch import FIELD as WELD_PATCH
+from ..effects.weld_patch import weld_patch
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
@@ -337,6 +339,8 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
     """
     if p.field in UNITS:
         return user_parameter(reduced.groups, p)
+    if p.field == WELD_PATCH:
+        return weld_patch(reduced.groups, p)
     placed = family(p.field).placed
     assert placed is not None
     setup = setup_of(question, f_max)
