@@ -298,8 +298,13 @@ def updating_problem(
     nuisance: list[Effect],
     f_max: float,
 ) -> UpdatingProblem:
-    """The updating problem of a diagnosis: calibration parameters and nuisances are free."""
-    base = [*freed_by(question, reduced, f_max), *nuisance]
+    """The updating problem of a diagnosis: calibration parameters and nuisances are free.
+
+    A family of joints that the user frees as a whole has no nuisance of its own beside it.
+    """
+    own = freed_by(question, reduced, f_max)
+    gone = {name for e in own for name in e.replaces}
+    base = [*own, *(e for e in nuisance if e.text not in gone)]
     return UpdatingProblem(
         reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
         setup_of(question, f_max), question.outputs.labels,
