@@ -135,7 +135,7 @@ SCALES = MassMeasurement(1.4, 0.004)
 
 def test_a_calibration_that_foretells_keeps_the_mass_and_its_priors_is_no_compensation(reduced):
     mass = MassComparison(1.4, 1.405)
-    result = SimpleNamespace(agreement=AGREES, mass=mass, left_where=None)
+    result = SimpleNamespace(agreement=AGREES, mass=mass, residual_localisation=None)
     assert compensating(calibrated_plate(reduced, 0.05), result, SCALES) == ()
 
 
@@ -150,9 +150,19 @@ def test_a_calibration_that_foretells_keeps_the_mass_and_its_priors_is_no_compen
 def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
     agreement = replace(AGREES, held_out=Scores(1.0, held))
     mass, spot = MassComparison(1.4, model), SimpleNamespace(parts=("top",))
-    result = SimpleNamespace(agreement=agreement, mass=mass, left_where=spot)
+    result = SimpleNamespace(agreement=agreement, mass=mass, residual_localisation=spot)
     *reasons, stands = compensating(calibrated_plate(reduced, x), result, SCALES)
     assert len(reasons) == 1
     assert said in reasons[0]
     assert f"plate {np.expm1(x):.1%} stiffer in bending" in stands
     assert "largest on top" in stands
+
+
+def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
+    """Where the mesh errs by more than any value, nothing changes, and the weighing says so."""
+    result = SimpleNamespace(
+        agreement=AGREES, mass=MassComparison(1.4, 1.5), residual_localisation=None
+    )
+    first, last = compensating(calibrated_plate(reduced, 0.0), result, SCALES)
+    assert "weighs 1.5 kg" in first
+    assert "the deck keeps its values" in last

@@ -254,7 +254,7 @@ def _place(where: Location) -> list[tuple[str, str]]:
 
 def _calibrated(result: DiagnosisResult) -> list[Block]:
     """Tabulate the values that differ between the given and the updated deck."""
-    if not (result.calibrated and result.deck_changed):
+    if not (result.calibrated and (result.deck_changed or result.study)):
         return []
     rows = [
         (

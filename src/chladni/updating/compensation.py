@@ -32,7 +32,7 @@ class Scored(Protocol):
         """Weighed and calibrated mass."""
 
     @property
-    def left_where(self) -> ResidualLocalisation | None:
+    def residual_localisation(self) -> ResidualLocalisation | None:
         """Where a local change would still gain."""
 
 
@@ -47,7 +47,7 @@ def compensating(fit: Fit, result: Scored, weighed: MassMeasurement | None) -> t
         *foretells_worse(result.agreement), *_leaves_the_scales(result.mass, weighed),
         *implausible_values(fit),
     )  # fmt: skip
-    spot = result.left_where
+    spot = result.residual_localisation
     place = "" if spot is None or not spot.parts else f"on {', '.join(spot.parts[:2])}"
     return (*reasons, _stands_for(fit, place)) if reasons else ()
 
@@ -81,7 +81,12 @@ def _stands_for(fit: Fit, place: str) -> str:
         for where in stiff
         if max(abs(stiff[where]), abs(heavy[where])) > 0.01
     ]
-    changes = "; ".join(said) or "small changes of many values"
+    if not said:
+        return (
+            "the deck keeps its values, as no others fit better on its mesh: refine the mesh, or "
+            "look for what is missing with `chladni diagnose`"
+        )
+    changes = "; ".join(said)
     left = f"; what it leaves is largest {place}" if place else ""
     return (
         f"the calibration is compensating: it stands for what makes {changes}{left}; `chladni "
