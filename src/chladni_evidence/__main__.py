@@ -19,6 +19,7 @@ from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
 from .record import record
 from .recorded_case import read_case
+from .recovery import recovery
 from .replay import case_lines, likelihood_lines, narrower, rule_lines
 from .screening_evidence import TIMES
 from .screening_faults import FAULTS, tally
@@ -95,9 +96,17 @@ def _replayed(asked: argparse.Namespace) -> int:
     return 0
 
 
+def _recovered(asked: argparse.Namespace) -> int:
+    """Calibrate articles of known values; print the coverage of the intervals."""
+    asked.out.mkdir(parents=True, exist_ok=True)
+    recovery(_seeds(asked), asked.out, _say)
+    return 0
+
+
 COMMANDS = {
     "run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
     "record": _recorded, "replay": _replayed,
+    "recovery": _recovered,
 }  # fmt: skip
 
 
@@ -130,6 +139,9 @@ def _parser() -> argparse.ArgumentParser:
     tested = commands.add_parser("thesis", help="tables 3 to 6, figures 19, 23 to 27 of the thesis")
     tested.add_argument("--seed", type=int, default=1)
     tested.add_argument("--out", type=Path, required=True)
+    known = commands.add_parser("recovery", help="calibrate to known values: coverage of intervals")
+    known.add_argument("--seeds", required=True, help="first and last, as 600-619")
+    known.add_argument("--out", type=Path, required=True)
     kept = commands.add_parser("record", help="diagnose cases once, and keep all that decides them")
     kept.add_argument("case", type=Path, nargs="+", help="a case folder")
     kept.add_argument("--out", type=Path, required=True, help="a folder for one file a case")

@@ -11,6 +11,7 @@ import chladni
 from chladni.cli.app import COMMANDS, application
 from chladni.output import plain
 from chladni.planning import PlanSettings
+from chladni.report.diagnosis_json import read_diagnosis
 from chladni.report.result_json import to_json
 
 WORKFLOW = {  # command: the function it calls
@@ -85,10 +86,15 @@ def test_json_of_a_calibration_is_the_result_of_its_function(calibrated, folder,
     """E, rho and t stand for a mass here and foretell worse, so that the exit code is 3."""
     found = written("calibrate", "diagnosis.json", folder, tmp_path / "out", code=3)
     assert "predicts the held-out data worse" in calibrated.distrust[0]
-    assert found.pop("files")["deck"] == "updated.bdf"
+    assert "the calibration is compensating" in calibrated.distrust[1]
+    files = found.pop("files")
+    assert (files["deck"], files["calibration"]) == ("calibrated.bdf", "calibration.json")
     due = plain(to_json(calibrated))
     due.pop("files")
     assert found == due
+    own = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert {key: own[key] for key in due["study"]} == due["study"]
+    assert read_diagnosis(tmp_path / "out").study == calibrated.study
 
 
 def test_json_of_a_diagnosis_is_the_result_of_its_function(diagnosed, folder, tmp_path):

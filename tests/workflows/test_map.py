@@ -186,7 +186,7 @@ def test_a_missing_part_thins_as_its_curvature_lets_expect(tmp_path):
 
 
 def test_a_case_carries_the_thickness_into_the_deck_it_writes(folder, tmp_path):
-    """Modes of a case with ``thickness`` are those of the mapped deck, and so is updated.bdf."""
+    """Modes of a case with ``thickness`` are those of the mapped deck, and so is calibrated.bdf."""
     for name in ("plate.bdf", "frf.npz"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     own = chladni.load(folder / "plate.bdf", "SI").assembly
@@ -201,7 +201,7 @@ def test_a_case_carries_the_thickness_into_the_deck_it_writes(folder, tmp_path):
     assert any("formed.k" in note for note in case.said("modes"))
     done = call("calibrate", tmp_path, "--out", tmp_path / "out")
     assert done.exit_code in (0, 3), done.output
-    after = chladni.load(tmp_path / "out" / "updated.bdf", "SI").assembly
+    after = chladni.load(tmp_path / "out" / "calibrated.bdf", "SI").assembly
     ratio = after.thickness() / case.assembly.thickness()
     np.testing.assert_allclose(ratio, ratio.mean(), rtol=1e-4)
 

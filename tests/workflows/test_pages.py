@@ -51,16 +51,19 @@ def test_the_result_is_read_back(run_folder, diagnosed):
 
 
 def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_path):
-    """E, rho and t: deck, updated deck with its interval, and the change."""
+    """Deck, interval, change; of E, rho and t only E t³ and ρ t are known, so that E is frozen."""
     result = write_diagnosis(tmp_path, case, calibrated)
     assert {c.where: c.deck_value for c in result.calibrated}
     page = (tmp_path / "report.html").read_text()
     assert "Calibrated parameters" in page
     assert page.count("<td") > 0
-    E = next(c for c in result.calibrated if c.estimate.name == "E")
-    assert E.deck_value == pytest.approx(2.1e11)
+    t = next(c for c in result.calibrated if c.estimate.name == "t")
+    assert t.deck_value == pytest.approx(1e-3)
     assert "210 GPa" in page
-    assert E.estimate.low < E.estimate.value < E.estimate.high
+    assert "frozen (186.7 GPa to 236.2 GPa by its prior)" in page
+    for title in ("What the data can know", "Basins of the fit", "How sure the values are"):
+        assert f"<h2>{title}</h2>" in page
+    assert t.estimate.low < t.estimate.value < t.estimate.high
 
 
 def test_figures_of_the_page_are_named_for_what_they_are(run_folder):

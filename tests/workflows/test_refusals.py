@@ -80,7 +80,7 @@ def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(case, tmp_path, 
     d = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert "not to be trusted" in d["distrust"][0]
     assert "Reasons for doubt" in (tmp_path / "out" / "report.html").read_text()
-    assert (tmp_path / "out" / "updated.bdf").exists()
+    assert (tmp_path / "out" / "calibrated.bdf").exists()
 
 
 def test_a_result_that_is_trusted_hands_itself_out(diagnosed):

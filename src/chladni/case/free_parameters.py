@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.registry import families
+from ..effects.weld_patch import FIELD as WELD_PATCH
 from ..errors import FileError, LabelError, did_you_mean
 from ..io.nastran import Deck
 from ..model.assembly import Assembly
@@ -104,7 +105,7 @@ def _field(section: TomlSection) -> str:
 
 def _placed_names() -> tuple[str, ...]:
     """Effects of which deck and test tell where they act, those of installed packages too."""
-    return tuple(f.name for f in families() if f.placed is not None)
+    return (*(f.name for f in families() if f.placed is not None), WELD_PATCH)
 
 
 def _placed(section: TomlSection, made: Assembly, what: str, name: str) -> FreeParameter:
@@ -115,6 +116,8 @@ def _placed(section: TomlSection, made: Assembly, what: str, name: str) -> FreeP
                 f"{section.at(key)} is for numbers ({', '.join(FIELDS)}); {what} has its own prior"
             )
     given, positions, _ = _members(section, made, None)
+    if what == WELD_PATCH:
+        return FreeParameter(name, what, tuple(given), positions=tuple(positions))
     if given and what != "orthotropic-material":
         raise FileError(f"{section.at('parts')}: {what} belongs to the test, not to parts")
     usable = [k for k, p in enumerate(made.parts) if _isotropic_shell(p)]

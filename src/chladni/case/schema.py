@@ -52,7 +52,7 @@ ALIASES = {  # effects that are a calibration parameter by another name
     "adhesive-stiffness": "E",
 }
 PLACED = (  # where they act is known
-    "orthotropic-material", "sensor-mass", "suspension", "shaker-restraint",
+    "orthotropic-material", "sensor-mass", "suspension", "shaker-restraint", "weld-patch",
 )  # fmt: skip
 PLANNED = (  # names of the public contract that no model stands behind yet
     "rattle", "joint-friction",

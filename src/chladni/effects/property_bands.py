@@ -25,12 +25,19 @@ def with_bands(
     ``changed`` returns a part changed by a value; name and id are set here.
     """
     level, step = levels(value)
+    return in_bands(assembly, level, lambda part, n: changed(part, n * step))
+
+
+def in_bands(
+    assembly: Assembly, level: np.ndarray, changed: Callable[[Part, int], Part]
+) -> Assembly:
+    """Put the shells into parts changed by their integer level (m,); 0 leaves them as they are."""
     old, parts = assembly.shells.part, list(assembly.parts)
     part = old.copy()
     pairs = set(zip(old.tolist(), level.tolist(), strict=True))
     for k, n in sorted((k, n) for k, n in pairs if n):
         part[(old == k) & (level == n)] = len(parts)
-        new = changed(assembly.parts[k], n * step)
+        new = changed(assembly.parts[k], n)
         name = f"{assembly.parts[k].name}, band {n}"
         parts.append(replace(new, id=1 + max(p.id for p in parts), name=name))
     return replace(assembly, parts=tuple(parts), shells=replace(assembly.shells, part=part))

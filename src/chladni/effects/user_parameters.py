@@ -6,7 +6,7 @@ solids, fasteners, springs, bushes and masses by their operators. The operators 
 one part are added; their second-order product is neglected.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,6 +31,7 @@ from .calibration_parameters import (
 from .effect import ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location
+from .joints import solid_parts
 from .linear_parameter import LinearScale, linear_scale
 
 UNITS = {
@@ -150,8 +151,21 @@ def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
     unknown = (Parameter(free.field, unit, 0.0, sd, float(scale), step=min(0.3, 2 * sd)),)
     low, high = _bounds(parts, free)
     return UserParameter(
-        unknown, text, names, members=tuple(members), low=low, high=high, called=free.name
+        unknown, text, names, members=tuple(members), low=low, high=high, called=free.name,
+        replaces=tuple(_whole_families(built.assembly, free)),
     )  # fmt: skip
+
+
+def _whole_families(assembly: Assembly, free: FreeParameter) -> Iterator[str]:
+    """Families of joints whose factor is this parameter, so that they need none beside it."""
+    for name, soft in (("adhesive", True), ("welds", False)):
+        parts = {int(assembly.solids[g].part[r]) for g, rows in solid_parts(assembly, soft)
+                 for r in rows}  # fmt: skip
+        if free.field == "E" and parts and parts <= set(free.positions):
+            yield name
+    own = set(np.flatnonzero(assembly.bushes.ids > 0).tolist())
+    if free.field == "K" and own and own <= set(free.bushes):
+        yield "bushes"
 
 
 def _bounds(parts: Sequence[Part], free: FreeParameter) -> tuple[float, float]:

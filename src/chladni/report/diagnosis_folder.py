@@ -14,6 +14,7 @@ from ..view.surface import surface
 from ..workflows.case_model import cords, markers
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Code, Section, Text
+from .calibration_blocks import calibration_json
 from .diagnosis_json import diagnosis_json
 from .figures import Shown, figures
 from .live_diagnosis import drawings, mac_of
@@ -43,6 +44,9 @@ def write_diagnosis(
     result = _with_states(folder, case, result, progress, home)
     files = _decks(folder, case, result, home)
     files |= {"report": "report.html", "diagnosis": "diagnosis.json"}
+    if result.study is not None:
+        files["calibration"] = "calibration.json"
+        write_json(folder / "calibration.json", calibration_json(result))
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)
@@ -85,7 +89,9 @@ def _decks(folder: Path, case: Case, result: DiagnosisResult, home: Path) -> dic
         return write_deck(case.deck, folder / name, changes, home).name
 
     if models.final.changes is not None:
-        found["deck"] = written("updated", models.final.changes)
+        found["deck"] = written(
+            "updated" if result.searched else "calibrated", models.final.changes
+        )
     if models.calibrated is not models.final and models.calibrated.changes is not None:
         found["calibrated"] = written("calibrated", models.calibrated.changes)
     return found

@@ -24,6 +24,7 @@ from ..updating.result import (
     Scores,
 )
 from ..workflows.diagnosis_result import Compared, DiagnosisResult, StateResult
+from .calibration_blocks import read_study, study_json
 from .level_blocks import level_json, read_levels
 from .screening_blocks import read_screening, screening_json
 from .typed_fields import wrong_field
@@ -69,6 +70,7 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
         "joints": [dict(vars(j)) for j in r.joints],
         "states": [{"state": s.name, **diagnosis_json(s.result)} for s in r.states],
         "shared": [_calibrated(c) for c in r.shared],
+        "study": study_json(r.study),
     }
 
 
@@ -166,6 +168,7 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
             StateResult(str(s.get("state", "")), from_json(s)) for s in d.get("states") or ()
         ),
         shared=_read_calibrated(d.get("shared")),
+        study=read_study(d.get("study")),
     )
 
 

@@ -1,12 +1,15 @@
 """A diagnosis in tables and pictures: the contents of its page."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..effects.estimate import Estimate, Location
+from ..updating.calibration_result import ParameterKnowledge
 from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Live, Picture, Section, Table, Text
+from .calibration_blocks import study_sections
 from .drawings import Drawing, Drawings
 from .level_blocks import level_section
 from .recording_scores import recording_scores
@@ -74,6 +77,7 @@ _FILES = {
     "calibrated": "the deck calibrated without the effect",
     "report": "this page",
     "diagnosis": "the result for other programs",
+    "calibration": "what could be known, basins, covariance and profiles for other programs",
     "frf": "test and model as arrays",
 }
 
@@ -162,7 +166,12 @@ def sections(
         Section("Findings", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),
         Section("Joints at each level", _joints(result)),
+<<<<<<< HEAD
         Section("Calibrated parameters", _calibrated(result)),
+=======
+        Section("What was calibrated", _calibrated(result)),
+        *study_sections(result.study),
+>>>>>>> calib
         Section("Test and model", shown("frf")),
         Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),
         Section("Frequencies", [*_frequencies(result), *shown("modes")]),
@@ -253,7 +262,7 @@ def _place(where: Location) -> list[tuple[str, str]]:
 
 def _calibrated(result: DiagnosisResult) -> list[Block]:
     """Tabulate the values that differ between the given and the updated deck."""
-    if not (result.calibrated and result.deck_changed):
+    if not (result.calibrated and (result.deck_changed or result.study)):
         return []
     rows = [
         (
@@ -265,8 +274,20 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
         )
         for c in result.calibrated
     ]
+    rows += [
+        (f.name, quantity(f.value, f.unit), f"frozen ({_range(f)} by its prior)", "–",
+         quantity(f.value, f.unit))
+        for f in (result.study.identifiability.parameters if result.study else ())
+        if f.frozen
+    ]  # fmt: skip
     heads = ("parameter", "deck", "found (95 % interval)", "change", "updated deck")
     return [Table(heads, rows, ("parameter",), _REACHED)]
+
+
+def _range(p: ParameterKnowledge) -> str:
+    """Both ends of the 95 % interval of a prior."""
+    low, high = (p.value * math.exp(z * p.prior_sd) for z in (-1.96, 1.96))
+    return f"{quantity(low, p.unit)} to {quantity(high, p.unit)}"
 
 
 _REACHED = (

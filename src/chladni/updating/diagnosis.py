@@ -128,20 +128,12 @@ class Diagnosis:
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence
 
 
-def diagnose(
-    problem: UpdatingProblem, progress: Progress = lambda text, share: None, effects: bool = True
-) -> Diagnosis:
-    """Name the missing physics, or say that none is missing; without ``effects``, calibrate.
-
-    A calibration alone is also begun from random values of the calibration parameters; the effects
-    bring starts of their own.
-    """
+def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: None) -> Diagnosis:
+    """Name the missing physics, or say that none is missing."""
     progress("calibration without new physics", 0.05)
     problem, null = without_effects(problem)
-    nominal = _base_fit(problem, problem.nuisance, _nominal_starts(problem))
-    if not effects:
-        return _calibrated(problem, nominal, null)
-    plain = _plain(problem, null)
+    nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
+    plain = fit_of_the_deck(problem, null)
     progress("scan of the catalogue", 0.2)
     tried = candidates(problem.begun_wide(), null)
     give_back_freed_memory()
@@ -149,7 +141,7 @@ def diagnose(
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=unasked(problem))
-    found = _called(problem, found)
+    found = named_by_fits(problem, found)
     whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
     found = _names_alone(problem, found, whole)
     del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
@@ -158,7 +150,7 @@ def diagnose(
     return _names_alone(problem, found, 1)
 
 
-def _called(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
+def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
     """The diagnosis by what was fitted alone: the leader, or calibration, is named and tested."""
     table = HypothesisTable(
         {NULL: row_of_null(found.null), **{t.effect.name: row_of(t) for t in found.hypotheses}},
@@ -239,7 +231,7 @@ def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, Hypothes
     identified = getattr(problem.data, "identified", None)
     for k in range(2 if identified is None else PASSES):
         problem = problem.allowing_errors(state, delta)
-        null = _base_fit(problem, problem.base, starts)
+        null = best_base_fit(problem, problem.base, starts)
         if not isinstance(null.data, Responses) or null.data.error is None:
             break
         before, delta = delta, null.data.error.delta
@@ -261,28 +253,7 @@ def threshold(data: object, tried: int | None = None) -> float:
     return gain_due(tried or len(families()), chance)
 
 
-def _calibrated(problem: UpdatingProblem, nominal: HypothesisFit, null: HypothesisFit) -> Diagnosis:
-    """The best of the usual and of random starts, and how many of them agree."""
-    tries = [_base_fit(problem, problem.base, [x]) for x in _random_starts(problem)]
-    best = min([null, *tries], key=lambda t: t.neg2_log_evidence)
-    agree = sum(t.neg2_log_evidence < best.neg2_log_evidence + 1 for t in [null, *tries])
-    note = (
-        f"{agree} of {len(tries) + 1} starts, {len(tries)} of them random, ended within 1 of the "
-        "best -2 ln evidence"
-    )
-    found = Diagnosis(nominal, best, _plain(problem, best), (), notes=(note,))
-    return _called(problem, found)
-
-
-def _random_starts(problem: UpdatingProblem, count: int = 4) -> list[np.ndarray]:
-    """Calibration parameters drawn from their prior, the rest at its mean (a fixed seed)."""
-    rng = np.random.default_rng(20250102)
-    own = [e.kind == "calibration" for e in problem.base for _ in e.parameters]
-    sd = np.array([p.sd for e in problem.base for p in e.parameters]) * own
-    return [problem.mean() + sd * rng.normal(size=len(sd)) for _ in range(count)]
-
-
-def _base_fit(
+def best_base_fit(
     problem: UpdatingProblem, effects: Sequence[Effect], starts: list[np.ndarray]
 ) -> HypothesisFit:
     """Best fit of these effects alone over several starts; one that is no structure is none."""
@@ -298,7 +269,7 @@ def _base_fit(
     return HypothesisFit(Effect(), min(fits, key=lambda f: f.neg2_log_evidence), model)
 
 
-def _plain(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
+def fit_of_the_deck(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
     """Calibration parameters alone, no scatter or modal discrepancy: same starts, and the null."""
     kept = [e.writable for e in problem.base]
     chosen = [e for e, k in zip(problem.base, kept, strict=True) if k]
@@ -306,10 +277,11 @@ def _plain(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
         [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]
     ).astype(bool)
     problem = problem.exactly()
-    return _base_fit(problem, chosen, [x[inside] for x in (*_null_starts(problem), null.fit.x)])
+    return best_base_fit(problem, chosen, [x[inside] for x in (*_null_starts(problem), null.fit.x)])
 
 
-def _nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:
+def nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:
+    """The prior mean of the nuisances."""
     return [np.array([p.mean for e in problem.nuisance for p in e.parameters])]
 
 
@@ -330,5 +302,5 @@ def _restarted(
     for lead in hypotheses[:2]:
         with suppress(ModelError):
             start = taken(problem, lead, ("calibration", "nuisance"))
-            tries.append(_base_fit(problem, problem.base, [start]))
+            tries.append(best_base_fit(problem, problem.base, [start]))
     return min(tries, key=lambda t: t.neg2_log_evidence)

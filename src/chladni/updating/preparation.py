@@ -16,6 +16,8 @@ from ..effects.effect_context import EffectContext, Setup
 from ..effects.model_families import joint_nuisances
 from ..effects.registry import family
 from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
+from ..effects.weld_patch import FIELD as WELD_PATCH
+from ..effects.weld_patch import weld_patch
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
@@ -297,8 +299,13 @@ def updating_problem(
     nuisance: list[Effect],
     f_max: float,
 ) -> UpdatingProblem:
-    """The updating problem of a diagnosis: calibration parameters and nuisances are free."""
-    base = [*freed_by(question, reduced, f_max), *nuisance]
+    """The updating problem of a diagnosis: calibration parameters and nuisances are free.
+
+    A family of joints that the user frees as a whole has no nuisance of its own beside it.
+    """
+    own = freed_by(question, reduced, f_max)
+    gone = {name for e in own for name in e.replaces}
+    base = [*own, *(e for e in nuisance if e.text not in gone)]
     return UpdatingProblem(
         reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
         setup_of(question, f_max), question.outputs.labels,
@@ -338,6 +345,8 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
     """
     if p.field in UNITS:
         return user_parameter(reduced.groups, p)
+    if p.field == WELD_PATCH:
+        return weld_patch(reduced.groups, p)
     placed = family(p.field).placed
     assert placed is not None
     setup = setup_of(question, f_max)

@@ -24,6 +24,9 @@ from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..sparse.freed_memory import give_back_freed_memory
 from ..updating.basis_refinement import Refinement, refined
+from ..updating.calibration import calibration
+from ..updating.calibration_result import CalibrationStudy
+from ..updating.compensation import compensating
 from ..updating.deciding import decided
 from ..updating.decision_in_words import concluded
 from ..updating.diagnosis import Diagnosis
@@ -44,7 +47,6 @@ from ..updating.result_parts import (
     agreement,
     alternatives,
     calibrated,
-    foretells_worse,
     laid_on_sheets,
     named_effects,
     otherwise,
@@ -78,6 +80,7 @@ class Explained:
     found: Diagnosis
     distrust: tuple[str, ...]
     screening: Screening | None = None
+    study: CalibrationStudy | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +92,7 @@ class Searched:
     prepared: Prepared
     found: Diagnosis
     screening: Screening | None
+    study: CalibrationStudy | None = None
 
     def refine(self, hypothesis: HypothesisFit) -> Refinement:
         """Fit a hypothesis again on a reduced model that can represent it."""
@@ -96,13 +100,15 @@ class Searched:
 
 
 def searched(
-    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None
-) -> Searched:
+    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
+    freeze: bool = True,
+) -> Searched:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
     Parameters
     ----------
     known : posterior of the shared parameters from other states
+    freeze : whether a calibration holds what the data do not know; states share one set
 
     Raises
     ------
@@ -132,20 +138,30 @@ def searched(
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
-    found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
-    return Searched(case, question, prepared, found, screening)
+    stage = within(progress, 0.1, 0.85)
+    if diagnosing:
+        return Searched(case, question, prepared, compared(prepared.problem, stage), screening)
+    made = calibration(prepared.problem, stage, freeze)
+    prepared = replace(prepared, problem=made.problem)
+    return Searched(case, question, prepared, made.diagnosis, screening, made.study)
 
 
 def explained(
-    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None
-) -> Explained:
+    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
+    freeze: bool = True,
+) -> Explained:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
-    made = searched(case, diagnosing, progress, known)
+    made = searched(case, diagnosing, progress, known, freeze)
     question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _judged(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
+<<<<<<< HEAD
         distrust = (*distrust, f"{screening.sentence}; a fit to it distorts the model")
     return Explained(case, question, prepared, found, distrust, screening)
+=======
+        distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
+    return Explained(case, question, prepared, found, distrust, screening, made.study)
+>>>>>>> calib
 
 
 def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
@@ -161,8 +177,11 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
         distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit))
+    study = known.study
     if not diagnosing:
-        distrust = (*distrust, *foretells_worse(result.agreement))
+        reasons = compensating(found.plain.fit, result, question.mass_measurement)
+        distrust = (*distrust, *reasons)
+        study = None if study is None else replace(study, compensating=reasons)
     if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen = known.screening
@@ -170,7 +189,10 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*distrust, *instead_of_effects(result.verdict, seen))
     said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
-    return replace(result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen)
+    return replace(
+        result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen,
+        study=study,
+    )  # fmt: skip
 
 
 def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:

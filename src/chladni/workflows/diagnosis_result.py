@@ -14,6 +14,7 @@ from ..ema.level_table import LevelTable
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
+from ..updating.calibration_result import CalibrationStudy
 from ..updating.level_effects import LinearJoint
 from ..updating.measured_modes import MeasuredModes
 from ..updating.residual_localisation import ResidualLocalisation
@@ -91,6 +92,7 @@ class DiagnosisResult:
     joints : K and GE that linear joints would have at each level, where friction may sit in them
     states : result of each state, if the object was measured in several; this is the first's
     shared : parameters common to the states, fitted to all of them together
+    study : what a calibration knows beside its values; None after a diagnosis
     """
 
     verdict: str = ""
@@ -117,6 +119,7 @@ class DiagnosisResult:
     joints: tuple[LinearJoint, ...] = ()
     states: tuple["StateResult", ...] = ()
     shared: tuple[CalibratedParameter, ...] = ()
+    study: CalibrationStudy | None = None
 
     @property
     def deck_changed(self) -> bool:

@@ -45,7 +45,8 @@ def _in_states(
     for k, name in enumerate(names):
         stage = within(progress, 0.8 * k / len(names), 0.8 * (k + 1) / len(names))
         known = _joint(every, [_lead(e.found) for e in every]).posterior() if every else None
-        every.append(explained(_one_state(case, names, name), diagnosing, stage, known))
+        state = _one_state(case, names, name)
+        every.append(explained(state, diagnosing, stage, known, freeze=False))
     joint = _joint(every, [_as_deck(e) for e in every])
     changed = any(e.found.verdict != "nothing missing" for e in every)
     every = [_with(e, fit, changed) for e, fit in zip(every, joint.fits, strict=True)]

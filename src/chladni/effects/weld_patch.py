@@ -1,0 +1,144 @@
+"""Weld patch: the sheet around welds has another modulus than the part, over a free radius.
+
+E of a shell is multiplied by e^{x q}, q = R²/s exp(-d²/2s), s = R² + v: a bell of radius R about
+the nearest weld at distance d, averaged over a shell of variance v = area/12.  q is smooth in R,
+also where R is smaller than a shell.  Shells are collected in rings of nearly equal q, which a deck
+holds as properties of their own.  The patch stands for nugget, heat-affected zone and the mesh of
+the joint (Echaniz Granado 2015, section 5.4: shells that touch weld solids get a material).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import ModelError
+from ..fem.assemble import Structure
+from ..fem.sparse_assembly import blocks, congruence
+from ..geometry.sampling import nearest_points
+from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from .effect import Effect, MatrixTerm, Parameter
+from .element_groups import ElementGroups
+from .joints import fasteners
+from .property_bands import in_bands
+from .stiffness_patch import softened
+
+FIELD = "weld-patch"
+SD_E, SD_R = 0.3, 0.4  # prior sd of ln of the factor on E and of ln R
+RINGS = 5  # of shells about the welds
+LEAST = 0.05  # of the bell's height: shells with less of it are outside
+
+
+@dataclass(frozen=True, eq=False)
+class WeldPatch(Effect):
+    """K + Σ_rings (e^{x q_j(R)} - 1) K_j, parameters x and ln R."""
+
+    name = "weld-patch"
+    claim = "the sheet around welds is stiffer or softer than the part"
+    kind = "calibration"
+    elastic = True
+
+    operators: tuple[sp.csr_array, ...] = ()
+    ring: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # of each shell, -1 outside
+    distance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of each ring [m]
+    variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of its shells [m²]
+    called: str = ""
+
+    def bell(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """q and ∂q/∂ln R of every ring."""
+        return bell(self.parameters[1].value(x[1]), self.distance, self.variance)
+
+    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """The operators of the rings times the change of their factor."""
+        q, dq = self.bell(x)
+        return tuple(
+            MatrixTerm("K", A, np.expm1(x[0] * a), np.exp(x[0] * a) * np.array([a, x[0] * b]))
+            for A, a, b in zip(self.operators, q, dq, strict=True)
+        )
+
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
+        """A φ of the patch as a whole, and of its innermost ring alone."""
+        q, _ = self.bell(x)
+        inner = self.operators[0] @ shapes
+        whole = sum(a * (A @ shapes) for a, A in zip(q, self.operators, strict=True))
+        return sp.csr_array(np.hstack([whole, inner]).T)
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """Give every ring of every part a property of its own."""
+        q, _ = self.bell(x)
+        logs = x[0] * q
+        return in_bands(assembly, self.ring + 1, lambda part, n: softened(part, logs[n - 1]))
+
+
+def bell(R: float, distance: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """q = R²/s exp(-d²/2s) with s = R² + v, and ∂q/∂ln R."""
+    s = R**2 + variance
+    q = R**2 / s * np.exp(-(distance**2) / (2 * s))
+    return q, q * (2 - 2 * R**2 / s + (distance * R / s) ** 2)
+
+
+def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
+    """Return the patch about all welds of the structure, or of the named parts.
+
+    Raises
+    ------
+    ModelError
+        If no shell of these parts touches a weld of solids.
+    """
+    built = groups.structure
+    assembly, shells = built.assembly, built.assembly.shells
+    welds = [j for j in fasteners(built) if j.kind == "solids"]
+    part = np.isin(shells.part, free.positions) if free.positions else np.ones(len(shells), bool)
+    held = assembly.rows(np.unique([g for j in welds for g in j.grids])) if welds else np.zeros(0)
+    touching = part & np.isin(shells.nodes, held).any(axis=1)
+    if not touching.any():
+        raise ModelError("the deck has no shells that touch welds of solids; leave weld-patch out")
+    part &= np.isin(shells.part, shells.part[touching])
+    area = groups_area(groups)
+    R = float(np.sqrt(area[touching].mean()) / 2)
+    middle = assembly.points[shells.nodes].mean(axis=1)
+    points = np.array([j.point for j in welds])
+    distance = np.linalg.norm(middle - points[nearest_points(points, middle)], axis=1)
+    wide = R * np.exp(2 * SD_R)
+    inside = part & (bell(wide, distance, area / 12)[0] > LEAST)
+    ring = _rings(inside, touching, distance)
+    count = range(ring.max() + 1)
+    unknown = (
+        Parameter("E", "of the deck's", 0.0, SD_E, step=0.3),
+        Parameter("R", "m", 0.0, SD_R, R, step=0.3),
+    )
+    names = tuple(assembly.parts[k].name for k in np.unique(shells.part[touching]))
+    mean = [np.average(np.stack([distance, area / 12])[:, ring == k], axis=1,
+                       weights=area[ring == k]) for k in count]  # fmt: skip
+    return WeldPatch(
+        unknown, f"the patch about {len(welds)} welds", names, called=free.name,
+        operators=tuple(_stiffness(built, groups, np.flatnonzero(ring == k)) for k in count),
+        ring=ring, distance=np.array([m[0] for m in mean]),
+        variance=np.array([m[1] for m in mean]),
+    )  # fmt: skip
+
+
+def groups_area(groups: ElementGroups) -> np.ndarray:
+    """Area of every shell [m²], from the diagonals of its quadrilateral."""
+    assembly = groups.structure.assembly
+    X = assembly.points[assembly.shells.nodes]
+    return np.asarray(np.linalg.norm(np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]), axis=1) / 2)
+
+
+def _rings(inside: np.ndarray, touching: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Ring of each shell: those that touch a weld first, the rest by distance; -1 outside."""
+    ring = np.where(touching, 0, -1)
+    rest = np.flatnonzero(inside & ~touching)
+    if len(rest):
+        edges = np.quantile(distance[rest], np.linspace(0, 1, RINGS)[1:-1])
+        ring[rest] = 1 + np.searchsorted(np.unique(edges), distance[rest])
+        _, ring[ring >= 0] = np.unique(ring[ring >= 0], return_inverse=True)
+    return ring
+
+
+def _stiffness(built: Structure, groups: ElementGroups, rows: Sequence[int]) -> sp.csr_array:
+    """Stiffness of some shells over the free dofs."""
+    matrices = groups.linear[rows] + groups.cubic[rows]
+    return congruence(built.T, blocks(matrices, groups.nodes[rows], len(built.assembly.points)))

@@ -1,0 +1,140 @@
+"""What a calibration knows beside its values: tables of the page, and ``calibration.json``."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
+from typing import Any, TypeVar, get_args, get_type_hints
+
+from ..updating.calibration_result import CalibrationStudy, Identifiability, ParameterKnowledge
+from ..workflows.diagnosis_result import DiagnosisResult
+from .blocks import Block, Items, Section, Table
+from .words import number, quantity
+
+Made = TypeVar("Made")
+_NONE = "–"
+_FAR = 1.0  # standard deviation of ln value from which a parameter counts as unbounded
+_KNOWN = (
+    "Standard deviations before the fit, at the deck's values. Single: all other parameters "
+    "known. All: every parameter free. Both from the data alone; mesh error, scatter, joints and "
+    "folds free. With priors: what the fit can reach. A parameter is frozen where the data tell "
+    "less than its prior; the intervals of the others count its prior."
+)
+_BASINS = (
+    "Fits from a Latin hypercube of {n} starts. Starts that end within 1 in -2 ln evidence and one "
+    "standard deviation of every parameter are one basin."
+)
+_PROFILE = (
+    "-2 ln profile likelihood above the best, all other parameters fitted again, at one and two "
+    "standard deviations. Beside it in brackets: what the interval of the table assumes."
+)
+
+
+def study_sections(study: CalibrationStudy | None) -> list[Section]:
+    """Sections of a calibration's page; none after a diagnosis."""
+    if study is None:
+        return []
+    return [
+        Section("What the data can know", _known(study.identifiability)),
+        Section("Basins of the fit", _basins(study)),
+        Section("How sure the values are", _profiles(study)),
+    ]
+
+
+def _known(found: Identifiability) -> list[Block]:
+    rows = [
+        (p.name, _percent(p.prior_sd), _percent(p.sd_single), _percent(p.sd_data),
+         _percent(p.sd_after), _verdict(p))
+        for p in found.parameters
+    ]  # fmt: skip
+    if not rows:
+        return []
+    heads = ("parameter", "prior", "single", "all", "with priors", "verdict")
+    index = _NONE if found.collinearity is None else number(found.collinearity, 3)
+    caption = f"{_KNOWN} Collinearity index: {index} (above 10 to 15 the set trades off)."
+    table = Table(heads, rows, ("parameter", "verdict"), caption)
+    texts = [p.why for p in found.parameters if p.why]
+    texts += [
+        f"the data do not tell {', '.join(f'{c:+.2f} % of {name}' for name, c in direction)} apart "
+        "from no change"
+        for direction in found.directions
+        if len(direction) > 1
+    ]
+    texts += [_along(p) for p in found.parameters if p.along]
+    return [table, *([Items(texts)] if texts else [])]
+
+
+def _verdict(p: ParameterKnowledge) -> str:
+    if p.frozen:
+        return "frozen"
+    if p.sd_after**2 > p.prior_sd**2 / 2:
+        return "its prior: not known at the deck's values"
+    return "known by the weighed mass" if p.why else "known"
+
+
+def _along(p: ParameterKnowledge) -> str:
+    """What the data know of a parameter along its range, in one sentence."""
+    points = ", ".join(f"{_percent(v.sd_data)} at {number(v.value, 3)}" for v in p.along)
+    return f"standard deviation of {p.name} from the data alone, all others known: {points}"
+
+
+def _percent(sd: float | None) -> str:
+    return _NONE if sd is None or sd > _FAR else f"{number(100 * sd, 2)} %"
+
+
+def _basins(study: CalibrationStudy) -> list[Block]:
+    if not study.basins:
+        return []
+    names = tuple(v.name for v in study.basins[0].values)
+    rows = [
+        (number(b.above, 3), str(b.starts), *(quantity(v.value, v.unit) for v in b.values))
+        for b in study.basins
+    ]
+    heads = ("-2 ln evidence above the best", "starts", *names)
+    return [Table(heads, rows, caption=_BASINS.format(n=study.starts))]
+
+
+def _profiles(study: CalibrationStudy) -> list[Block]:
+    rows = [
+        (p.name, *(f"{number(v, 3)} ({number(q, 3)}) at {quantity(at, p.unit)}" for at, v, q in
+                   zip(p.values, p.neg2_log_likelihood, p.quadratic, strict=True)))
+        for p in study.profiles
+    ]  # fmt: skip
+    heads = ("parameter", "-2 sd", "-1 sd", "+1 sd", "+2 sd")
+    return [Table(heads, rows, ("parameter",), _PROFILE)] if rows else []
+
+
+def calibration_json(result: DiagnosisResult) -> dict[str, Any]:
+    """The contents of ``calibration.json``: values of the parameters, and :func:`study_json`."""
+    values = [
+        {"where": c.where, **vars(c.estimate), "deck_value": c.deck_value,
+         "written_value": c.written_value}
+        for c in result.calibrated
+    ]  # fmt: skip
+    mass = None if result.mass is None else vars(result.mass)
+    return {"values": values, "mass": mass, **(study_json(result.study) or {})}
+
+
+def study_json(study: CalibrationStudy | None) -> dict[str, Any] | None:
+    """All that a calibration knows beside its values; None after a diagnosis."""
+    return None if study is None else asdict(study)
+
+
+def read_study(found: Mapping[str, Any] | None) -> CalibrationStudy | None:
+    """Return the study of :func:`study_json`; missing fields keep their defaults."""
+    return None if found is None else _made(CalibrationStudy, found)
+
+
+def _made(kind: type[Made], found: Mapping[str, Any]) -> Made:
+    hints = get_type_hints(kind)
+    return kind(**{name: _typed(hints[name], v) for name, v in found.items() if name in hints})
+
+
+def _typed(hint: Any, value: Any) -> Any:
+    """A value of JSON in the type of its field: lists become tuples, objects dataclasses."""
+    if is_dataclass(hint) and isinstance(value, Mapping):
+        return _made(hint, value)  # type: ignore[arg-type]
+    if not isinstance(value, list):
+        return value
+    inner = get_args(hint)
+    each = inner[:1] * len(value) if inner[-1:] == (Ellipsis,) else inner
+    pairs = zip(each, value, strict=False)
+    return tuple(_typed(h, v) for h, v in pairs) if each else tuple(value)

@@ -1,0 +1,136 @@
+"""Result of a calibration beyond its values: what could be known, where the fits ended, how sure.
+
+Every class is a part of ``calibration.json``.  Logarithms are natural: 0.06 is 6 %.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ValueAndSpread:
+    """Standard deviation of ln value from the data alone, at one value of a parameter.
+
+    ``sd_data`` is None where the data know nothing; ``known`` tells whether they know more than
+    the prior.
+    """
+
+    value: float
+    sd_data: float | None
+    known: bool
+
+
+@dataclass(frozen=True)
+class ParameterKnowledge:
+    """What the data can tell of one parameter, before any fit.
+
+    Attributes
+    ----------
+    value, unit : of the deck
+    prior_sd : of ln value
+    sd_single : from the data alone, if all other parameters were known; None: not at all
+    sd_data : from the data alone, all parameters free; None: not at all
+    sd_after : from data and priors, the frozen parameters held
+    frozen : whether it is held at its prior mean
+    why : reason why it is frozen, or what settles it
+    along : what the data know of it at other values
+    """
+
+    name: str
+    value: float
+    unit: str
+    prior_sd: float
+    sd_single: float | None
+    sd_data: float | None
+    sd_after: float
+    frozen: bool
+    why: str = ""
+    along: tuple[ValueAndSpread, ...] = ()
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """What the data can tell of all parameters, before any fit.
+
+    Attributes
+    ----------
+    correlation : (p, p)   of all parameters, with data and priors
+    collinearity : index of Brun, Reichert and Künsch (2001) of the data alone; None: infinite
+    directions : of which the data tell less than the priors, as (parameter, change in %)
+    weighed : whether a weighed mass was among the data
+    """
+
+    parameters: tuple[ParameterKnowledge, ...] = ()
+    correlation: tuple[tuple[float, ...], ...] = ()
+    collinearity: float | None = None
+    directions: tuple[tuple[tuple[str, float], ...], ...] = ()
+    weighed: bool = False
+
+    @property
+    def frozen(self) -> tuple[str, ...]:
+        """Names of the parameters that are held at their prior mean."""
+        return tuple(p.name for p in self.parameters if p.frozen)
+
+
+@dataclass(frozen=True)
+class NamedValue:
+    """A fitted parameter: physical value, and ln(value / deck's value) where it is a factor."""
+
+    name: str
+    value: float
+    unit: str
+    x: float
+
+
+@dataclass(frozen=True)
+class Basin:
+    """A place where fits from several starts ended.
+
+    Attributes
+    ----------
+    above : -2 ln evidence above the best basin
+    starts : number of starts that ended here
+    values : of the free parameters
+    """
+
+    above: float
+    starts: int
+    values: tuple[NamedValue, ...]
+
+
+@dataclass(frozen=True)
+class LikelihoodProfile:
+    """-2 ln of the profile likelihood of a parameter above its minimum.
+
+    Every other parameter is fitted again at each value.  ``quadratic`` is what the covariance
+    predicts: where both agree, the interval of the table holds.
+    """
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    neg2_log_likelihood: tuple[float, ...]
+    quadratic: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class CalibrationStudy:
+    """All that a calibration knows beside the fitted values.
+
+    Attributes
+    ----------
+    identifiability : before the fit
+    starts : number of starts of a Latin hypercube
+    basins : the ten best places where they ended, best first
+    names, mean, covariance : of the free parameters x after the fit, frozen ones at their priors
+    profiles : of the free parameters
+    compensating : reasons why the values stand for something else; empty where none does
+    """
+
+    identifiability: Identifiability = Identifiability()
+    starts: int = 0
+    basins: tuple[Basin, ...] = ()
+    names: tuple[str, ...] = ()
+    mean: tuple[float, ...] = ()
+    covariance: tuple[tuple[float, ...], ...] = ()
+    profiles: tuple[LikelihoodProfile, ...] = ()
+    compensating: tuple[str, ...] = ()
