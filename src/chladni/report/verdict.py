@@ -166,12 +166,8 @@ def sections(
         Section("Findings", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),
         Section("Joints at each level", _joints(result)),
-<<<<<<< HEAD
         Section("Calibrated parameters", _calibrated(result)),
-=======
-        Section("What was calibrated", _calibrated(result)),
         *study_sections(result.study),
->>>>>>> calib
         Section("Test and model", shown("frf")),
         Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),
         Section("Frequencies", [*_frequencies(result), *shown("modes")]),

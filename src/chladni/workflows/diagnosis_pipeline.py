@@ -155,13 +155,8 @@ def explained(
     question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _judged(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
-<<<<<<< HEAD
         distrust = (*distrust, f"{screening.sentence}; a fit to it distorts the model")
-    return Explained(case, question, prepared, found, distrust, screening)
-=======
-        distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, question, prepared, found, distrust, screening, made.study)
->>>>>>> calib
 
 
 def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
