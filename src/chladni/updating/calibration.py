@@ -34,8 +34,9 @@ from .diagnosis import (
 )
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted, wide_start
 from .identifiability import calibration_positions, identifiability, parameter_names
-from .likelihood import Poles, Responses
+from .likelihood import Responses
 from .map_fit import Fit, MassMeasurement, descend, fit, prior_residuals, unknowns
+from .pole_data import Poles
 from .reduced_model import evaluate
 
 STARTS = 12  # of the Latin hypercube
