@@ -211,10 +211,10 @@ def summary(every: list[list[Recovered]], masses: list[float]) -> list[str]:
         width = f"{np.median(widths):.2f}" if widths else "–"
         inside = sum(bool(r.inside) for r in known)
         out.append(f"{name:10} {len(known):5}  {inside:6}  {len(mine) - len(known):6}  {width}")
-    known = [r.inside for rows in every for r in rows if r.inside is not None]
-    share = sum(known) / max(len(known), 1)
+    held = [r.inside for rows in every for r in rows if r.inside is not None]
+    share = sum(held) / max(len(held), 1)
     out.append(
-        f"{sum(known)} of {len(known)} intervals of 95 % hold the truth ({share:.1%}); mass off by "
+        f"{sum(held)} of {len(held)} intervals of 95 % hold the truth ({share:.1%}); mass off by "
         f"{max(masses, default=np.nan):.2%} at most"
     )
     return out

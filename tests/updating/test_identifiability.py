@@ -13,8 +13,8 @@ from chladni.effects.user_parameters import user_parameter
 from chladni.model.free_parameter import FreeParameter
 from chladni.updating.hypothesis_fit import UpdatingProblem
 from chladni.updating.identifiability import collinearity, identifiability
-from chladni.updating.likelihood import Poles
 from chladni.updating.map_fit import MassMeasurement
+from chladni.updating.pole_data import Poles
 from chladni.updating.preparation import carrying
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem

@@ -7,7 +7,6 @@ holds as properties of their own.  The patch stands for nugget, heat-affected zo
 the joint (Echaniz Granado 2015, section 5.4: shells that touch weld solids get a material).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -138,7 +137,7 @@ def _rings(inside: np.ndarray, touching: np.ndarray, distance: np.ndarray) -> np
     return ring
 
 
-def _stiffness(built: Structure, groups: ElementGroups, rows: Sequence[int]) -> sp.csr_array:
+def _stiffness(built: Structure, groups: ElementGroups, rows: np.ndarray) -> sp.csr_array:
     """Stiffness of some shells over the free dofs."""
     matrices = groups.linear[rows] + groups.cubic[rows]
     return congruence(built.T, blocks(matrices, groups.nodes[rows], len(built.assembly.points)))

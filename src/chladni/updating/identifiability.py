@@ -17,8 +17,9 @@ import numpy as np
 from ..effects.effect import Effect
 from .calibration_result import Identifiability, ParameterKnowledge, ValueAndSpread
 from .hypothesis_fit import UpdatingProblem
-from .likelihood import Data, Poles
+from .likelihood import Data
 from .map_fit import MassMeasurement, unknowns
+from .pole_data import Poles
 from .reduced_model import State, evaluate, slices
 
 HALF = 0.5  # of the prior's variance: the data know less than the prior of what keeps more
