@@ -74,6 +74,7 @@ REFUSED = {
     "stars where a number was too wide": (
         file(function()).replace(b"  1.00000E+00", b"*" * 13, 1), r"dataset 1 .*\*{12}"),
     "not a number": (file(function(y=np.where(F == 13, np.nan, H))), "1 values are not numbers"),
+    "beyond measure": (file(function(y=np.where(F == 13, 1e280, H))), "1 values are not numbers"),
     "more values than it says": (file(function(count=6)), "7 values are there, it says it holds 6"),
     "fewer values than it says": (file(function(count=9)), "7 of 9 values .* truncated"),
     "no phase": (file(function(y=H.real)), "without phase"),

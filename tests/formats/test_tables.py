@@ -170,6 +170,7 @@ def test_faults_of_an_archive(tmp_path: Path, H: FRF) -> None:
     for change, said in (
         ({"outputs": np.array(["1:+Z"])}, r"labels and frequencies say \(20, 1, 2\)"),
         ({"values": np.where(np.arange(20)[:, None, None] == 3, np.nan, H.values)}, "not a number"),
+        ({"values": np.where(np.arange(20)[:, None, None] == 3, 1e280, H.values)}, "not a number"),
         ({"outputs": np.array([{}], dtype=object)}, "cannot be read"),
         ({"gain": np.ones(2)}, "unknown array gain"),
         ({"frequency_hz": np.ones(20)}, "frequencies must increase"),

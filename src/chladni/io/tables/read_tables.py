@@ -8,6 +8,7 @@ from typing import cast, get_args
 
 import numpy as np
 
+from ...arrays import measurable
 from ...dynamics.frf import FRF, Quantity
 from ...ema.response_correlations import of_responses
 from ...ema.setup import PoleTable, Recording
@@ -222,8 +223,8 @@ def _frf(
     **extra: np.ndarray,
 ) -> FRF:
     """An FRF whose complaints name the file."""
-    if not np.isfinite(values).all():
-        k, i, _ = (int(v[0]) for v in np.nonzero(~np.isfinite(values)))
+    if not (known := measurable(values)).all():
+        k, i, _ = (int(v[0]) for v in np.nonzero(~known))
         raise FileError(f"{name}: {tuple(outputs)[i]} is not a number at {frequency[k]:g} Hz")
     for role, labels in (("output", list(outputs)), ("input", list(inputs))):
         if twice := [label for label in dict.fromkeys(labels) if labels.count(label) > 1]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import measurable
 from ...dofs import label
 from ...ema.response_correlations import responses
 from ...ema.setup import Function, Recording, Shapes
@@ -236,8 +237,7 @@ def _complete(record: FunctionSet, where: str) -> FunctionSet:
     x, y = x[:due], y[:due]
     if due == 0:
         raise FileError(f"{where}: the record is empty (0 values)")
-    if not (np.isfinite(y).all() and np.isfinite(x).all()):
-        bad = np.flatnonzero(~(np.isfinite(y) & np.isfinite(x)))
+    if len(bad := np.flatnonzero(~(measurable(y) & measurable(x)))):
         raise FileError(f"{where}: {len(bad)} values are not numbers, the first in line {bad[0]}")
     return replace(record, x=x, y=y)
 
