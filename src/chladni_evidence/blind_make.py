@@ -119,7 +119,9 @@ def _made(name: str, order: Order, place: BlindFolder) -> bool:
 def made_of(order: Order, cache: Path | None = None) -> MadeCase:
     """The case of an order, made on one thread so that it is the same on every machine."""
     with one_blas_thread():
-        return made_case(order.bench(), order.kind, order.seed, order.mesh, cache, order.recorder)
+        return made_case(
+            order.bench(), order.kind, order.seed, order.mesh, cache, order.recorder, order.times
+        )
 
 
 def _why_not(place: BlindFolder, name: str) -> Path:

@@ -1,7 +1,7 @@
 """Cases of each set of evidence, and the seeds that tune or report."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from chladni.errors import LabelError, did_you_mean
@@ -18,7 +18,7 @@ from .bench_of_structure import (
 )
 from .benched_recording import PLAIN, Recorder
 from .hidden_kinds import CATALOGUED
-from .made_case import KINDS
+from .made_case import KINDS, UNSIZED
 from .package_kinds import package_kinds
 from .pair_kinds import HEMS, PAIRS
 
@@ -60,6 +60,7 @@ class Order:
     seed: int
     mesh: str
     recorder: Recorder = PLAIN
+    times: float | None = None  # size of the effect over scatter and mesh together; None: usual
 
     def bench(self) -> Bench:
         """The structure on the bench."""
@@ -100,6 +101,15 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     if name not in made:
         raise LabelError(f"no set {name!r}; there are {', '.join(SETS)}")
     return [order for seed in seeds for order in made[name](seed)]
+
+
+def of_sizes(chosen: Sequence[Order], times: Sequence[float]) -> list[Order]:
+    """Every order at each size; those whose effect has no size once, as they are."""
+    return [
+        replace(order, times=t)
+        for order in chosen
+        for t in ((None,) if order.kind in UNSIZED or not times else times)
+    ]
 
 
 def chosen(

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,7 @@ UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # kinds without a size
 TWICE = 2.0  # least change of responses by an effect, over that by scatter
 FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
 NOTHING = 0.02  # an effect that changes less is a bad draw [rms decades]
+NEAR_SIZE, FAR_SIZE, STEP = 0.1, 0.25, 5.0  # ln of a change: near enough, too far; growth a try
 GROWTH, TRIES, COARSE = 1.5, 5, 250  # the size is found on about COARSE lines of the band
 CHAIN = MeasurementChain(noise=0.01, floor=0.001)
 DAMPING_SPREAD = 0.3  # of ln ζ between modes
@@ -106,7 +107,7 @@ class _Rig:
 
 def made_case(
     bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None = None,
-    recorder: Recorder = PLAIN,
+    recorder: Recorder = PLAIN, times: float | None = None,
 ) -> MadeCase:  # fmt: skip
     """Measure an article of one of the bench's meshes, with part scatter and an effect.
 
@@ -119,6 +120,7 @@ def made_case(
     ----------
     recorder : "independent noise" on every line, or a test on the virtual bench; effects with a law
         of frequency of their own (rotors, foam, friction, lumps) always have the first
+    times : change by the effect over that by scatter and mesh together, which the size is set to
     """
     common = [seed, *bench.name.encode(), *mesh.encode()]
     rng, noise = np.random.default_rng(common), np.random.default_rng([*common, *kind.encode()])
@@ -135,8 +137,14 @@ def made_case(
     band = band[:: max(1, len(band) // COARSE)]
     own = rig.responses(Hidden(article, {}), band)[0]
     scatter = decades_apart(own, rig.responses(Hidden(plain, {}), band)[0])
+    floor = scatter
+    if times is not None:
+        of_deck = replace(rig, article=bench.deck)
+        floor = decades_apart(own, of_deck.responses(Hidden(bench.deck, {}), band)[0])
 
     def sized(name: str, own_seed: list[int]) -> tuple[Hidden, float, float]:
+        if times is not None and name not in UNSIZED:
+            return _of_change(rig, site, name, own_seed, own, times * floor, band)
         return _sized(rig, site, name, own_seed, own, scatter, band)
 
     if len(members(kind)) > 1:
@@ -163,6 +171,7 @@ def made_case(
         "solver": solver, **({} if tested is None else {"recorded_by": recorder}),
         **known, **_calibration_parameters(bench.deck, hidden.article),
         "moved_by_scatter_decades": scatter, "moved_by_effect_decades": effect,
+        **({} if times is None else {"times": times, "moved_by_scatter_and_mesh_decades": floor}),
         "scales": scales, "frequency_hz": modes.frequency[modes.frequency < 1.5 * bench.held[1]],
         "drive": bench.drive.labels[0], "mass_kg": weight,
         "unweighed_kg": hidden.unweighed,
@@ -226,6 +235,25 @@ def _sized(
         size *= GROWTH
     if kind not in UNSIZED and moved < NOTHING:
         raise ModelError(f"{kind} of size {size:.3g} moves {rig.bench.name} by {moved:.1e} decades")
+    return hidden, moved, size
+
+
+def _of_change(
+    rig: _Rig, site: Site, kind: str, seed: list[int], own: np.ndarray, due: float,
+    band: np.ndarray,
+) -> tuple[Hidden, float, float]:  # fmt: skip
+    """The effect of the size that changes the responses by ``due`` decades, within a tenth."""
+    size, tried, hide = 1.0, [], KINDS.get(kind) or package_kinds()[kind]
+    for _ in range(TRIES):
+        hidden = hide(site, np.random.default_rng(seed), size)
+        moved = decades_apart(hidden.spoil(rig.responses(hidden, band)[0]), own)
+        tried.append((abs(np.log(max(moved, 1e-12) / due)), hidden, moved, size))
+        if tried[-1][0] < NEAR_SIZE:
+            break
+        size *= float(np.clip(due / max(moved, 1e-12), 1 / STEP, STEP))
+    off, hidden, moved, size = min(tried, key=lambda one: one[0])
+    if off > FAR_SIZE:
+        raise ModelError(f"{kind} moves {rig.bench.name} by {moved:.3g} decades, not by {due:.3g}")
     return hidden, moved, size
 
 

@@ -74,6 +74,7 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
         },
         "p": (d.get("adequate") or {}).get("p"),
         "times_scatter": _times(truth),
+        "times": truth.get("times"),
         "seconds": answer.seconds,
         "gigabytes": answer.gigabytes,
         "said": answer.said if answer.code else "",

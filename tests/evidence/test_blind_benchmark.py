@@ -104,7 +104,7 @@ def test_some_of_a_set():
             chosen(*asked)
 
 
-@pytest.mark.parametrize("step", ["make", "run", "score"])
+@pytest.mark.parametrize("step", ["make", "run", "score", "power"])
 def test_every_step_explains_itself(step):
     done = call(step, "--help")
     assert done.exit_code == 0

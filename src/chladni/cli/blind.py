@@ -45,6 +45,12 @@ def make(
             "burst-random."
         ),
     ] = "independent noise",
+    sizes: Annotated[
+        str,
+        typer.Option(
+            help="Change by the effect, times scatter and mesh, as 0.5,1,2; default: one size."
+        ),
+    ] = "",
     workers: Workers = 1,
 ) -> None:
     """Make cases, seal their truths, publish the hashes.
@@ -54,10 +60,11 @@ def make(
     """
     from chladni_evidence.benched_recording import RECORDERS
     from chladni_evidence.blind_make import make
-    from chladni_evidence.evidence_sets import PURPOSES, chosen, seed_range
+    from chladni_evidence.evidence_sets import PURPOSES, chosen, of_sizes, seed_range
 
     by, why = _one_of("--recorder", recorder, RECORDERS), _one_of("--purpose", purpose, PURPOSES)
     asked = chosen(set_name, seed_range(seeds), _names(kinds), _names(structures))
+    asked = of_sizes(asked, _sizes(sizes))
     with _kept():
         make([replace(o, recorder=by) for o in asked], out, why, set_name, workers, say)
 
@@ -94,8 +101,21 @@ def score(
     score(outs, say)
 
 
+def power(
+    outs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="One or more folders.")],
+) -> None:
+    """Share of effects named over their size, and false alarms.
+
+    Each folder is a curve. Cases are made with `blind make --sizes`. Opens the truths, as score
+    does; writes power.json, power.txt and power.png into the first folder.
+    """
+    from chladni_evidence.blind_power import power
+
+    power(outs, say)
+
+
 HELP = "Conceal effects in structures, diagnose them blindly, score the answers."
-STEPS = (make, run, score)
+STEPS = (make, run, score, power)
 
 
 @contextmanager
@@ -116,6 +136,17 @@ def _one_of(option: str, word: str, known: tuple[Word, ...]) -> Word:
             f"no {option} {word!r}; {did_you_mean(word, known)}there are {', '.join(known)}"
         )
     return known[known.index(cast(Word, word))]
+
+
+def _sizes(text: str) -> list[float]:
+    """Sizes above zero."""
+    try:
+        found = [float(name) for name in _names(text)]
+    except ValueError:
+        found = [0.0]
+    if not all(0 < size < 100 for size in found):
+        raise LabelError(f"--sizes {text!r} is no list of numbers from 0 to 100; write 0.5,1,2")
+    return found
 
 
 def _names(text: str) -> list[str]:

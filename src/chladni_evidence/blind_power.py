@@ -1,0 +1,93 @@
+"""Power of a diagnosis: how often effects of each size are named, and how often none is made up."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from scipy.stats import beta
+
+from chladni.output import write_json, write_text
+from chladni.view.paper import LEGEND, TITLE, save
+
+from .blind_score import score
+from .outcome_row import NULLS, Row
+
+NAMED = ("right", "among")
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")  # Okabe and Ito 2008
+
+
+@dataclass(frozen=True)
+class Share:
+    """Share of some cases, with its interval of 90 % (Jeffreys).
+
+    Attributes
+    ----------
+    times : size of the effects over scatter and mesh together; 0 for cases without an effect
+    """
+
+    times: float
+    named: int
+    cases: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Ends of the interval; 0 or 1 where no or every case counts."""
+        k, n = self.named, self.cases
+        low = 0.0 if k == 0 else float(beta.ppf(0.05, k + 0.5, n - k + 0.5))
+        return low, 1.0 if k == n else float(beta.ppf(0.95, k + 0.5, n - k + 0.5))
+
+
+def shares(rows: Sequence[Row]) -> list[Share]:
+    """Share named right or among several, by size; first that of false alarms without an effect.
+
+    Cases whose size was not set belong to no share.
+    """
+    nulls = [r["outcome"] in ("wrong", "among") for r in rows if r["effect"] in NULLS]
+    out = [Share(0.0, sum(nulls), len(nulls))] if nulls else []
+    for times in sorted({r["times"] for r in rows if r["times"] is not None}):
+        named = [r["outcome"] in NAMED for r in rows if r["times"] == times]
+        out.append(Share(times, sum(named), len(named)))
+    return out
+
+
+def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[Share]]:
+    """Score folders one by one; write power.json, power.txt and power.png into the first.
+
+    Each folder is a curve, so that two versions of a diagnosis stand side by side.
+    """
+    found = {str(out): shares(score([out], lambda text: None)) for out in outs}
+    lines = [f"{'':24}{'size':>6}{'named':>7}{'of':>5}   90 % interval"]
+    for name, every in found.items():
+        for s in every:
+            size = f"{s.times:g}" if s.times else "none"
+            low, high = s.interval
+            lines.append(
+                f"{name[-22:]:24}{size:>6}{s.named:>7}{s.cases:>5}   {low:.0%} to {high:.0%}"
+            )
+    lines.append("size: change of the responses over that by scatter and mesh; none: false alarms")
+    write_json(outs[0] / "power.json", {n: [vars(s) for s in every] for n, every in found.items()})
+    write_text(outs[0] / "power.txt", "\n".join(lines) + "\n")
+    draw(outs[0] / "power.png", found)
+    for line in lines:
+        say(line)
+    return found
+
+
+def draw(path: Path, found: Mapping[str, Sequence[Share]]) -> Path:
+    """Draw the share named over the size of the effect, with intervals of 90 %."""
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    ax = figure.subplots()
+    for k, (name, every) in enumerate(found.items()):
+        x = [s.times for s in every]
+        y = [s.named / s.cases for s in every]
+        ends = [s.interval for s in every]
+        off = [[a - low for a, (low, _) in zip(y, ends, strict=True)],
+               [high - a for a, (_, high) in zip(y, ends, strict=True)]]  # fmt: skip
+        ax.errorbar(x, y, off, marker="o", capsize=3, color=COLOURS[k % 4], label=name)
+    ax.set_ylim(-0.03, 1.03)
+    ax.set_xlabel("size of the effect, times scatter and mesh (0: no effect, false alarms)")
+    ax.set_ylabel("share named")
+    ax.set_title("Power of the diagnosis", loc="left", **TITLE)
+    ax.legend(**LEGEND)
+    return save(figure, path)
