@@ -19,7 +19,8 @@ PACKAGES = {  # every package of ours and where its source is
     "chladni_envs": ROOT / "envs",
 }
 GROUND = {
-    "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "parallel"
+    "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "parallel",
+    "results"
 }  # fmt: skip
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
