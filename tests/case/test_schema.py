@@ -282,7 +282,7 @@ def test_no_cell_of_the_drive_is_dropped(folder: Path, as_it_stands: str, column
 
 
 def test_sections_know_their_words() -> None:
-    assert sections() == ("model", "test", "recording", "band", "held_out", "parameter")
+    assert sections() == ("model", "test", "recording", "band", "held_out", "search", "parameter")
     for section in sections():
         assert len(set(known(section))) == len(known(section))
     assert all(set(k.used) <= set(COMMANDS) and k.used for k in (*SCHEMA, *COLUMNS))

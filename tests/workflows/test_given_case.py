@@ -12,7 +12,7 @@ from chladni.case.schema import SCHEMA
 from chladni.errors import ChladniError
 from chladni.updating.preparation import prepare
 from chladni.workflows.given_case import given_case
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import question_of
 
 FILE_ALONE = {("model", "deck"), ("model", "outside"), ("test", "recordings")}
 
@@ -27,8 +27,8 @@ def arrays(value, at="") -> dict[str, np.ndarray]:
     return {k: v for n, x in held.items() for k, v in arrays(x, f"{at}/{n}").items()}
 
 
-def same_question(one, other):
-    a, b = arrays(question(one)), arrays(question(other))
+def same_question_of(one, other):
+    a, b = arrays(question_of(one)), arrays(question_of(other))
     assert a.keys() == b.keys()
     for name in a:
         np.testing.assert_array_equal(a[name], b[name], err_msg=name)
@@ -46,7 +46,7 @@ def test_arguments_ask_what_the_file_asks(case, folder):
         folder / "frf.npz",
         {"units": "SI", "damping": 0.01, "mass": case.setup.mass, "band": (20.0, 170.0)},
     )
-    same_question(case, asked)
+    same_question_of(case, asked)
     assert [n.replace(str(folder) + "/", "") for n in asked.notes] == list(case.notes)
 
 
@@ -85,9 +85,9 @@ def test_a_variant_is_diagnosed_against_its_own_deck(case, folder):
 
 
 def test_only_the_effects_asked_for_are_tried(case):
-    tried = prepare(question(replace(case, effects=("crack", "point-mass")))).problem.families
+    tried = prepare(question_of(replace(case, effects=("crack", "point-mass")))).problem.families
     assert {f.name for f in tried} == {"crack", "point-mass"}
-    assert len(prepare(question(case)).problem.families) > 20
+    assert len(prepare(question_of(case)).problem.families) > 20
 
 
 def test_repeated_words_are_dicts(folder):
