@@ -53,7 +53,7 @@ LIBRARIES = {
     "parallel": {"threadpoolctl"},
     "sparse": {"sksparse"},
     "geometry": {"pyvista", "trimesh"},
-    "io": {"meshio", "pyyeti", "pyuff", "trimesh", "xarray"},
+    "io": {"meshio", "pandas", "pyyeti", "pyuff", "trimesh", "xarray"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},

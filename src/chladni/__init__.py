@@ -19,6 +19,9 @@ arguments. The command of the same name takes the same road, so that numbers are
 
 Every result has ``summary()``, ``plot(name)`` and ``save(folder)``, and shows itself in a notebook.
 
+``chladni.exchange`` holds what goes to and comes from other packages: xarray, SDynPy, pyFBS,
+python-control, universal files, CSV, NPZ, ParaView.
+
 Data: ``Assembly`` (the structure), ``ModalModel``, ``FRF``; all in SI, frequencies in Hz, labels
 as ``412:+Z`` or ``412:n``. An input that is wrong raises a ``ChladniError`` of one sentence.
 """
@@ -31,8 +34,9 @@ from .dynamics.frf import synthesise as synthesise
 from .dynamics.modes import ModalModel as ModalModel
 from .io.nastran import read_deck as read_deck
 from .io.nastran import write_deck as write_deck
-from .io.labelled_arrays import from_xarray as from_xarray
-from .io.labelled_arrays import to_xarray as to_xarray
+from .io import exchange as exchange
+from .io.exchange import from_xarray as from_xarray
+from .io.exchange import to_xarray as to_xarray
 from .ema.correlation import mac as mac
 from .ema.frf_estimate import EstimateSettings as EstimateSettings
 from .ema.setup import PoleTable as PoleTable

@@ -12,8 +12,16 @@ from chladni.report.result_views import _PAGES
 from chladni.results import Result, _views
 from chladni.workflows.diagnosis_result import DiagnosisResult
 
+
+def with_own_modes(case):
+    """The model against the shapes it wrote itself."""
+    folder = chladni.modes(case, 12).save(case.path.parent / "own")
+    return chladni.other_modes(case, folder / "modes.unv")
+
+
 MADE = {  # (file of the result, a picture): call
     "modes": ("modes.json", "modes", lambda case: chladni.modes(case, 8)),
+    "other modes": ("correlation.json", "mac", lambda case: with_own_modes(case)),
     "frf": ("frf.npz", "", lambda case: chladni.frf(case)),
     "correlate": ("correlation.json", "mac", lambda case: chladni.correlate(case)),
     "identify": ("identified.json", "stabilisation", lambda case: chladni.identify(case)),

@@ -9,6 +9,8 @@ import numpy as np
 from ..case import Case
 from ..case.mended_recordings import with_frf
 from ..dynamics.frf import FRF, Quantity
+from ..dynamics.modes import ModalModel
+from ..dynamics.statespace import StateSpace
 from ..ema.coincident_poles import peak_notes
 from ..ema.finding import Screening, notes_of_all, which
 from ..ema.identification import Identified
@@ -16,10 +18,12 @@ from ..ema.identification import identify as identified
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import LevelStudy, level_study
 from ..ema.level_words import level_notes
+from ..ema.realisation import realised
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import ALIKE, RELEASE, responses, ringing
 from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
+from ..ema.shapes import modal_model
 from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
 from ..errors import AccuracyError, FileError
 from ..parallel import one_blas_thread
@@ -62,6 +66,28 @@ class RecordingModes:
     def firm(self) -> np.ndarray:
         """Among ``modes``, the ones known accurately enough to be reported as modes (r,) bool."""
         return firm(self.modes) & ~self.struck
+
+    @property
+    def modal(self) -> ModalModel:
+        """The ``firm`` modes, mass-normalised over the measured dofs, for MAC and synthesis.
+
+        Raises
+        ------
+        LabelError
+            If an output is no single component (412:n), or no point was both driven and measured.
+        """
+        return modal_model(self.modes.sel(self.firm))
+
+    @property
+    def state_space(self) -> StateSpace:
+        """A, B, C, D of all identified poles and the band's residual terms, outputs as recorded.
+
+        Raises
+        ------
+        LabelError
+            If the quantity has no state space: a transmissibility.
+        """
+        return realised(self.whole, self.whole.quantity)  # type: ignore[arg-type]
 
     @property
     def poles(self) -> PoleTable:

@@ -143,7 +143,7 @@ def other_modes(
         tuple((np.flatnonzero(elastic) + 1).tolist()), tuple((np.flatnonzero(near) + 1).tolist()),
         M, pair(f_model, f_other, M), _in_span(phi, psi, f_model, f_other),
         len(rows), int(held.sum()), shapes, _whole(model.assembly, rows),
-        (*model.notes, *_notes(model, read, rows, elastic)),
+        (*model.notes, *_notes(model, read, rows, elastic)), origin=model,
     )  # fmt: skip
 
 

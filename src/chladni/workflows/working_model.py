@@ -10,6 +10,7 @@ import numpy as np
 from ..case.free_parameters import fields_of
 from ..case.schema import FIELDS
 from ..dynamics.frf import FRF, Quantity
+from ..dynamics.statespace import StateSpace, state_space
 from ..effects.user_parameters import number, with_factor
 from ..errors import LabelError, ModelError
 from ..io.nastran import assembly, write_deck
@@ -60,6 +61,35 @@ class WorkingModel(Model):
         outputs, inputs = ((x,) if isinstance(x, str) else tuple(x) for x in (output, input))
         (found,) = frf(self, outputs, inputs, np.atleast_1d(frequency), damping).frfs
         return found if found.quantity == "transmissibility" else found.to(quantity)
+
+    def state_space(
+        self,
+        output: str | Sequence[str],
+        input: str | Sequence[str],
+        modes: int = 20,
+        damping: float = 0.01,
+        quantity: Quantity = "receptance",
+    ) -> StateSpace:
+        """x' = A x + B u, y = C x + D u of the lowest modes; higher modes are left out.
+
+        Parameters
+        ----------
+        output, input : labels as ``55:+Z`` or ``55:n``; forces u [N]
+        modes : how many; two states each
+        damping : ratio of every mode
+        quantity : of y, receptance [m], mobility [m/s] or accelerance [m/s²]
+
+        Raises
+        ------
+        LabelError
+            If the model has no such grid, or the quantity has no state space.
+        """
+        outputs, inputs = ((x,) if isinstance(x, str) else tuple(x) for x in (output, input))
+        modal = self.normal_modes(modes).with_damping(damping)
+        phi_out, phi_in = (self.directions(side) @ modal.shapes for side in (outputs, inputs))
+        return state_space(
+            modal, phi_out, phi_in, outputs=outputs, inputs=inputs, quantity=quantity
+        )
 
     def show(self, mode: int) -> DrawnPicture:
         """The shape of a mode, drawn."""
