@@ -34,9 +34,9 @@ from .dynamics.frf import synthesise as synthesise
 from .dynamics.modes import ModalModel as ModalModel
 from .io.nastran import read_deck as read_deck
 from .io.nastran import write_deck as write_deck
-from .io import exchange as exchange
-from .io.exchange import from_xarray as from_xarray
-from .io.exchange import to_xarray as to_xarray
+from .io import other_packages as exchange
+from .io.other_packages import from_xarray as from_xarray
+from .io.other_packages import to_xarray as to_xarray
 from .ema.correlation import mac as mac
 from .ema.frf_estimate import EstimateSettings as EstimateSettings
 from .ema.setup import PoleTable as PoleTable
@@ -92,6 +92,7 @@ __all__ = [
     "correlate",
     "diagnose",
     "evaluate_recordings",
+    "exchange",
     "frf",
     "from_xarray",
     "identify",
