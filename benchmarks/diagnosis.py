@@ -68,7 +68,7 @@ def main():
     if asked.profile:
         profile.enable()
     case = load_case(asked.case)
-    found = diagnose(case, stages)
+    found = diagnose(case, progress=stages)
     with TemporaryDirectory() as folder:
         write_diagnosis(Path(folder), case, found, "", stages)
     stages("the end")

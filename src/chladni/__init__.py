@@ -2,34 +2,51 @@
 
 The names a script starts from; everything else is one import further down.
 
-A model alone: ``load(deck, units)`` has ``.modes(count)``, ``.frf(output, input, frequency)``,
-``.show(mode)``, ``.variant(t=0.8e-3)`` and ``.write(path)``.
+A diagnosis in three lines::
 
-A model and a recording: ``load_case(folder)`` goes into ``check``, ``correlate``, ``calibrate``,
-``diagnose``, ``plan``, ``frf``, ``modes`` and ``study``, one function for each command.
-``identify`` and ``evaluate_recordings`` need a recording alone (``load_recordings``).
+    found = chladni.diagnose("deck.bdf", "test.uff", units="mm-t-s", mass=2.1)
+    print(found.summary())
+    found.save("runs/first")
+
+``diagnose``, ``calibrate``, ``correlate`` and ``check`` take a deck with its recordings, or a
+case (a folder, or what ``load_case`` returns). A recording is a path, an ``FRF`` of arrays whose
+channels are placed by ``Sensor``, a ``PoleTable`` or a ``Recording``. ``CaseWords`` lists the other
+arguments. The command of the same name takes the same road, so that numbers are equal.
+
+``modes``, ``frf``, ``plan`` and ``study`` need a model alone, ``identify`` and
+``evaluate_recordings`` a recording alone. ``load`` gives a model with ``.modes(count)``,
+``.frf(output, input, frequency)``, ``.show(mode)``, ``.variant(t=0.8e-3)`` and ``.write(path)``.
+
+Every result has ``summary()``, ``plot(name)`` and ``save(folder)``, and shows itself in a notebook.
+
+``chladni.exchange`` holds what goes to and comes from other packages: xarray, SDynPy, pyFBS,
+python-control, universal files, CSV, NPZ, ParaView.
 
 Data: ``Assembly`` (the structure), ``ModalModel``, ``FRF``; all in SI, frequencies in Hz, labels
-as ``412:+Z`` or ``412:n``. Decks come in by ``read_deck`` and go out changed by ``write_deck``,
-an ``FRF`` to and from xarray by ``to_xarray`` and ``from_xarray``.
-What is wrong with an input is told by a ``chladni.errors.ChladniError`` in one sentence.
+as ``412:+Z`` or ``412:n``. An input that is wrong raises a ``ChladniError`` of one sentence.
 """
 
 from . import address_space as address_space  # first: NumPy does not start below its limit
+from .errors import ChladniError as ChladniError
 from .model.assembly import Assembly as Assembly
-from .dynamics.eigen import normal_modes as normal_modes
 from .dynamics.frf import FRF as FRF
 from .dynamics.frf import synthesise as synthesise
 from .dynamics.modes import ModalModel as ModalModel
 from .io.nastran import read_deck as read_deck
 from .io.nastran import write_deck as write_deck
-from .io.labelled_arrays import from_xarray as from_xarray
-from .io.labelled_arrays import to_xarray as to_xarray
-from .fem.assemble import structure as structure
+from .io import other_packages as exchange
+from .io.other_packages import from_xarray as from_xarray
+from .io.other_packages import to_xarray as to_xarray
 from .ema.correlation import mac as mac
-from .planning import effective_independence as effective_independence
+from .ema.frf_estimate import EstimateSettings as EstimateSettings
+from .ema.setup import PoleTable as PoleTable
+from .ema.setup import Recording as Recording
+from .ema.setup import Sensor as Sensor
+from .planning import PlanSettings as PlanSettings
+from .case import Case as Case
 from .case import load_case as load_case
-from .workflows.loaded_model import load_model as load_model
+from .case.make_case import CaseWords as CaseWords
+from .case.make_case import make_case as make_case
 from .workflows.working_model import WorkingModel as WorkingModel
 from .workflows.working_model import load as load
 from .workflows.recordings_of import load_recordings as load_recordings
@@ -38,44 +55,58 @@ from .workflows.modes import modes as modes
 from .workflows.frf import frf as frf
 from .workflows.case_check import check as check
 from .workflows.plan import plan as plan
+from .workflows.virtual_test import BenchSettings as BenchSettings
 from .workflows.virtual_test import virtual_test as virtual_test
 from .workflows.evaluation import evaluate_recordings as evaluate_recordings
+from .workflows.identify import PoleChoice as PoleChoice
 from .workflows.identify import identify as identify
 from .workflows.correlate import correlate as correlate
 from .workflows.other_modes import other_modes as other_modes
 from .workflows.calibrate import calibrate as calibrate
 from .workflows.diagnose import diagnose as diagnose
+from .studies.study_settings import StudySettings as StudySettings
 from .studies.parameter_study import study as study
-from .report.notebook import shown_in_notebooks as _shown_in_notebooks
+from .report.diagnosis_json import read_diagnosis as read_diagnosis
+from .report.result_views import show_results as _show_results
 
-_shown_in_notebooks()
+_show_results()
 
 __all__ = [
     "FRF",
     "Assembly",
+    "BenchSettings",
+    "Case",
+    "CaseWords",
+    "ChladniError",
+    "EstimateSettings",
     "ModalModel",
+    "PlanSettings",
+    "PoleChoice",
+    "PoleTable",
+    "Recording",
+    "Sensor",
+    "StudySettings",
     "WorkingModel",
     "calibrate",
     "check",
     "correlate",
     "diagnose",
-    "effective_independence",
     "evaluate_recordings",
+    "exchange",
     "frf",
     "from_xarray",
     "identify",
     "load",
     "load_case",
-    "load_model",
     "load_recordings",
     "mac",
+    "make_case",
     "map_formed",
     "modes",
-    "normal_modes",
     "other_modes",
     "plan",
     "read_deck",
-    "structure",
+    "read_diagnosis",
     "study",
     "synthesise",
     "to_xarray",

@@ -302,7 +302,7 @@ def _write_scans(folder: Path) -> None:
 
 def _punched(model: Model) -> str:
     """Eight modes as Nastran punches them, components 1 to 3."""
-    modal = model.modes(8)
+    modal = model.normal_modes(8)
     motion = model.motion(modal.shapes)
     lines = []
     for k, f in enumerate(modal.frequency):

@@ -68,6 +68,8 @@ exclude = [[20.0, 21.0]]
 [held_out]
 sensors = ["16:+Z"]
 band = [50.0, 60.0]
+[search]
+effects = ["point-mass"]
 [[parameter]]
 name = "E of the sheet"
 parts = ["sheet"]
@@ -118,6 +120,7 @@ OTHER = {  # another accepted value of every word
     ("band", "exclude"): "[[20.0, 22.0]]",
     ("held_out", "sensors"): "1",
     ("held_out", "band"): "[48.0, 60.0]",
+    ("search", "effects"): '["point-mass", "crack"]',
     ("parameter", "name"): '"stiffness"',
     ("parameter", "parts"): '["CELAS2 99"]',
     ("parameter", "field"): '"nu"',
@@ -229,7 +232,8 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
     for effect in problem.base:
         if effect.kind == "calibration" or effect.name == "gain":
             mark.update(effect_bytes(effect))
-    known = (problem.mass_measurement, problem.setup.hangers, problem.setup.sensors)
+    tried = [family.name for family in problem.families]
+    known = (problem.mass_measurement, problem.setup.hangers, problem.setup.sensors, tried)
     mark.update(repr(known).encode())
     mark.update(repr((ready.held.tolist(), ready.what, ready.notes)).encode())
     mark.update(repr([case.said(c) for c in COMMANDS]).encode())
@@ -278,7 +282,7 @@ def test_no_cell_of_the_drive_is_dropped(folder: Path, as_it_stands: str, column
 
 
 def test_sections_know_their_words() -> None:
-    assert sections() == ("model", "test", "recording", "band", "held_out", "parameter")
+    assert sections() == ("model", "test", "recording", "band", "held_out", "search", "parameter")
     for section in sections():
         assert len(set(known(section))) == len(known(section))
     assert all(set(k.used) <= set(COMMANDS) and k.used for k in (*SCHEMA, *COLUMNS))

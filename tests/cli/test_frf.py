@@ -178,7 +178,7 @@ def test_shapes_as_a_universal_file(deck, tmp_path):
     done = call("modes", deck, "--count", 9, "--units", "SI", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     read = read_uff(tmp_path / "out/modes.unv")
-    model = chladni.load_model(deck, "SI")
+    model = chladni.load(deck, "SI")
     modal = model.modes(9)
     motion = model.motion(modal.shapes)
     np.testing.assert_allclose(read.shapes.frequency[6:], modal.frequency[6:], rtol=1e-5)

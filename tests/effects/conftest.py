@@ -1,6 +1,7 @@
 """Packages that add effects, installed for a test as pip would: a folder and its entry points."""
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from chladni.effects import registry
+from chladni.effects.family import Family
 from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import Assembly, RigidBody
 from chladni.model.properties import Isotropic
@@ -42,18 +44,29 @@ def installed(tmp_path, monkeypatch):
     registry._installed.cache_clear()
 
 
-@pytest.fixture(scope="module")
-def example_edge_mass(tmp_path_factory):
-    """The example package, installed: its one file and one entry point."""
+def example(name: str, module: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Family]:
+    """An example package, installed: its one file and one entry point."""
     folder = tmp_path_factory.mktemp("site")
-    write_package(folder, "example-edge-mass", {"edge-mass": "edge_mass:FAMILY"})
+    write_package(folder, f"example-{name}", {name: f"{module}:FAMILY"})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
-        patch.syspath_prepend(str(Path(__file__).parent / "example_edge_mass"))
+        patch.syspath_prepend(str(Path(__file__).parent / f"example_{module}"))
         registry._installed.cache_clear()
-        yield registry.family("edge-mass")
+        yield registry.family(name)
     registry._installed.cache_clear()
-    sys.modules.pop("edge_mass", None)
+    sys.modules.pop(module, None)
+
+
+@pytest.fixture(scope="module")
+def example_edge_mass(tmp_path_factory):
+    """A mass along an edge."""
+    yield from example("edge-mass", "edge_mass", tmp_path_factory)
+
+
+@pytest.fixture(scope="module")
+def example_stringer(tmp_path_factory):
+    """Beams across a sheet."""
+    yield from example("stringer", "stringer", tmp_path_factory)
 
 
 JOINTED_TOP = 300.0  # Hz; six flexible modes of the two plates lie below

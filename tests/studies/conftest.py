@@ -21,7 +21,7 @@ def deck(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def model(deck):
-    return chladni.load_model(deck, "SI")
+    return chladni.load(deck, "SI")
 
 
 @pytest.fixture(scope="session")

@@ -120,7 +120,7 @@ def test_a_mode_is_followed_past_another():
 def test_modes_that_may_mix_are_not_lost(tmp_path):
     """A square plate has pairs of equal frequency, whose shapes turn freely from run to run."""
     write_assembly(plate(0.3, 0.3, 6, 6, 1e-3), tmp_path / "square.bdf")
-    made = chladni.load_model(tmp_path / "square.bdf", "SI")
+    made = chladni.load(tmp_path / "square.bdf", "SI")
     found = chladni.study(made, ["E=50%:150%"], StudySettings(samples=5, modes=9))
     for k in range(1, 10):
         assert found.column(f"mac{k}").min() > 0.99
@@ -191,7 +191,7 @@ ENDDATA
 def mm(tmp_path_factory):
     path = tmp_path_factory.mktemp("mm") / "mm.bdf"
     path.write_text(MM)
-    return chladni.load_model(path, "mm-t-s")
+    return chladni.load(path, "mm-t-s")
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def folder(deck, tmp_path_factory):
     """The plate recorded with a modulus 5 % above the deck's."""
     folder = tmp_path_factory.mktemp("case")
     (folder / "plate.bdf").write_bytes(deck.read_bytes())
-    model = chladni.load_model(deck, "SI")
+    model = chladni.load(deck, "SI")
     parts = model.assembly.parts
     stiffer = model.assembly.with_parts(
         tuple(

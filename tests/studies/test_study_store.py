@@ -96,9 +96,9 @@ def test_another_deck_is_another_study(deck, tmp_path):
     text = deck.read_text()
     assert "2.1+11" in text or "2.1E" in text
     thicker.write_text(text)
-    first = chladni.load_model(thicker, "SI")
+    first = chladni.load(thicker, "SI")
     chladni.study(first, THREE, SETTINGS, out=tmp_path / "out")
-    same = chladni.load_model(deck, "SI")  # the same structure under another name
+    same = chladni.load(deck, "SI")  # the same structure under another name
     assert chladni.study(same, THREE, SETTINGS, out=tmp_path / "out").kept == 12
     made = first.assembly
     parts = tuple(p.with_section(nonstructural=0.1) for p in made.parts)

@@ -140,7 +140,7 @@ def test_plain_numbers_are_those_of_the_cards_where_a_deck_counts_masses_its_own
     heavy = tmp_path / "heavy.bdf"
     text = deck.read_text()
     heavy.write_text(text.replace("BEGIN BULK\n", "BEGIN BULK\nPARAM,WTMASS,2.59-3\n"))
-    model = chladni.load_model(heavy, "SI")
+    model = chladni.load(heavy, "SI")
     (rho,) = model.assembly.parts
     own = rho.section.membrane.rho / 2.59e-3  # as the card has it
     vary = (f"rho={0.9 * own:g}:{1.1 * own:g}", "point-mass at 8=1:3")

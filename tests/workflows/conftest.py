@@ -35,7 +35,7 @@ def write_case(folder, shells, sensors, frequency, top):
     deck, corner = plate(0.3, 0.22, shells, shells, 1e-3), (shells + 1) ** 2
     write_assembly(deck, folder / "plate.bdf")
     write_assembly(with_masses(deck, (corner,), 0.02), folder / "article.bdf")
-    article = chladni.load_model(folder / "article.bdf", "SI")
+    article = chladni.load(folder / "article.bdf", "SI")
     made = chladni.frf(article, [f"{g}:+Z" for g in sensors], ["2:+Z"], frequency).frfs[0]
     write_npz(folder / "frf.npz", made.to("accelerance"))
     mass = round(chladni.modes(article, 7).mass, 5)

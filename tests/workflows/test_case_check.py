@@ -162,7 +162,7 @@ def along_x(folder, tmp_path_factory):
     """Nine sensors that measured along Z; their table says X."""
     place = tmp_path_factory.mktemp("axes")
     shutil.copy(folder / "plate.bdf", place)
-    article = chladni.load_model(folder / "article.bdf", "SI")
+    article = chladni.load(folder / "article.bdf", "SI")
     ends = [f"{g}:+Z" for g in (2, 4, 7, 18, 24, 30, 36, 43, 47)]
     made = chladni.frf(article, ends, ["2:+Z"], np.linspace(15, 250, 1200)).frfs[0]
     write_npz(place / "frf.npz", made.to("accelerance"))

@@ -38,7 +38,7 @@ def deck(structure, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def frf(deck):
-    model = chladni.load_model(deck, "SI")
+    model = chladni.load(deck, "SI")
     found = chladni.frf(model, ENDS, ["1:+Z"], np.linspace(15, 100, 120)).frfs[0]
     return found.to("accelerance")
 

@@ -188,7 +188,7 @@ def test_sensors_that_are_heavy_in_earnest_are_no_mistake(sound, tmp_path):
     grid, kg = 24, 0.03
     heavy = replace(sound, sensor_masses=((grid, kg),))
     write_assembly(with_masses(sound.assembly, (grid,), kg), tmp_path / "article.bdf")
-    article = chladni.load_model(tmp_path / "article.bdf", "SI")
+    article = chladni.load(tmp_path / "article.bdf", "SI")
     frf = chladni.frf(article, list(sound.outputs.labels), ["2:+Z"], sound.frfs[0].frequency)
     heavy = with_frf(heavy, values=frf.frfs[0].to("accelerance").values)
     assert not [f for f in chladni.check(heavy).findings if "sensors weigh" in f.text]

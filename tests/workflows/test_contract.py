@@ -121,7 +121,7 @@ def test_arrays_of_frf_are_the_result_of_its_function(case, folder, tmp_path):
 
 def test_progress_is_a_callback_that_only_rises(case):
     told = []
-    chladni.correlate(case, lambda what, share: told.append((what, share)))
+    chladni.correlate(case, progress=lambda what, share: told.append((what, share)))
     shares = [share for _, share in told]
     assert shares == sorted(shares)
     assert all(what and 0 <= share <= 1 for what, share in told)

@@ -54,7 +54,7 @@ def a_case(folder, article, seed):
     folder.mkdir(exist_ok=True)
     write_assembly(clamped(), folder / "plate.bdf")
     write_assembly(article, folder / "article.bdf")
-    model = chladni.load_model(folder / "article.bdf", "SI")
+    model = chladni.load(folder / "article.bdf", "SI")
     ends = [f"{g}:+Z" for g in at(article, SENSORS)]
     T = chladni.frf(model, ends, ["base:+Z"], np.linspace(12, 480, 1200)).frfs[0]
     noise = np.random.default_rng(seed).normal(size=(2, *T.values.shape))

@@ -52,7 +52,7 @@ def sprung(folder, name, k):
     springs = [f"CELAS2,{900 + g},{k},{g},3\n" for g in (1, 7, 43, 49)]
     text = (folder / name).read_text().replace("ENDDATA", f"{''.join(springs)}ENDDATA")
     (folder / name).write_text(text)
-    return modelled(chladni.load_model(folder / name, "SI").assembly, 400.0)
+    return modelled(chladni.load(folder / name, "SI").assembly, 400.0)
 
 
 def recorded(folder, level, joint, seed):

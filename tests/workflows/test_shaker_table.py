@@ -40,7 +40,7 @@ def case(tmp_path_factory):
     write_assembly(made, folder / "plate.bdf")
     away = np.linalg.norm(made.points[None, :, :2] - np.array(PLACES)[:, None], axis=2)
     labels = [f"{made.ids[k]}:+Z" for k in away.argmin(axis=1)]
-    model = chladni.load_model(folder / "plate.bdf", "SI")
+    model = chladni.load(folder / "plate.bdf", "SI")
     frf = chladni.frf(model, labels, ["base:+Z"], np.linspace(*BAND, 400)).frfs[0]
     write_npz(folder / "once.npz", frf)
     (folder / "case.toml").write_text(

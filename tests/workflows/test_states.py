@@ -46,7 +46,7 @@ def record(path, t=T, mass=0.0, shakers=SHAKERS[:1], seed=0):
     if mass:
         article = with_masses(article, at(article, [PLACE]), mass)
     write_assembly(article, path.with_suffix(".bdf"))
-    model = chladni.load_model(path.with_suffix(".bdf"), "SI")
+    model = chladni.load(path.with_suffix(".bdf"), "SI")
     ends, drives = (list(labels(article, p)) for p in (SENSORS, shakers))
     H = chladni.frf(model, ends, drives, np.linspace(15, 230, 900)).frfs[0].to("accelerance")
     z = np.random.default_rng(seed).normal(size=(2, *H.values.shape))
@@ -156,7 +156,7 @@ def test_states_of_a_table_of_poles_share_their_parameters(tmp_path):
 
 def _article(folder):
     write_assembly(plate(0.3, 0.22, 12, 12, T), folder / "article.bdf")
-    return chladni.load_model(folder / "article.bdf", "SI")
+    return chladni.load(folder / "article.bdf", "SI")
 
 
 def test_two_shakers_an_article_and_a_level(tmp_path):

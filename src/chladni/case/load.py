@@ -5,7 +5,7 @@ shell, bands are compared with the data. What does not fit is refused in one sen
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
@@ -14,7 +14,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
-from ..errors import ChladniError, FileError, LabelError, did_you_mean, named
+from ..errors import ChladniError, FileError, did_you_mean, named
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
@@ -24,6 +24,7 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
 from ..units import HERTZ, UNITS, Units
+from .bands import bands, held_out, searched_effects
 from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
 from .mended_recordings import mended, read_as, record_length, with_frf
@@ -61,6 +62,7 @@ class Case:
     given : (section, key)    every word the file holds
     keys : KeyFile            the same with what they say
     sensor_masses : (grid, kg) pairs of known mass: on the article while it was measured
+    effects : names           that a diagnosis tries; empty: all
     """
 
     path: Path
@@ -83,6 +85,7 @@ class Case:
     given: tuple[tuple[str, str], ...] = ()
     keys: KeyFile = field(default_factory=lambda: KeyFile(Path(), {}))
     sensor_masses: tuple[tuple[int, float], ...] = ()
+    effects: tuple[str, ...] = ()
 
     @property
     def frfs(self) -> tuple[FRF, ...]:
@@ -129,35 +132,72 @@ def load_case(path: str | Path) -> Case:
     if not path.exists():
         raise FileError(f"no file or folder {path}")
     path = path / "case.toml" if path.is_dir() else path
-    keys = read_keys(path, sections())
+    return resolved(path, read_keys(path, sections()))
+
+
+@dataclass(frozen=True, eq=False)
+class InMemory:
+    """Parts of a case that a program holds already, in place of the files that it would name.
+
+    Attributes
+    ----------
+    deck : the deck, and ``assembly`` the structure where it differs from the deck's
+    recordings : by the names under which the keys list them
+    sensors : the table of sensors
+    anywhere : whether files may lie anywhere, as where a program names them
+    """
+
+    deck: Deck | None = None
+    assembly: Assembly | None = None
+    recordings: Mapping[str, tuple[Recording, ...]] = field(default_factory=dict)
+    sensors: tuple[Sensor, ...] | None = None
+    anywhere: bool = False
+
+
+def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
+    """Read what the keys of a case name, and resolve it.
+
+    Parameters
+    ----------
+    path : of the case, as messages name it
+    held : what need not be read
+
+    Raises
+    ------
+    FileError, LabelError, ModelError
+        One sentence naming file, line, offender and alternatives.
+    """
     model, test = (
         keys.section("model", known("model"), due=True),
         keys.section("test", known("test")),
     )
     units = UNITS[model.text("units", due=True, among=key("model", "units").choices) or "SI"]
-    outside = model.flag("outside")
+    outside = model.flag("outside") or held.anywhere
     allow = model.list("allow", str) or []
-    deck = read_deck(_file(model, "deck", str(model.text("deck", due=True)), outside), allow)
+    deck = held.deck
+    if deck is None:
+        deck = read_deck(_file(model, "deck", str(model.text("deck", due=True)), outside), allow)
     as_deck = assembly(deck, units)
-    made, notes = _thickness(model, as_deck, units, outside)
-    setup = _setup(test, made, outside)
+    made, notes = _thickness(model, held.assembly or as_deck, units, outside)
+    setup = _setup(test, made, outside, held.sensors)
     sensors = (*setup.outputs, *setup.inputs)
     more = keys.sections("recording", known("recording"))
-    recordings = _recordings(test, more, sensors, outside)
+    recordings = _recordings(test, more, sensors, outside, held.recordings)
     notes += notes_of(recordings, "use" in test)
     notes += remarks(deck, STRUCTURAL)
     if allow:
         notes.append(f"passed over as [model] allow says: {named(allow, 20)}")
-    if outside:
+    if "outside" in model and outside:
         notes.append(OUTSIDE)
-    band, exclude = _bands(keys, recordings, notes)
-    held_sensors, held_band = _held(keys, recordings, notes)
+    band, exclude = bands(keys, recordings, notes)
+    held_sensors, held_band = held_out(keys, recordings, notes)
     outputs, inputs = (
         places(test, setup, made, labels(recordings, setup, role), role, recordings[:1], notes)
         for role in ROLES
     )
     _base_and_quantity(test, recordings, inputs)
     notes += unrecorded(setup, outputs, inputs)
+    tried = searched_effects(keys, notes)
     return Case(
         path=path,
         deck=deck,
@@ -179,6 +219,7 @@ def load_case(path: str | Path) -> Case:
         given=keys.given(),
         keys=keys,
         sensor_masses=sensor_masses(made, outputs, inputs),
+        effects=tried,
     )
 
 
@@ -222,8 +263,9 @@ def _thickness(
 
 
 def _recordings(
-    test: TomlSection, more: Sequence[TomlSection], sensors: Sequence[Sensor], outside: bool
-) -> tuple[Recording, ...]:
+    test: TomlSection, more: Sequence[TomlSection], sensors: Sequence[Sensor], outside: bool,
+    held: Mapping[str, tuple[Recording, ...]],
+) -> tuple[Recording, ...]:  # fmt: skip
     """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
     if (factor := test.number("factor")) == 0:
@@ -239,11 +281,14 @@ def _recordings(
     read: list[Recording] = []
     paths: list[Path] = []
     for section, word, name in listed:
-        paths.append(_file(section, word, name, outside).resolve())
-        if paths[-1] in paths[:-1]:
-            said = f"lists {name!r} twice; a repeat is a measurement of its own"
-            raise FileError(f"{section.at(word)} {said}")
-        found = read_recordings(paths[-1], quantity)
+        if name in held:
+            found = held[name]
+        else:
+            paths.append(_file(section, word, name, outside).resolve())
+            if paths[-1] in paths[:-1]:
+                said = f"lists {name!r} twice; a repeat is a measurement of its own"
+                raise FileError(f"{section.at(word)} {said}")
+            found = read_recordings(paths[-1], quantity)
         for r in described(more, name, [with_frf(r)[0] for r in found]):
             alive = read_as(without_dead_channels(r), *how)
             longest = record_length(alive)
@@ -275,10 +320,14 @@ def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
     return replace(other, frf=b.sel(a.outputs, a.inputs))
 
 
-def _setup(test: TomlSection, made: Assembly, outside: bool) -> TestSetup:
+def _setup(
+    test: TomlSection, made: Assembly, outside: bool, held: tuple[Sensor, ...] | None
+) -> TestSetup:
     """Sensors, hangers and weighing as the user gives them."""
     name = test.text("sensors")
-    sensors = read_sensors(_file(test, "sensors", name, outside)) if name else ()
+    sensors = held or ()
+    if name:
+        sensors = read_sensors(_file(test, "sensors", name, outside))
     mass = test.number("mass", low=1e-9)
     mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0), high=mass or 1e300)
     if mass is None and mass_sd is not None:
@@ -328,68 +377,3 @@ def _base_and_quantity(
             f"{test.at('quantity')}: {recordings[0].name} is {quantity} from "
             f"{', '.join(frf.inputs[:3])}; {due}"
         )
-
-
-def _bands(
-    keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
-) -> tuple[tuple[float, float] | None, tuple[tuple[float, float], ...]]:
-    section = keys.section("band", known("band"))
-    band = section.band("fit")
-    if band is not None:
-        band = _inside(section, "fit", band, recordings, notes)
-    return band, section.bands("exclude")
-
-
-def _inside(
-    section: TomlSection,
-    key: str,
-    band: tuple[float, float],
-    recordings: Sequence[Recording],
-    notes: list[str],
-) -> tuple[float, float]:
-    """The band, cut to what every FRF holds; refused where less than half of it is there."""
-    for r in recordings:
-        if r.frf is None:
-            continue
-        f = r.frf.frequency[r.frf.frequency > 0]
-        low, high = max(band[0], float(f[0])), min(band[1], float(f[-1]))
-        lines = int(np.count_nonzero((low <= f) & (f <= high)))
-        if high - low < 0.5 * (band[1] - band[0]) or lines < 2:
-            raise FileError(
-                f"{section.at(key)} = [{band[0]:g}, {band[1]:g}] Hz lies outside of {r.name}, "
-                f"which holds {f[0]:g} to {f[-1]:g} Hz ({lines} lines in common)"
-            )
-        if (low, high) != band and max(low - band[0], band[1] - high) > 0.02 * (high - low):
-            notes.append(f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, all {r.name} holds")
-        band = (low, high)
-    return band
-
-
-def _held(
-    keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
-) -> tuple[int | tuple[str, ...] | None, tuple[float, float] | None]:
-    """Sensors (how many, or which) and band that no fit may see."""
-    section = keys.section("held_out", known("held_out"))
-    band = section.band("band")
-    if band is not None:
-        band = _inside(section, "band", band, recordings, notes)
-    value = section.values.get("sensors")
-    outputs = next((r.frf.outputs for r in recordings if r.frf is not None), ())
-    if value is None:
-        return None, band
-    if not outputs:
-        raise FileError(f"{section.at('sensors')}: there are no FRFs of which to hold any out")
-    if isinstance(value, list):
-        labels = section.list("sensors", str) or []
-        for label in labels:
-            if label not in outputs:
-                raise LabelError(
-                    f"{section.at('sensors')}: no output {label!r}; there are {named(outputs, 8)}"
-                )
-        if set(labels) >= set(outputs):
-            raise FileError(f"{section.at('sensors')} names every output; none is left to fit")
-        return tuple(labels), band
-    count = section.number("sensors", low=0, high=max(len(outputs) - 1, 0)) or 0.0
-    if count != int(count):
-        raise FileError(f"{section.at('sensors')} = {count:g} is no whole number")
-    return int(count), band

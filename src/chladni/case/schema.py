@@ -154,6 +154,9 @@ SCHEMA = (
         "Outputs no fit may see.", '["412:+Z"]', _FIT),
     Key("held_out", "band", "[low, high]", "Hz", "the upper fifth of the band",
         "Band no fit may see.", "[200.0, 300.0]", (*_FIT, "bench")),
+    Key("search", "effects", "list of effects", "", "all of the catalogue",
+        "The effects that are tried; a cause that is not among them is not named. Faults of the "
+        "recording are always looked for.", '["point-mass", "stiffness-patch"]', ("diagnose",)),
     Key("parameter", "name", "text", "", "the field", "What the page calls it.", '"E steel"',
         _VARIED),
     Key("parameter", "parts", "list of parts", "", "all that have the field",

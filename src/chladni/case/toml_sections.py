@@ -65,6 +65,10 @@ class TomlSection:
         """'case.toml, line 7: [test] gain', to begin a sentence with."""
         return f"{self.file.name}, line {self.lines.get(key, self.line)}: [{self.name}] {key}"
 
+    def lacks(self, key: str) -> str:
+        """Say that a key is missing."""
+        return f"{self.file.name}, line {self.line}: [{self.name}] needs a key {key}"
+
     def only(self, known: Sequence[str]) -> None:
         """Refuse keys that nobody reads."""
         for key in self.values:
@@ -74,7 +78,7 @@ class TomlSection:
 
     def _get(self, key: str, due: bool) -> Any:
         if due and key not in self.values:
-            raise FileError(f"{self.file.name}, line {self.line}: [{self.name}] needs a key {key}")
+            raise FileError(self.lacks(key))
         return self.values.get(key)
 
     def text(self, key: str, due: bool = False, among: Sequence[str] = ()) -> str | None:
@@ -163,9 +167,13 @@ class KeyFile:
             raise FileError(f"{self.path.name} needs a section [{name}]")
         if len(found) > 1:
             raise FileError(f"{self.path.name}, line {found[1].line}: [{name}] occurs twice")
-        section = found[0] if found else TomlSection(self.path, name, {}, {}, 1)
+        section = found[0] if found else self.empty(name)
         section.only(known)
         return section
+
+    def empty(self, name: str) -> TomlSection:
+        """A table that is not there."""
+        return TomlSection(self.path, name, {}, {}, 1)
 
     def given(self) -> tuple[tuple[str, str], ...]:
         """(section, key) of every word of the file."""

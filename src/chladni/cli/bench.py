@@ -120,7 +120,7 @@ def run(
         with tempfile.TemporaryDirectory() as scratch:
             stage = within(job.progress, 0.0, 0.2)
             case = _case(source, units, allow or [], sensors, input, Path(scratch), stage)
-            found = virtual_test(case, settings, within(job.progress, 0.2, 0.95))
+            found = virtual_test(case, settings, progress=within(job.progress, 0.2, 0.95))
             job.progress("writing", 0.95)
             job.files += write_bench(job.folder, case, found)
         job.json("bench.json", to_json(found))

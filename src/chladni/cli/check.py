@@ -16,7 +16,7 @@ def run(
 
     with started("check", source, out) as job:
         case = opened(source)
-        found = check(case, within(job.progress, 0.0, 0.7))
+        found = check(case, progress=within(job.progress, 0.0, 0.7))
         job.json("check.json", to_json(found))
         job.progress("the picture", 0.7)
         job.show(check_page(job.folder, case, found))

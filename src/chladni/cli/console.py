@@ -3,16 +3,14 @@
 import os
 import shlex
 import sys
-import textwrap
 import threading
 import time
 import unicodedata
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
-from itertools import zip_longest
 from pathlib import Path
 from typing import IO
 
@@ -21,11 +19,10 @@ import typer
 from ..errors import FileError
 from ..progress import Progress, terminal
 from ..report.blocks import Table
+from ..report.text_tables import table_lines
 
 QUIET = 10.0  # seconds after which a run without a terminal says what it does
 AGAIN = 60.0  # and how often from then on
-ROWS = 24  # of a table on the terminal; the page has them all
-_CELL, _LAST = 56, 110  # characters of a cell's line, and of a sentence's at the end of a row
 
 
 @dataclass
@@ -159,38 +156,6 @@ def say_table(table: Table) -> None:
     """A table in columns, its first rows where it is long."""
     for line in table_lines(table):
         say(line)
-
-
-def table_lines(table: Table, most: int = ROWS) -> list[str]:
-    """The lines of a table: words to the left, numbers to the right, long words over several lines.
-
-    >>> table_lines(Table(("mode", "Hz"), [("1", "5.2"), ("2", "11.4")]))
-    ['mode    Hz', '   1   5.2', '   2  11.4']
-    """
-    shown = [tuple(table.columns), *(tuple(row) for row in table.rows[:most])]
-    cells = [[*map(_cell, row[:-1]), *(_cell(text, _LAST) for text in row[-1:])] for row in shown]
-    width = [
-        max(len(line) for cell in column for line in cell) for column in zip(*cells, strict=True)
-    ]
-    left = [name in table.words for name in table.columns]
-    lines = [
-        "  ".join(_aligned(line, width, left)).rstrip()
-        for row in cells
-        for line in zip_longest(*row, fillvalue="")
-    ]
-    if (more := len(table.rows) - most) > 0:
-        lines.append(f"report.html has {more} more rows")
-    return lines
-
-
-def _cell(text: object, most: int = _CELL) -> list[str]:
-    """The lines of a cell; a word is never cut."""
-    return textwrap.wrap(str(text), most, break_long_words=False, break_on_hyphens=False) or [""]
-
-
-def _aligned(row: Sequence[str], width: Sequence[int], left: Sequence[bool]) -> Iterator[str]:
-    for text, n, is_word in zip(row, width, left, strict=True):
-        yield text.ljust(n) if is_word else text.rjust(n)
 
 
 @contextmanager

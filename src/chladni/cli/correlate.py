@@ -50,7 +50,7 @@ def _with_test(job: Run, source: Path) -> None:
             "another program"
         )
     case = opened(source)
-    found = correlate(case, within(job.progress, 0.0, 0.8))
+    found = correlate(case, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
     job.show(correlation_page(job.folder, case, found))
@@ -60,7 +60,7 @@ def _beside(job: Run, source: Path, modes: Path, units: str | None, allow: list[
     from ..report.other_modes_page import other_modes_page
 
     model = load_model(source, units, allow, command="correlate")
-    found = other_modes(model, modes, within(job.progress, 0.0, 0.8))
+    found = other_modes(model, modes, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
     job.show(other_modes_page(job.folder, model, found))

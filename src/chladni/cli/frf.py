@@ -76,7 +76,7 @@ def run(
         if sensors is not None:
             given, *placed = placed_layout(as_model(given, "frf"), sensors, input or ())
             ends = (placed[0], placed[1])
-        found = frf(given, *ends, f, damping, stage)
+        found = frf(given, *ends, f, damping, progress=stage)
         job.note(found.notes)
         for k, one in enumerate(found.frfs):
             if one.quantity != "transmissibility":

@@ -50,7 +50,7 @@ def run(
     with started("identify", source, out) as job:
         is_one = source.exists() and is_case(source)
         read = load_case(source) if is_one else load_recordings(source, quantity or None)
-        found = identify(read, limit, averages, job.progress, choice)
+        found = identify(read, limit, averages, choice, progress=job.progress)
         job.json("identified.json", to_json(found))
         job.show(identification_page(job.folder, found))
     found.trusted()

@@ -56,7 +56,7 @@ def run(
         job.progress("reading the deck", 0.0)
         model = load_deck(deck, units, allow or ()).model()
         stage = within(job.progress, 0.1, 0.7)
-        found = map_formed(model, formed, other, place, pairs, guess, stage)
+        found = map_formed(model, formed, other, place, pairs, guess, progress=stage)
         job.progress("writing", 0.7)
         assert model.deck is not None
         path = job.keep("mapped.bdf", "the deck with mapped thickness")

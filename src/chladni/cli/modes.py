@@ -28,7 +28,7 @@ def run(
     with started("modes", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units, allow or (), subcase)
-        found = modes(model, count, within(job.progress, 0.0, 0.7))
+        found = modes(model, count, progress=within(job.progress, 0.0, 0.7))
         job.json("modes.json", to_json(found))
         job.progress("pictures", 0.7)
         job.show(modes_page(job.folder, model, found))

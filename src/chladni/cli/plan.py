@@ -89,7 +89,7 @@ def run(
         job.note(model.notes)
         if said:
             job.say(said)
-        found = plan(model, settings, within(job.progress, 0.1, 0.6))
+        found = plan(model, settings, progress=within(job.progress, 0.1, 0.6))
         job.json("plan.json", to_json(found))
         job.progress("pictures", 0.7)
         parts = plan_page(job.folder, model, found)

@@ -95,7 +95,7 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     if not count:
         return None
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.2)
-    modal = model.modes(max(count, LEAST_MODES))
+    modal = model.normal_modes(max(count, LEAST_MODES))
     if len(modal) < count:
         raise FileError(f"{job.source} has {len(modal)} modes, not {count}")
     rigid = int(rigid_modes(modal).sum())

@@ -185,7 +185,7 @@ def opened(source: Path) -> Case:
 class Diagnosing(Protocol):
     """A workflow from a case to a diagnosis."""
 
-    def __call__(self, case: Case, progress: Progress) -> DiagnosisResult:
+    def __call__(self, source: Case, *, progress: Progress) -> DiagnosisResult:
         """Diagnose or calibrate."""
 
 
@@ -205,7 +205,7 @@ def diagnosed(
 
     with started(command, source, out) as job:
         case = opened(source)
-        found = workflow(case, within(job.progress, 0.0, 0.85))
+        found = workflow(case, progress=within(job.progress, 0.0, 0.85))
         stage = within(job.progress, 0.85, 1.0)
         found = write_diagnosis(job.folder, case, found, command_line(), stage, job.place)
         say_sections(sentence(found), sections(found, {}, (), (), ""))

@@ -60,6 +60,6 @@ def run(
         job.progress("reading", 0.0)
         is_one = source.exists() and is_case(source)
         read = load_case(source) if is_one else load_recordings(source, quantity or None)
-        found = evaluate_recordings(read, settings, job.progress)
+        found = evaluate_recordings(read, settings, progress=job.progress)
         job.json("test.json", to_json(found))
         job.show(evaluation_page(job.folder, found))

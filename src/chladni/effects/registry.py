@@ -6,6 +6,7 @@ A package adds a family by an entry point, without any change of chladni::
     edge-mass = "my_package.edge_mass:FAMILY"
 """
 
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
@@ -76,6 +77,11 @@ def families() -> tuple[Family, ...]:
 def names() -> tuple[str, ...]:
     """The names of all known families."""
     return tuple(family.name for family in families())
+
+
+def catalogue(chosen: Sequence[str] = ()) -> tuple[Family, ...]:
+    """The families with these names, in the order of :func:`families`; all without a name."""
+    return tuple(f for f in families() if not chosen or f.name in chosen)
 
 
 def family(name: str) -> Family:

@@ -57,6 +57,26 @@ class Structure:
         """
         return congruence(self.T, blocks(matrices, nodes, len(self.assembly.points)))
 
+    def contribution(self, elements: Assembly) -> tuple[sp.csr_array, sp.csr_array]:
+        """Tᵀ K T and Tᵀ M T of elements over the same points: what they add to the system.
+
+        Parameters
+        ----------
+        elements : an assembly of these alone, as :func:`.energy.only` makes it
+
+        Raises
+        ------
+        ModelError
+            If it has other points.
+        """
+        if len(elements.points) != len(self.assembly.points):
+            raise ModelError(
+                f"the elements are over {len(elements.points)} points, the structure over "
+                f"{len(self.assembly.points)}"
+            )
+        M, _, K, _ = over_all_motions(elements)
+        return congruence(self.T, K), congruence(self.T, M)
+
     def rows(self, dofs: np.ndarray) -> sp.csr_array:
         """Motion at (point id, component 1-6) in the point's displacement frame: (k, n_free)."""
         dofs = np.asarray(dofs, dtype=np.int64)

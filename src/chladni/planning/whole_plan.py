@@ -17,6 +17,7 @@ from ..errors import ModelError, ShapeError
 from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
+from ..results import Result
 from .actuator_ranking import ActuatorRanking, best_actuators, ranked_actuators, shaking
 from .drawn_models import drawn, ensemble
 from .gramians import gramian_quotient, modal_rank, observability_gramian
@@ -95,8 +96,8 @@ class Mount:
     side: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
     """A test plan; arrays over modes are over the flexible target modes.
 
     Attributes

@@ -50,6 +50,12 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
     return PageParts(lead(found), [Section("The test", blocks)], found.notes, files)
 
 
+def in_words(found: BenchResult) -> PageParts:
+    """The page without its pictures."""
+    blocks: list[Block] = [Facts(_facts(found)), _table(found)]
+    return PageParts(lead(found), [Section("The test", blocks)], found.notes)
+
+
 def bench_json(found: BenchResult) -> dict[str, Any]:
     """``bench.json``: what was tested and how well; nothing of what is sealed."""
     return {

@@ -30,22 +30,27 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
     path = folder / "sensors.png"
     ends = markers(case.outputs), markers(case.inputs)
     scene.sensors(path, surface(case.assembly), *ends, cords=cords(case))
-    looks = [
-        f"{'Fault: ' if f.fault else ''}{f.text}. What to do: {f.remedy}" for f in found.findings
-    ]
     blocks: list[Block] = [Picture(path, "Sensors, shakers and cords; arrows: their directions.")]
     if found.dofs:
         blocks.append(_table(found.dofs))
+    looks, facts, *told = in_words(found).sections
+    sections = [looks, facts, Section("Sensors", blocks), *told]
+    return PageParts(_lead(found), sections, (), [(path.name, "sensors on the mesh")])
+
+
+def in_words(found: CaseCheck) -> PageParts:
+    """The page without its picture."""
+    looks = [
+        f"{'Fault: ' if f.fault else ''}{f.text}. What to do: {f.remedy}" for f in found.findings
+    ]
     modes = ", ".join(number(f) for f in found.frequency)
     facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
-    told = [Section(f"For {who}", [Items(said)]) for who, said in _told(found.unused)]
     sections = [
         Section("Possible errors", [Items(looks)] if looks else []),
         Section("Data and settings in use", [Facts(facts)]),
-        Section("Sensors", blocks),
-        *told,
+        *(Section(f"For {who}", [Items(said)]) for who, said in _told(found.unused)),
     ]
-    return PageParts(_lead(found), sections, (), [(path.name, "sensors on the mesh")])
+    return PageParts(_lead(found), sections)
 
 
 def _told(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:

@@ -88,6 +88,17 @@ def correlation_page(folder: Path, case: Case, found: Correlation) -> PageParts:
     )
 
 
+def in_words(found: Correlation) -> PageParts:
+    """The page without its pictures."""
+    sections = [
+        screening_section(found.screening),
+        Section("Modes", [_modes(found)]),
+        Section("Sensors", _sensors(found)),
+        Section("Responses", _scores(found)),
+    ]
+    return PageParts(_lead(found), sections, found.notes)
+
+
 def _lead(found: Correlation) -> str:
     p = found.pairs
     off = np.abs(found.f_model[p.model] / found.f_test[p.test] - 1)

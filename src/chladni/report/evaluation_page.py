@@ -40,6 +40,15 @@ def evaluation_page(folder: Path, found: Evaluation) -> PageParts:
     return PageParts(lead, sections, found.notes, files)
 
 
+def in_words(found: Evaluation) -> PageParts:
+    """The page without its pictures."""
+    sections = [screening_section(*(r.screening for r in found.recordings))]
+    for r in found.recordings:
+        if r.recording.frf is not None:
+            sections.append(Section(r.recording.name, [_table(r.recording.frf)]))
+    return PageParts(lead_of([r.screening for r in found.recordings]), sections, found.notes)
+
+
 def _written(folder: Path, stem: str, r: RecordingEvaluation) -> list[tuple[str, str]]:
     """The FRFs of time data as a universal file in text and in binary, and as arrays."""
     if r.estimate is None or r.recording.frf is None:

@@ -59,6 +59,12 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
     return PageParts(_lead(found.recordings), sections, found.notes, files, page.drawings)
 
 
+def in_words(found: Identification) -> PageParts:
+    """The page without its pictures."""
+    sections = [Section(r.recording.name, [_table(r)]) for r in found.recordings]
+    return PageParts(f"{_lead(found.recordings)}.", sections, found.notes)
+
+
 def _modal_files(folder: Path, stem: str, r: RecordingModes) -> list[tuple[str, str]]:
     """Shapes as a table, the state space for other programs."""
     sure, name = r.modes.sel(r.firm), r.recording.name

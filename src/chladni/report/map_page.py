@@ -47,6 +47,11 @@ def map_page(folder: Path, found: MappedDeck) -> PageParts:
     return PageParts(_lead(found), sections, found.notes, files)
 
 
+def in_words(found: MappedDeck) -> PageParts:
+    """The page without its pictures."""
+    return PageParts(_lead(found), [Section("Thickness", [_parts(found)])], found.notes)
+
+
 def _lead(found: MappedDeck) -> str:
     parts, (was, now) = found.found.mapped.parts, found.mass
     errors = [p.round_trip for p in parts if np.isfinite(p.round_trip)]

@@ -33,15 +33,21 @@ def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
     every = elastic if len(elastic) else shown
     order = [int(k) + 1 for k in every]
     shapes = mode_shapes(page, whole, motion[:, :, every], f[every], order, [still])
-    kg = "kg" if found.in_si else "deck units"
+    said = in_words(found)
+    files = [("modes.vtu", "shapes for ParaView"), *other]
+    files.append(("modes.png", "the first elastic modes"))
+    sections = [Section("Mode shapes", list(shapes)), *said.sections]
+    return PageParts(said.lead, sections, (*said.notes, *notes), files, page.drawings)
+
+
+def in_words(found: NormalModes) -> PageParts:
+    """The page without its pictures."""
+    f, kg = found.modal.frequency, "kg" if found.in_si else "deck units"
     lead = (
         f"{len(f)} modes from {number(f[0])} to {number(f[-1])} Hz; "
         f"its mass is {number(found.mass)} {kg}."
     )
-    files = [("modes.vtu", "shapes for ParaView"), *other]
-    files.append(("modes.png", "the first elastic modes"))
-    sections = [Section("Mode shapes", list(shapes)), Section("Modes", _tables(found, kg))]
-    return PageParts(lead, sections, (*found.notes, *notes), files, page.drawings)
+    return PageParts(lead, [Section("Modes", _tables(found, kg))], found.notes)
 
 
 def _universal(

@@ -45,6 +45,11 @@ def other_modes_page(folder: Path, model: Model, found: OtherModes) -> PageParts
     return PageParts(_lead(found), sections, notes, files)
 
 
+def in_words(found: OtherModes) -> PageParts:
+    """The page without its pictures."""
+    return PageParts(_lead(found), [Section("Modes", [_table(found)])], found.notes)
+
+
 def _lead(found: OtherModes) -> str:
     p, count = found.pairs, len(found.f_other)
     if not len(p):

@@ -91,6 +91,11 @@ def write_sections(
     return write_text(path, _page(title, body, lead=lead, drawings=drawings))
 
 
+def sections_page(title: str, body: Sequence[Section], lead: str = "") -> str:
+    """One page of titled sections as text."""
+    return _page(title, body, lead=lead)
+
+
 def _page(
     title: str,
     body: Sequence[Section],

@@ -46,6 +46,12 @@ def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
     return PageParts(lead(result), body, notes(found), files, page.drawings)
 
 
+def in_words(found: Plan) -> PageParts:
+    """The page without its pictures."""
+    result = summary(found)
+    return PageParts(lead(result), [Section("Sensors", [_layout(result)])], notes(found))
+
+
 def lead(result: PlanSummary) -> str:
     """The plan in two sentences."""
     f = [m.frequency_hz for m in result.modes]
@@ -163,17 +169,6 @@ def _sensors(found: Plan, result: PlanSummary, shown: Shown, page: Page, path: P
     )
     cords = [_hanger(found, int(g)) for g in result.hangers]
     placed = replace(shown, outputs=outputs, inputs=shakers, cords=cords)
-    rows = [
-        (str(s.rank), s.at.label, *_where(s.at), direction(s.at.direction.tolist()), s.at.mounted)
-        for s in result.sensors
-    ]
-    table = Table(
-        ("rank", "label", "grid", "place [m]", "direction", "mounted"),
-        rows,
-        words=("label", "place [m]", "direction", "mounted"),
-        caption="The most informative place is first; the last is the first to give up. A place "
-        "without a grid is the centre of a shell.",
-    )
     moves = [
         f"Mode {m.mode} was barely visible ({number(m.before, 2)} of its largest motion): the "
         f"sensor at {m.given_up} moves to {m.taken} ({number(m.after, 2)})."
@@ -181,10 +176,25 @@ def _sensors(found: Plan, result: PlanSummary, shown: Shown, page: Page, path: P
     ]
     return [
         *live.layout(page, "where", placed, [still]),
-        table,
+        _layout(result),
         Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
         Items(moves or ["All modes were visible, so no sensor was moved."]),
     ]
+
+
+def _layout(result: PlanSummary) -> Table:
+    """Tabulate the sensors by rank."""
+    rows = [
+        (str(s.rank), s.at.label, *_where(s.at), direction(s.at.direction.tolist()), s.at.mounted)
+        for s in result.sensors
+    ]
+    return Table(
+        ("rank", "label", "grid", "place [m]", "direction", "mounted"),
+        rows,
+        words=("label", "place [m]", "direction", "mounted"),
+        caption="The most informative place is first; the last is the first to give up. A place "
+        "without a grid is the centre of a shell.",
+    )
 
 
 def _where(at: PlannedPlace) -> tuple[str, str]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..dynamics.frf import FRF, UNIT
+from ..workflows.frf import FrequencyResponses
 from .blocks import PageParts, Picture, Section, Table
 from .words import number
 
@@ -21,9 +22,7 @@ def response_page(folder: Path, found: FRF) -> PageParts:
 
     unit = _unit(found)
     peak = np.abs(found.values).max(axis=0)
-    at = found.frequency[np.abs(found.values).argmax(axis=0)]
-    count = max(1, _SHOWN // len(found.inputs))
-    shown = sorted(np.argsort(-peak.max(axis=1), kind="stable")[:count].tolist())
+    shown = _shown(found)
     pictures, files = [], []
     for j, drive in enumerate(found.inputs):
         for i in (i for i in shown if peak[i, j] > 0):
@@ -32,24 +31,45 @@ def response_page(folder: Path, found: FRF) -> PageParts:
             plots.frf(path, {"model": (found.frequency, found.values[:, i, j])}, title, unit)
             pictures.append(Picture(path))
             files.append((path.name, title))
-    rows = [
-        (found.outputs[i], drive, number(peak[i, j]), number(at[i, j]))
-        for i in shown
-        for j, drive in enumerate(found.inputs)
-    ]
     notes = []
     if len(found.outputs) > len(shown):
         notes.append(
             f"The {len(shown)} outputs that move most are shown; all {len(found.outputs)} are in "
             "the arrays."
         )
+    page, said = Page(), _words(found)
+    live = responses(page, "frf", {"model": found}, pictures)
+    sections = [Section("Responses", [live, *said.sections[0].blocks])]
+    return PageParts(said.lead, sections, notes, files, page.drawings)
+
+
+def in_words(found: FrequencyResponses) -> PageParts:
+    """The page of one or several sets of responses without its pictures."""
+    each = [_words(one) for one in found.frfs]
+    sections = [section for one in each for section in one.sections]
+    return PageParts(" ".join(one.lead for one in each), sections, found.notes)
+
+
+def _words(found: FRF) -> PageParts:
+    """The page of one set without its pictures."""
+    unit, size = _unit(found), np.abs(found.values)
+    peak, at = size.max(axis=0), found.frequency[size.argmax(axis=0)]
+    rows = [
+        (found.outputs[i], drive, number(peak[i, j]), number(at[i, j]))
+        for i in _shown(found)
+        for j, drive in enumerate(found.inputs)
+    ]
     heads = ("output", "input", f"largest [{unit}]" if unit else "largest", "at [Hz]")
     f, count = found.frequency, len(found.outputs) * len(found.inputs)
     lead = f"{count} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
-    table = Table(heads, rows, ("output", "input"))
-    page = Page()
-    live = responses(page, "frf", {"model": found}, pictures)
-    return PageParts(lead, [Section("Responses", [live, table])], notes, files, page.drawings)
+    return PageParts(lead, [Section("Responses", [Table(heads, rows, ("output", "input"))])])
+
+
+def _shown(found: FRF) -> list[int]:
+    """Positions of the outputs that move most."""
+    peak = np.abs(found.values).max(axis=(0, 2))
+    count = max(1, _SHOWN // len(found.inputs))
+    return sorted(np.argsort(-peak, kind="stable")[:count].tolist())
 
 
 def _unit(found: FRF) -> str:

@@ -56,24 +56,31 @@ def _range(y: np.ndarray) -> dict[str, float] | None:
 
 def study_page(folder: Path, found: ParameterStudy) -> PageParts:
     """Sections of the page; its pictures are written into the folder."""
+    said = in_words(found)
+    files: list[tuple[str, str]] = []
+    sections = list(said.sections)
+    if len(found.rows) > len(found.failed):
+        sections += [
+            Section("Sensitivities", _sensitivities(folder, found, files)),
+            Section("Results over parameters", _pictures(folder, found, files)),
+        ]
+    if found.failed:
+        why_not = [f"sample {k}: {why}" for k, why in found.failed[:_LISTED]]
+        sections.append(Section(f"{len(found.failed)} samples failed", [Items(why_not)]))
+    sections.append(Section("Read it", [Code(READ)]))
+    return PageParts(said.lead, sections, said.notes, files)
+
+
+def in_words(found: ParameterStudy) -> PageParts:
+    """The page without its pictures."""
     done = len(found.rows) - len(found.failed)
     lead = f"{done} of {len(found.rows)} samples of {', '.join(found.names)} were solved"
     first = found.column("f1_hz")
     if np.isfinite(first).any():
         span = number(np.nanmin(first)), number(np.nanmax(first))
         lead += f"; the first elastic mode lies between {span[0]} and {span[1]} Hz"
-    files: list[tuple[str, str]] = []
     sections = [Section("Varied parameters", [_ranges(found)])]
-    if done:
-        sections += [
-            Section("Sensitivities", _sensitivities(folder, found, files)),
-            Section("Results over parameters", _pictures(folder, found, files)),
-        ]
-    if found.failed:
-        said = [f"sample {k}: {why}" for k, why in found.failed[:_LISTED]]
-        sections.append(Section(f"{len(found.failed)} samples failed", [Items(said)]))
-    sections.append(Section("Read it", [Code(READ)]))
-    return PageParts(f"{lead}.", sections, [*found.notes, *_notes(found)], files)
+    return PageParts(f"{lead}.", sections, [*found.notes, *_notes(found)])
 
 
 def _notes(found: ParameterStudy) -> list[str]:

@@ -68,7 +68,7 @@ def _fits(value: object, kind: Any, inner: tuple[Any, ...]) -> bool:
         return value is None or (number and abs(value) < LARGEST)  # type: ignore[operator, arg-type]
     if kind is int:
         return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
-    return not isinstance(kind, type) or isinstance(value, kind)
+    return kind is Any or not isinstance(kind, type) or isinstance(value, kind)
 
 
 def _said(value: object, where: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import fingerprint
-from ..case import Case
+from ..case import Case, load_case
 from ..case.free_parameters import fields_of
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import ChladniError, FileError, Interrupted
@@ -22,9 +22,10 @@ from ..io.nastran import units_of
 from ..model.assembly import Assembly
 from ..output import own_version
 from ..progress import Progress, remaining, silent
+from ..results import Result
 from ..workflows.case_model import REACH
 from ..workflows.frf import refuse_unknown
-from ..workflows.loaded_model import DeckModels, Model, as_model
+from ..workflows.loaded_model import DeckModels, Model, as_model, is_case, load_model
 from .designs import Design, design
 from .followed_modes import MARGIN, followed
 from .sample import StudyModel, computed
@@ -41,8 +42,8 @@ RESERVED = ("mode", "frequency", "mac", "done", "rms", "peak", "peak_hz", "frequ
 _RIGID = 6  # rigid motions of a free structure in one piece
 
 
-@dataclass(frozen=True, eq=False)
-class ParameterStudy:
+@dataclass(frozen=True, eq=False, repr=False)
+class ParameterStudy(Result):
     """Samples of a model and their results.
 
     Attributes
@@ -105,7 +106,7 @@ class ParameterStudy:
 
 
 def study(
-    source: Case | Model | DeckModels,
+    source: Case | Model | DeckModels | str | Path,
     vary: Sequence[str] = (),
     settings: StudySettings | None = None,
     *,
@@ -118,6 +119,7 @@ def study(
 
     Parameters
     ----------
+    source : a model, a case, or the path of a case; of a deck ``chladni.load(deck, units)``
     vary : ranges as "t of inner=0.6:0.8", "E=90%:110%" or "point-mass at 412=0.01:0.2"; without
         any, the [[parameter]] of a case
     out : folder of the store: a study that was begun there continues where it stopped
@@ -137,6 +139,8 @@ def study(
     if workers is not None:
         refuse_many(workers)
     settings = settings or StudySettings()
+    if isinstance(source, str | Path):
+        source = load_case(source) if is_case(Path(source)) else load_model(source)
     wanted = [vary_text(text) for text in vary]
     if isinstance(source, Case) and any(asked.name == "suspension" for asked in wanted):
         source = replace(source, given=tuple(g for g in source.given if g[1] != "hangers"))  # used
@@ -272,10 +276,10 @@ def _elastic(whole: Model, count: int) -> ModalModel:
     of modes is doubled until the number of rigid ones stays the same.
     """
     n = count + _RIGID
-    modal = whole.modes(n)
+    modal = whole.normal_modes(n)
     while True:
         n, before = 2 * n, int(rigid_modes(modal).sum())
-        modal = whole.modes(n)
+        modal = whole.normal_modes(n)
         rigid = int(rigid_modes(modal).sum())
         if len(modal) < n or (rigid == before and len(modal) - rigid >= count):
             return modal

@@ -106,7 +106,7 @@ def solved(model: Model, count: int, reach: float) -> Modelled:
     """The lowest modes of a model: up to ``reach`` [Hz], or ``count`` modes where that is 0."""
     if reach:
         return model.solved(reach)
-    modal: ModalModel = model.modes(count)
+    modal: ModalModel = model.normal_modes(count)
     return Modelled(model.structure, modal, float(modal.frequency[-1]))
 
 

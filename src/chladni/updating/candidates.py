@@ -10,7 +10,6 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, ElementGrids
 from ..effects.joints import Connection
-from ..effects.registry import families
 from ..effects.search_context import APART, Candidate
 from ..errors import ModelError
 from ..parallel import in_parallel
@@ -45,7 +44,7 @@ def candidates(
     context = UpdatingContext(problem, null).ready()
     every = [
         c
-        for proposed in in_parallel(lambda family: family.proposed(context), families())
+        for proposed in in_parallel(lambda family: family.proposed(context), problem.families)
         for c in proposed
         if not already_there(problem, c.effect, c.start)
     ]
@@ -93,12 +92,13 @@ def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> l
 
 
 def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
-    """What a structure of beams is not asked for, and why; nothing of one that has shells."""
+    """Return why effects on shells are not tried on a structure of beams; empty with shells."""
     if problem.where.groups.sheet.any():
         return ()
-    names = ", ".join(family.name for family in families() if family.on_sheets)
+    names = ", ".join(family.name for family in problem.families if family.on_sheets)
+    said = f"not searched, because they act on shells and the deck has none: {names}"
     return (
-        f"not searched, because they act on shells and the deck has none: {names}",
+        *([said] if names else []),
         "compliance of a joint where beams share a grid is not searched, because no element "
         "models it; bushes between beams are searched",
     )

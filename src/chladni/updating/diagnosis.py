@@ -158,7 +158,7 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         nominal=found.nominal.neg2_log_evidence,
         poles=isinstance(found.null.data, Poles),
         implausible=bool(implausible_values(found.plain.fit)),
-        families=len(families()),
+        families=len(problem.families),
         known_noise=getattr(found.null.data, "identified", None) is not None,
     )
     tests = dict(found.tests)

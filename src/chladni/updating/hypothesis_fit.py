@@ -1,13 +1,15 @@
 """The problem of a diagnosis, and the fit of one hypothesis."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
+from ..effects.family import Family
+from ..effects.registry import catalogue
 from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned
@@ -107,6 +109,7 @@ class UpdatingProblem:
     nuisance : the nuisances alone
     damping, coupling : of the identified modes, if responses are compared
     found : effects found earlier and now in the base, each with its parameters
+    families : of effects that are tried
     """
 
     reduced: ReducedProblem
@@ -119,6 +122,7 @@ class UpdatingProblem:
     damping: ModalDamping | None = None
     coupling: ModeCoupling | None = None
     found: tuple[tuple[Effect, np.ndarray], ...] = ()
+    families: tuple[Family, ...] = field(default_factory=catalogue)
 
     @property
     def where(self) -> EffectContext:

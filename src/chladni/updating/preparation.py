@@ -14,7 +14,7 @@ from ..effects.calibration_parameters import channel_gain, defaults
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
 from ..effects.model_families import joint_nuisances
-from ..effects.registry import family
+from ..effects.registry import catalogue, family
 from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
 from ..effects.weld_patch import FIELD as WELD_PATCH
 from ..effects.weld_patch import weld_patch
@@ -308,7 +308,7 @@ def updating_problem(
     base = [*own, *(e for e in nuisance if e.text not in gone)]
     return UpdatingProblem(
         reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
-        setup_of(question, f_max), question.outputs.labels,
+        setup_of(question, f_max), question.outputs.labels, families=catalogue(question.effects),
     )  # fmt: skip
 
 

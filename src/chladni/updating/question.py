@@ -68,6 +68,7 @@ class Question:
     level: float | None = None  # of the recording that is fitted [N], [m/s²]
     control: Control = "force"  # quantity that was kept at the level
     accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
+    effects: tuple[str, ...] = ()  # names of the effects that are tried; empty: all
     identified_noise: bool = False  # whiten with the covariance of the identification
 
     def tested(self, assembly: Assembly) -> Assembly:

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..decision.decision_rules import TIED
 from ..effects.effect import Effect
-from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..errors import ModelError
 from ..parallel import in_parallel
@@ -192,7 +191,7 @@ def _of_the_same_lump(
     if lead is None or lump is None or not isinstance(problem.data, Responses):
         return []
     base, out = taken(problem, lead, ("calibration", "nuisance")), list[HypothesisFit]()
-    for family in families():
+    for family in problem.families:
         begun = family.effect.of_lump(problem.where, *lump)
         if begun is not None and not already_there(problem, *begun):
             with suppress(ModelError):
@@ -206,7 +205,7 @@ def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -
     again = lead.effect.recentred(x, problem.where)
     if again is not None:
         return Candidate(*again, base)
-    known = next((f for f in families() if f.name == lead.effect.name), None)
+    known = next((f for f in problem.families if f.name == lead.effect.name), None)
     if known is None or known.closer is None:
         return None
     return known.closer(UpdatingContext(problem, null, base), lead.effect, x)

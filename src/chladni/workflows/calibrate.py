@@ -1,17 +1,35 @@
 """Fit the calibration parameters of a deck alone."""
 
-from ..case import Case
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Unpack
+
+from ..case.make_case import CaseWords, Measured
 from ..progress import Progress, silent
 from .diagnosis_result import DiagnosisResult
+from .given_case import Source, given_case
 from .states import diagnose_states
 
 
-def calibrate(case: Case, progress: Progress = silent) -> DiagnosisResult:
-    """E, rho and t of the parts (or what the case frees) at their most probable; no new physics.
+def calibrate(
+    source: Source,
+    recording: Measured | Sequence[Measured] = (),
+    *,
+    progress: Progress = silent,
+    **words: Unpack[CaseWords],
+) -> DiagnosisResult:
+    """Fit E, rho and t of the parts (or the ``parameters`` given) at their most probable.
+
+    No new physics is tried.
+
+    Parameters
+    ----------
+    source, recording, progress, words : as in :func:`chladni.diagnose`
 
     Raises
     ------
-    FileError
-        If the recordings hold nothing to compare, or the deck's unit system cannot be right.
+    FileError, LabelError, ModelError
+        One sentence that names the argument (or file and line), the offender and the alternatives.
     """
-    return diagnose_states(case, False, progress)
+    case = given_case(source, recording, words)
+    return replace(diagnose_states(case, False, progress), origin=case)

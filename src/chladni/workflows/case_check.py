@@ -1,10 +1,13 @@
 """Check a case before a long run: what will be used, what not, and what looks wrong."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 
 from ..case import Case
+from ..case.make_case import CaseWords, Measured
 from ..case.recordings import DEAD
 from ..errors import ChladniError, FileError
 from ..fem.energy import mass_properties
@@ -12,8 +15,10 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
+from ..results import Result
 from .case_draft import said_of
 from .correlate import correlate
+from .given_case import Source, given_case
 from .loaded_model import as_model
 from .modes import loose_parts
 from .screening_of_case import POUND, in_pounds, screened_unprepared
@@ -50,8 +55,8 @@ class CheckedDof:
     mass_kg: float
 
 
-@dataclass(frozen=True, eq=False)
-class CaseCheck:
+@dataclass(frozen=True, eq=False, repr=False)
+class CaseCheck(Result):
     """Content of a case, as it was understood.
 
     Attributes
@@ -76,11 +81,28 @@ class CaseCheck:
 
 
 @one_blas_thread()
-def check(case: Case, progress: Progress = silent) -> CaseCheck:
-    """Check units, mass, size, places, band and words of a case, with the model's lowest modes."""
+def check(
+    source: Source,
+    recording: Measured | Sequence[Measured] = (),
+    *,
+    progress: Progress = silent,
+    **words: Unpack[CaseWords],
+) -> CaseCheck:
+    """Check units, mass, size, places, band and words of a case, with the model's lowest modes.
+
+    Parameters
+    ----------
+    source, recording, progress, words : as in :func:`chladni.diagnose`
+
+    Raises
+    ------
+    FileError, LabelError, ModelError
+        If the case cannot be read at all.
+    """
+    case = given_case(source, recording, words)
     progress("modes of the model", 0.1)
     model = as_model(case, "modes")
-    modal = model.modes(MODES + 6)
+    modal = model.normal_modes(MODES + 6)
     f = modal.frequency
     elastic = f[f > 1e-3 * f[-1]][:MODES]
     progress("places", 0.7)
@@ -95,7 +117,7 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
         sure = {f.remedy for f in more if f.fault}  # is not a guess any more
         findings = [f for f in findings if f.remedy.partition(", if ")[0] not in sure] + more
     unused = {c: tuple(case.said(c)) for c in COMMANDS}
-    return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
+    return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused, origin=case)
 
 
 _NO_RECORDING = "none yet: all commands need one except modes, frf, plan, bench, render and study"
@@ -231,7 +253,7 @@ def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
     if not case.frfs:
         return []
     try:
-        screening = correlate(case, progress, every_line=False).screening
+        screening = correlate(case, progress=progress, every_line=False).screening
     except ChladniError as error:
         screening = screened_unprepared(case)
         if screening is None or not screening.faults:

@@ -1,10 +1,13 @@
 """Compare test and model without calibration: paired modes, MAC, COMAC, Q."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Unpack
 
 import numpy as np
 
 from ..case import Case
+from ..case.make_case import CaseWords, Measured
 from ..dynamics.frf import FRF
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.correlation import Quality, comac, deviation, mac, quality
@@ -19,9 +22,11 @@ from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
+from ..results import Result
 from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
+from .given_case import Source, given_case
 from .identify import firm
 from .output_only import with_natural_frequencies
 from .question_of_case import nothing_measured
@@ -33,8 +38,8 @@ LONG = 100_000  # values of a recording: 210 000 took 190 s on a busy machine
 RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid motions
 
 
-@dataclass(frozen=True, eq=False)
-class Correlation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Correlation(Result):
     """Comparison of test and model: paired modes with shapes at the sensors, and Q.
 
     Attributes
@@ -70,11 +75,19 @@ class Correlation:
     likeness: tuple[Likeness, ...] = ()
 
 
-def correlate(case: Case, progress: Progress = silent, every_line: bool = True) -> Correlation:
+def correlate(
+    source: Source,
+    recording: Measured | Sequence[Measured] = (),
+    *,
+    progress: Progress = silent,
+    every_line: bool = True,
+    **words: Unpack[CaseWords],
+) -> Correlation:
     """Identify the first recording, pair its modes with the model's, score the responses.
 
     Parameters
     ----------
+    source, recording, progress, words : as in :func:`chladni.diagnose`
     every_line : False if only its screening is needed: the modes of a long recording are then
         identified from the lines that screening needs
 
@@ -83,9 +96,11 @@ def correlate(case: Case, progress: Progress = silent, every_line: bool = True) 
     FileError
         If the deck's unit system cannot be right, or there is no recording to compare with.
     """
+    case = given_case(source, recording, words)
     refuse_other_units(case)
     with one_blas_thread():
-        return _correlated(with_natural_frequencies(case), progress, every_line)
+        found = _correlated(with_natural_frequencies(case), progress, every_line)
+    return replace(found, origin=case)
 
 
 def _correlated(case: Case, progress: Progress, every_line: bool) -> Correlation:

@@ -1,17 +1,52 @@
 """Name the physics that a deck left out."""
 
-from ..case import Case
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Unpack
+
+from ..case.make_case import CaseWords, Measured
 from ..progress import Progress, silent
 from .diagnosis_result import DiagnosisResult
+from .given_case import Source, given_case
 from .states import diagnose_states
 
 
-def diagnose(case: Case, progress: Progress = silent) -> DiagnosisResult:
-    """The missing physics of a case, or that none is missing, judged on data no fit saw.
+def diagnose(
+    source: Source,
+    recording: Measured | Sequence[Measured] = (),
+    *,
+    progress: Progress = silent,
+    **words: Unpack[CaseWords],
+) -> DiagnosisResult:
+    """Name the physics a model lacks, or find that none is missing, judged on held-out data.
+
+    Parameters
+    ----------
+    source : a deck (path, or a model of :func:`chladni.load`), or a case (folder, ``case.toml`` or
+        :func:`chladni.load_case`), which then says everything else itself
+    recording : one or several: paths, ``FRF`` with channels as ``412:+Z``, ``PoleTable``,
+        ``Recording``, or dicts with the keys of a [[recording]]; the first is compared
+    progress : is called with a text and a share of the work
+    words : units, sensors, mass, band, effects and the other words of a case, as
+        :class:`chladni.CaseWords` lists them (SI, Hz)
+
+    Returns
+    -------
+    DiagnosisResult
+        With ``verdict``, ``effects``, ``summary()``, ``plot()`` and ``save(folder)``.
 
     Raises
     ------
-    FileError
-        If the recordings hold nothing to compare, or the deck's unit system cannot be right.
+    FileError, LabelError, ModelError
+        One sentence that names the argument (or file and line), the offender and the alternatives.
+
+    Examples
+    --------
+    ::
+
+        found = chladni.diagnose("deck.bdf", "test.uff", units="mm-t-s", mass=2.1)
+        print(found.summary())
+        found.save("runs/first")
     """
-    return diagnose_states(case, True, progress)
+    case = given_case(source, recording, words)
+    return replace(diagnose_states(case, True, progress), origin=case)

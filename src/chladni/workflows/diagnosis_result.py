@@ -14,6 +14,7 @@ from ..ema.level_table import LevelTable
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
+from ..results import Result
 from ..updating.calibration_result import CalibrationStudy
 from ..updating.level_effects import LinearJoint
 from ..updating.measured_modes import MeasuredModes
@@ -66,8 +67,8 @@ class UpdatedModels:
     test: MeasuredModes = field(default_factory=lambda: MeasuredModes(np.zeros(0)))
 
 
-@dataclass(frozen=True, eq=False)
-class DiagnosisResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class DiagnosisResult(Result):
     """Result of a diagnosis: the verdict, its certainty, and the improvement it brings.
 
     Attributes

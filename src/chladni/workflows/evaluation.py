@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from ..case import Case
 from ..case.mended_recordings import with_frf
@@ -17,8 +18,10 @@ from ..errors import ChladniError, FileError
 from ..fem.modelled import modelled
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
+from ..results import Result
 from .case_model import REACH
 from .identify import without_window
+from .recordings_of import read_source
 from .screening_of_case import screened_by_model
 
 MOVES = 1.5  # damping at one amplitude over that at another: more is no linear structure
@@ -46,8 +49,8 @@ class RecordingEvaluation:
     levels: LevelStudy = field(default_factory=LevelStudy)
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation(Result):
     """The evaluation of every recording of a test."""
 
     recordings: tuple[RecordingEvaluation, ...]
@@ -55,14 +58,20 @@ class Evaluation:
 
 
 def evaluate_recordings(
-    source: Case | Sequence[Recording],
+    source: Case | str | Path | Sequence[Recording],
     settings: EstimateSettings | None = None,
+    *,
     progress: Progress = silent,
 ) -> Evaluation:
     """Estimate FRFs from time data, and screen every recording.
 
     The first recording of a case is screened against its model as well. A case that compares
     natural frequencies does not know the places of its channels; it is screened alone.
+
+    Parameters
+    ----------
+    source : a case, recordings, or the path of either
+    settings : excitation, method, lines and band of the estimate
 
     Raises
     ------
@@ -71,6 +80,7 @@ def evaluate_recordings(
     LabelError
         If excitation or method have no such name.
     """
+    source = read_source(source)
     settings = settings or EstimateSettings()
     refuse_unknown(settings)
     case = source if isinstance(source, Case) else None
@@ -99,7 +109,7 @@ def evaluate_recordings(
     if settings != EstimateSettings() and not any(e for _, e in held):
         said.append("Nothing was estimated, so excitation, method, lines and band were not used.")
     own = case.said("test") if case is not None else [n for r, _ in held for n in r.notes]
-    return Evaluation(tuple(found), tuple(dict.fromkeys([*said, *own])))
+    return Evaluation(tuple(found), tuple(dict.fromkeys([*said, *own])), origin=source)
 
 
 def _decay_notes(found: RecordingEvaluation) -> list[str]:

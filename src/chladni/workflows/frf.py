@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from ..case import Case
+from ..case import Case, load_case
 from ..case.sensor_places import ROLES, placed, sensor_masses, weight_of_sensors
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
@@ -21,8 +21,10 @@ from ..model.analysis import Analysis, Subcase
 from ..model.point_masses import with_masses
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
+from ..results import Result
+from ..units import Units
 from .case_model import REACH, model_frf
-from .loaded_model import DeckModels, Model, as_model, similar_names
+from .loaded_model import DeckModels, Model, as_model, is_case, load_deck, similar_names
 
 Side = Sequence[str] | MeasuredDofs  # outputs, or inputs
 MOST_DOFS, MOST_NAMED = (
@@ -31,8 +33,8 @@ MOST_DOFS, MOST_NAMED = (
 )  # dofs a deck may ask for at once; loaded ones taken in their stead
 
 
-@dataclass(frozen=True, eq=False)
-class FrequencyResponses:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrequencyResponses(Result):
     """Responses, one FRF for each set of frequencies, with notes on the computation."""
 
     frfs: tuple[FRF, ...]
@@ -41,28 +43,42 @@ class FrequencyResponses:
 
 @one_blas_thread()
 def frf(
-    source: Case | Model | DeckModels,
+    source: Case | Model | DeckModels | str | Path,
     outputs: Side = (),
     inputs: Side = (),
     frequency: np.ndarray | None = None,
     damping: float = 0.01,
+    *,
+    units: str | Units | None = None,
     progress: Progress = silent,
 ) -> FrequencyResponses:
     """Compute frequency responses of a model.
 
     Parameters
     ----------
-    source : a case (lines and places of its recording), a deck (its own loads), or a model
+    source : a case (lines and places of its recording), a deck (its own loads), a model, or the
+        path of a case or deck
     outputs, inputs : labels as 55:+Z, 12:n or base:+Z, or places as ``placed_layout`` makes them;
         without inputs those of the source
     frequency : (n_f,) [Hz]     with inputs
     damping : ratio of every mode, where the case gives none
+    units : of a deck given by its path
 
     Raises
     ------
     FileError
         If the places of excitation or response are missing.
     """
+    if isinstance(source, str | Path):
+        source = load_case(source) if is_case(Path(source)) else load_deck(Path(source), units)
+    found = _responses(source, outputs, inputs, frequency, damping, progress)
+    return replace(found, origin=source)
+
+
+def _responses(
+    source: Case | Model | DeckModels, outputs: Side, inputs: Side,
+    frequency: np.ndarray | None, damping: float, progress: Progress,
+) -> FrequencyResponses:  # fmt: skip
     if _labels(inputs):
         if frequency is None or not _labels(outputs):
             raise FileError("--input needs at least one --output, as --output 55:+Z")

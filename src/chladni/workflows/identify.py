@@ -2,11 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ..case import Case
 from ..case.mended_recordings import with_frf
+from ..dynamics.frf import FRF, Quantity
+from ..dynamics.modes import ModalModel
+from ..dynamics.statespace import StateSpace
 from ..ema.coincident_poles import peak_notes
 from ..ema.finding import Screening, notes_of_all, which
 from ..ema.identification import Identified
@@ -14,15 +18,19 @@ from ..ema.identification import identify as identified
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import LevelStudy, level_study
 from ..ema.level_words import level_notes
+from ..ema.realisation import realised
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import ALIKE, RELEASE, responses, ringing
 from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
+from ..ema.shapes import modal_model
 from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
 from ..errors import AccuracyError, FileError
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
+from ..results import Result
 from ..updating.measured_frequencies import LEAST_DELTA_CHI2
+from .recordings_of import read_source
 
 TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted
 
@@ -60,6 +68,28 @@ class RecordingModes:
         return firm(self.modes) & ~self.struck
 
     @property
+    def modal(self) -> ModalModel:
+        """The ``firm`` modes, mass-normalised over the measured dofs, for MAC and synthesis.
+
+        Raises
+        ------
+        LabelError
+            If an output is no single component (412:n), or no point was both driven and measured.
+        """
+        return modal_model(self.modes.sel(self.firm))
+
+    @property
+    def state_space(self) -> StateSpace:
+        """A, B, C, D of all identified poles and the band's residual terms, outputs as recorded.
+
+        Raises
+        ------
+        LabelError
+            If the quantity has no state space: a transmissibility.
+        """
+        return realised(self.whole, self.whole.quantity)  # type: ignore[arg-type]
+
+    @property
     def poles(self) -> PoleTable:
         """The ``firm`` modes, as a table for the report."""
         m = self.modes.sel(self.firm)
@@ -93,8 +123,8 @@ class PoleChoice:
         return said
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result):
     """The modes of every recording, with notes and reasons not to trust them.
 
     ``levels`` holds a study of each object that was measured at two levels or more.
@@ -119,26 +149,30 @@ class Identification:
 
 
 def identify(
-    source: Case | Sequence[Recording],
+    source: Case | str | Path | FRF | Recording | Sequence[Recording],
     band: tuple[float, float] | None = None,
     averages: int = 1,
-    progress: Progress = silent,
     choice: PoleChoice = PoleChoice(),
+    *,
+    quantity: Quantity | None = None,
+    progress: Progress = silent,
 ) -> Identification:
     """Identify the poles of every recording that holds an FRF, or free decays.
 
     Parameters
     ----------
-    source : a case, whose band and gaps apply, or recordings
+    source : a case, whose band and gaps apply; recordings; or the path of either
     band : [Hz]; default that of the case, else the whole
     averages : of the estimate, where the noise comes from the coherence
     choice : poles by hand, or all of a state space
+    quantity : of the responses, where the file at a path does not say it
 
     Raises
     ------
     FileError
         If no recording holds either.
     """
+    source = read_source(source, quantity)
     if isinstance(source, Case):
         recordings = source.recordings
     else:
@@ -170,7 +204,7 @@ def identify(
         *(f"{r.recording.name}: {note}" for r in found for note in peak_notes(r.modes.sel(r.firm))),
         *(note for study in levels for note in level_notes(study)),
     ]
-    return Identification(tuple(found), tuple(notes), _doubts(found), levels)
+    return Identification(tuple(found), tuple(notes), _doubts(found), levels, origin=source)
 
 
 def _has(read: Sequence[Recording]) -> str:

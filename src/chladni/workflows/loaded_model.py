@@ -64,8 +64,8 @@ class Model:
         """The surface that a picture shows."""
         return surface(self.assembly, self.unit)
 
-    def modes(self, count: int) -> ModalModel:
-        """Compute the lowest normal modes."""
+    def normal_modes(self, count: int) -> ModalModel:
+        """Compute the lowest normal modes, fewer if the model has fewer."""
         from ..dynamics.eigen import normal_modes
 
         count = min(count, len(self.structure.system.dofs))
@@ -149,8 +149,16 @@ class DeckModels:
         return Model(self.source, made, "m", notes, self.units.length, self.units, self.deck)
 
 
-def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Model:
-    """Convert a case or a deck to a model; return a model unchanged."""
+def as_model(
+    source: "Case | Model | DeckModels | str | Path",
+    command: str = "modes",
+    units: str | Units | None = None,
+) -> Model:
+    """Convert a case or a deck, or the path of either, to a model; return a model unchanged."""
+    if isinstance(source, str | Path):
+        return load_model(source, units, command=command)
+    if units is not None:
+        raise FileError("argument units is of the path of a deck; this model was loaded before")
     if isinstance(source, Model):
         return source
     if isinstance(source, DeckModels):

@@ -14,12 +14,13 @@ from ..io.nastran.edit.changes import Change
 from ..io.nastran.edit.model_changes import changes
 from ..model.assembly import Assembly
 from ..progress import Progress, silent
+from ..results import Result
 from ..units import Units
 from .loaded_model import Model
 
 
-@dataclass(frozen=True, eq=False)
-class MappedDeck:
+@dataclass(frozen=True, eq=False, repr=False)
+class MappedDeck(Result):
     """A deck with mapped thickness.
 
     Attributes
@@ -48,17 +49,20 @@ class MappedDeck:
 
 def map_formed(
     model: Model,
-    formed: Path,
+    formed: Path | str,
     units: Units | None = None,
     place: str = "unchanged",
     pairs: Mapping[str, int] | None = None,
     guess: bool = False,
+    *,
     progress: Progress = silent,
 ) -> MappedDeck:
     """Map thickness onto a deck's shells, corner by corner.
 
     Parameters
     ----------
+    model : of a deck with units, as ``chladni.load(deck, "mm-t-s")`` returns it
+    formed : LS-DYNA keyword file, VTU, CSV, or a scan of both faces (STL, PLY, OBJ)
     units : of the formed file, the deck's unless given
     place : "as it lies", "aligned" or "mirrored"
     pairs : part of the deck -> part id of the formed mesh
@@ -74,7 +78,7 @@ def map_formed(
         raise FileError(f"{model.source}: a thickness needs the deck's unit system (--units)")
     before = model.assembly
     progress("mapping", 0.2)
-    found = formed_thickness(before, formed, units or model.units, place, pairs)
+    found = formed_thickness(before, Path(formed), units or model.units, place, pairs)
     after, thinning, guessed = found.mapped.assembly, None, None
     if guess:
         progress("thinning by curvature", 0.6)
@@ -82,7 +86,7 @@ def map_formed(
     progress("cards", 0.8)
     edits = tuple(changes(model.deck, before, after, model.units))
     notes = (*model.notes, *found.said(), *_not_mapped(after, found, guessed))
-    return MappedDeck(before, after, found, edits, thinning, guessed, notes)
+    return MappedDeck(before, after, found, edits, thinning, guessed, notes, origin=model)
 
 
 def _with_guess(

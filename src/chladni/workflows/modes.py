@@ -1,6 +1,7 @@
 """Normal modes of a model: frequencies, shapes, mass, the energy of each part."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -10,11 +11,13 @@ from ..fem.energy import mass_properties, part_energies
 from ..fem.loose_parts import loose_grids
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
-from .loaded_model import LEAST_MODES, Model, as_model
+from ..results import Result
+from ..units import Units
+from .loaded_model import LEAST_MODES, DeckModels, Model, as_model
 
 
-@dataclass(frozen=True, eq=False)
-class NormalModes:
+@dataclass(frozen=True, eq=False, repr=False)
+class NormalModes(Result):
     """Modes and what they say of the structure.
 
     Attributes
@@ -39,16 +42,47 @@ class NormalModes:
     in_si: bool
     notes: tuple[str, ...] = ()
 
+    def __len__(self) -> int:
+        return len(self.modal)
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Natural frequencies (r,) [Hz]."""
+        return self.modal.frequency
+
+    @property
+    def shapes(self) -> np.ndarray:
+        """Mass-normalised shapes Φ (n, r) [1/√kg], over the rows of ``modal.dofs``."""
+        return self.modal.shapes
+
 
 @one_blas_thread()
-def modes(source: Case | Model, count: int = 20, progress: Progress = silent) -> NormalModes:
-    """The ``count`` lowest modes, fewer where the model has fewer."""
-    model = as_model(source)
+def modes(
+    source: Case | Model | DeckModels | str | Path,
+    count: int = 20,
+    *,
+    units: str | Units | None = None,
+    progress: Progress = silent,
+) -> NormalModes:
+    """Compute the ``count`` lowest modes, fewer where the model has fewer.
+
+    Parameters
+    ----------
+    source : a model, a case, or the path of a deck or case
+    units : of a deck given by its path; without it numbers stay in the deck's own units, and
+        frequencies are Hz in any
+
+    Raises
+    ------
+    FileError, ModelError
+        If there is no such file, or the deck is wrong.
+    """
+    model = as_model(source, units=units)
     progress("matrices", 0.1)
     structure = model.structure
     size = len(structure.system.dofs)
     progress(f"modes of {size} degrees of freedom", 0.2)
-    whole = model.modes(max(count, LEAST_MODES))
+    whole = model.normal_modes(max(count, LEAST_MODES))
     modal, still = whole.sel(slice(count)), rigid_modes(whole)
     progress("energies", 0.8)
     phi, rigid = modal.shapes, still[:count]
@@ -63,6 +97,7 @@ def modes(source: Case | Model, count: int = 20, progress: Progress = silent) ->
         tuple((part.name, part.id) for part in model.assembly.parts),
         bool(model.unit),
         (*model.notes, *_notes(model, modal, count, int(still.sum())), *loose_parts(model, whole)),
+        origin=model,
     )
 
 

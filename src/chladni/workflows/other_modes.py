@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..case import Case
 from ..dofs import parse
 from ..dynamics.modes import rigid_modes
 from ..ema.correlation import mac, subspace_mac
@@ -16,7 +17,9 @@ from ..io.uff.read_uff import read_uff
 from ..model.assembly import Assembly
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
-from .loaded_model import Model, similar_names
+from ..results import Result
+from ..units import Units
+from .loaded_model import DeckModels, Model, as_model, similar_names
 
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both
 CLOSE = 0.01  # relative distance of frequencies within which shapes may mix
@@ -25,8 +28,8 @@ LEAST_GRIDS = 3  # grids in common: on fewer all shapes look similar
 READERS = (".op2", ".pch", ".punch", ".unv", ".uff", ".uf")
 
 
-@dataclass(frozen=True, eq=False)
-class OtherModes:
+@dataclass(frozen=True, eq=False, repr=False)
+class OtherModes(Result):
     """Elastic modes of the model and of a file, each numbered from 1 as in its source.
 
     Attributes
@@ -93,19 +96,32 @@ def _universal(path: Path) -> PunchModes:
 
 
 @one_blas_thread()
-def other_modes(model: Model, path: Path, progress: Progress = silent) -> OtherModes:
+def other_modes(
+    source: Case | Model | DeckModels | str | Path,
+    path: Path | str,
+    *,
+    units: str | Units | None = None,
+    progress: Progress = silent,
+) -> OtherModes:
     """Pair the modes of a file with the model's, by frequency and by shape at common grids.
+
+    Parameters
+    ----------
+    source : a model, a case, or the path of a deck or case
+    path : OP2, punch or universal file (dataset 55)
+    units : of a deck given by its path
 
     Raises
     ------
     FileError
         If the file holds no elastic modes, or hardly a grid of the model.
     """
+    model, path = as_model(source, "correlate", units), Path(path)
     progress("reading the modes", 0.0)
     read = read_modes(path)
     rows, values = _on_model(model.assembly, read, path)
     progress("modes of the model", 0.2)
-    modal = model.modes(int(MORE * len(read.frequency)) + 6)
+    modal = model.normal_modes(int(MORE * len(read.frequency)) + 6)
     flexible = modal.frequency[~rigid_modes(modal)]
     least = RIGID * float(flexible.min(initial=np.inf))
     elastic = read.frequency > least
@@ -127,7 +143,7 @@ def other_modes(model: Model, path: Path, progress: Progress = silent) -> OtherM
         tuple((np.flatnonzero(elastic) + 1).tolist()), tuple((np.flatnonzero(near) + 1).tolist()),
         M, pair(f_model, f_other, M), _in_span(phi, psi, f_model, f_other),
         len(rows), int(held.sum()), shapes, _whole(model.assembly, rows),
-        (*model.notes, *_notes(model, read, rows, elastic)),
+        (*model.notes, *_notes(model, read, rows, elastic)), origin=model,
     )  # fmt: skip
 
 

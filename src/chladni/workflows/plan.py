@@ -1,18 +1,39 @@
 """Where to put sensors and shakers, and which lines to measure."""
 
+from dataclasses import replace
+from pathlib import Path
+
 from ..case import Case
 from ..parallel import one_blas_thread
 from ..planning import Plan, PlanSettings
 from ..planning import plan as planned
 from ..progress import Progress, silent
-from .loaded_model import Model, as_model
+from ..units import Units
+from .loaded_model import DeckModels, Model, as_model
 
 
 @one_blas_thread()
 def plan(
-    source: Case | Model, settings: PlanSettings | None = None, progress: Progress = silent
+    source: Case | Model | DeckModels | str | Path,
+    settings: PlanSettings | None = None,
+    *,
+    units: str | Units | None = None,
+    progress: Progress = silent,
 ) -> Plan:
-    """Sensors by effective independence and exchange, shaker and cords, lines and duration."""
-    model = as_model(source)
+    """Place sensors by effective independence and exchange; choose shaker, cords and lines.
+
+    Parameters
+    ----------
+    source : a model, a case, or the path of a deck or case
+    settings : how many sensors, modes, shakers, ...; default 30 sensors
+    units : of a deck given by its path
+
+    Raises
+    ------
+    FileError, ModelError
+        If there is no such file, the deck is wrong, or it has too few places for the sensors.
+    """
+    model = as_model(source, "plan", units)
     built, settings = model.structure, settings or PlanSettings()
-    return planned(model.assembly, settings, built=built, unit=model.unit, progress=progress)
+    found = planned(model.assembly, settings, built=built, unit=model.unit, progress=progress)
+    return replace(found, origin=model)

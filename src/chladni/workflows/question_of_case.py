@@ -50,6 +50,7 @@ def question_of(case: Case) -> Question:
         parameters=case.parameters,
         sensor_masses=case.sensor_masses,
         accuracy=case.setup.accuracy,
+        effects=case.effects,
     )
     if frfs:
         first = case.recordings[0]

@@ -1,14 +1,41 @@
 """From a path to recordings, whether it is a file of a test or a case."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from ..dynamics.frf import FRF
 from ..ema.setup import Recording
 from ..errors import FileError
 from .loaded_model import is_case, similar_names
 
+if TYPE_CHECKING:
+    from ..case import Case
+
+
+def read_source(
+    source: "Case | str | Path | FRF | Recording | Sequence[Recording]",
+    quantity: str | None = None,
+) -> "Case | Sequence[Recording]":
+    """Read a case or recordings where a path is given; return what is in memory as it is."""
+    if isinstance(source, str | Path):
+        from ..case import load_case
+
+        path = Path(source)
+        at_case = path.exists() and is_case(path)
+        return load_case(path) if at_case else load_recordings(path, quantity)
+    if isinstance(source, FRF):
+        return (Recording("recording", frf=source),)
+    return (source,) if isinstance(source, Recording) else source
+
 
 def load_recordings(source: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
-    """The recordings of a file, or all of a case.
+    """Read the recordings of a file, or all of a case.
+
+    Parameters
+    ----------
+    source : universal file, NPZ, CSV, MAT or WAV, or a case
+    quantity : receptance, mobility, accelerance or transmissibility, where the file does not say it
 
     Raises
     ------

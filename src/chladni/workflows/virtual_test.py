@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any, Unpack, get_args
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ..bench.front_end import sampling_rate
 from ..bench.sine_schedule import SineLine, dwells_of, stages_for
 from ..bench.sine_sweep import swept
 from ..case import Case
+from ..case.make_case import CaseWords
 from ..dynamics.modes import rigid_modes
 from ..effects.family import Article
 from ..effects.registry import family
@@ -34,7 +35,9 @@ from ..geometry.sampling import nearest_points
 from ..io.file_size import OVERRIDE, most_gigabytes
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
+from ..results import Result
 from .benched_article import benched, true_places
+from .given_case import Source, given_case
 from .loaded_model import as_model
 from .local_sites import LOCAL, local_site
 
@@ -88,8 +91,8 @@ class BenchSettings:
     keep_time: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class BenchResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class BenchResult(Result):
     """Recordings, article by article and level by level, and the concealed truth.
 
     Attributes
@@ -118,9 +121,18 @@ class BenchResult:
 
 
 def virtual_test(
-    case: Case, settings: BenchSettings | None = None, progress: Progress = silent
+    source: Source,
+    settings: BenchSettings | None = None,
+    *,
+    progress: Progress = silent,
+    **words: Unpack[CaseWords],
 ) -> BenchResult:
     """Put the case's structure on the bench, conceal the chosen effects in it, and test it.
+
+    Parameters
+    ----------
+    source, words : as in :func:`chladni.diagnose`; ``sensors`` says where it is driven and measured
+    settings : excitation, level, articles, effects to conceal, ...
 
     Raises
     ------
@@ -130,11 +142,12 @@ def virtual_test(
     LabelError
         If an effect, a local force or an excitation has no such name.
     """
+    case = given_case(source, (), words)
     settings = settings or BenchSettings()
     _known(settings)
     _places_known(case, settings)
     with one_blas_thread():
-        return _tested(case, settings, progress)
+        return replace(_tested(case, settings, progress), origin=case)
 
 
 def _known(settings: BenchSettings) -> None:
@@ -267,7 +280,7 @@ def _band(case: Case) -> tuple[float, float]:
     if named:
         low, high = min(b[0] for b in named), max(b[1] for b in named)
         return max(LEAST_FREQUENCY, BELOW * low), BEYOND * high
-    modal = as_model(case).modes(MODES + 6)
+    modal = as_model(case).normal_modes(MODES + 6)
     f = modal.frequency[~rigid_modes(modal)]
     return max(LEAST_FREQUENCY, BELOW * float(f[0])), BEYOND * float(f[-1])
 

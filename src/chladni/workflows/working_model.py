@@ -10,16 +10,18 @@ import numpy as np
 from ..case.free_parameters import fields_of
 from ..case.schema import FIELDS
 from ..dynamics.frf import FRF, Quantity
+from ..dynamics.statespace import StateSpace, state_space
 from ..effects.user_parameters import number, with_factor
 from ..errors import LabelError, ModelError
 from ..io.nastran import assembly, write_deck
 from ..io.nastran.edit.model_changes import changes
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
+from ..results import DrawnPicture
 from ..units import Units
-from ..view.drawn_picture import DrawnPicture
 from .frf import frf
-from .loaded_model import Model, load_deck
+from .loaded_model import Model, load_model
+from .modes import NormalModes, modes
 
 OF_PARTS = tuple(name for name in FIELDS if name not in ("K", "M"))
 
@@ -29,6 +31,10 @@ class WorkingModel(Model):
 
     Modes are numbered from 1 with the rigid ones counted, as Nastran does.
     """
+
+    def modes(self, count: int = 20) -> NormalModes:
+        """Compute the ``count`` lowest modes, as :func:`chladni.modes` does."""
+        return modes(self, count)
 
     def frf(
         self,
@@ -56,6 +62,35 @@ class WorkingModel(Model):
         (found,) = frf(self, outputs, inputs, np.atleast_1d(frequency), damping).frfs
         return found if found.quantity == "transmissibility" else found.to(quantity)
 
+    def state_space(
+        self,
+        output: str | Sequence[str],
+        input: str | Sequence[str],
+        modes: int = 20,
+        damping: float = 0.01,
+        quantity: Quantity = "receptance",
+    ) -> StateSpace:
+        """x' = A x + B u, y = C x + D u of the lowest modes; higher modes are left out.
+
+        Parameters
+        ----------
+        output, input : labels as ``55:+Z`` or ``55:n``; forces u [N]
+        modes : how many; two states each
+        damping : ratio of every mode
+        quantity : of y, receptance [m], mobility [m/s] or accelerance [m/s²]
+
+        Raises
+        ------
+        LabelError
+            If the model has no such grid, or the quantity has no state space.
+        """
+        outputs, inputs = ((x,) if isinstance(x, str) else tuple(x) for x in (output, input))
+        modal = self.normal_modes(modes).with_damping(damping)
+        phi_out, phi_in = (self.directions(side) @ modal.shapes for side in (outputs, inputs))
+        return state_space(
+            modal, phi_out, phi_in, outputs=outputs, inputs=inputs, quantity=quantity
+        )
+
     def show(self, mode: int) -> DrawnPicture:
         """The shape of a mode, drawn."""
         from tempfile import TemporaryDirectory
@@ -65,7 +100,7 @@ class WorkingModel(Model):
         most = len(self.structure.system.dofs)
         if not 1 <= mode <= most:
             raise ModelError(f"no mode {mode}; the modes of this model are 1 to {most}")
-        modal = self.modes(mode)
+        modal = self.normal_modes(mode)
         motion = self.motion(modal.shapes[:, mode - 1 :])[:, :, 0]
         with TemporaryDirectory(prefix="chladni-") as folder:
             path = Path(folder) / "mode.png"
@@ -97,16 +132,25 @@ class WorkingModel(Model):
     def write(self, path: Path | str) -> Path:
         """Write its deck: the cards that changed are edited, every other line stays as it was."""
         if self.deck is None:
-            raise ModelError("this model was not read from a deck, so there is none to edit")
+            raise ModelError("write edits the cards of a deck, and this model was read from none")
         before = assembly(self.deck, self.units)
         return write_deck(self.deck, path, changes(self.deck, before, self.assembly, self.units))
 
 
-def load(deck: str | Path, units: str | Units | None = None) -> WorkingModel:
-    """The model of a Nastran deck, converted to SI.
+def load(
+    source: str | Path,
+    units: str | Units | None = None,
+    *,
+    allow: Sequence[str] = (),
+    subcase: int | None = None,
+) -> WorkingModel:
+    """Load the model of a Nastran deck or of a case, converted to SI.
 
     Parameters
     ----------
+    source : a deck; or a case (folder or case.toml), which says its units itself
+    allow : cards of the deck to leave out although they carry stiffness
+    subcase : whose supports hold; default the first that seeks modes
     units : the deck's consistent system: SI, mm-t-s, mm-kg-ms, mm-kg-s or in-lb-s; without it its
         numbers are kept as they are (frequencies are Hz in any system that counts seconds)
 
@@ -115,8 +159,7 @@ def load(deck: str | Path, units: str | Units | None = None) -> WorkingModel:
     FileError, ModelError
         One sentence naming file, line, card and the alternatives.
     """
-    made = load_deck(Path(deck), units).model()
-    return WorkingModel(**vars(made))
+    return WorkingModel(**vars(load_model(source, units, allow, subcase)))
 
 
 def _wanted(made: Assembly, field: str, value: float | Mapping[str, float]) -> dict[int, float]:

@@ -1,7 +1,6 @@
 """The changes that turn one assembly's deck into another's: what was repaired, and only that."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +9,9 @@ from ....model.assembly import Assembly, Shells
 from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from ....units import Units
 from .. import Add, Deck, Replace, SetColumns, SetField, units_of
+from ..export.part_cards import material_card
 from .added_elements import added_cards
+from .beam_additions import added_beams
 from .beam_changes import with_sections
 from .changes import Change
 from .free_ids import FreeIds, free_ids
@@ -42,8 +43,10 @@ def changes(
         If the two differ in something no card here can say.
     """
     units = units_of(deck, units)
+    added = added_beams(before, after)
+    whole, after = after, added.rest
     before, out = taken_out(deck, before, after)
-    free = free_ids(deck, after)
+    free = free_ids(deck, whole)
     before, after, split = with_new_properties(before, after, free.properties)
     out += _materials(deck, before, after, units, free, split)
     out += laminate_changes(deck, before, after, units, free.materials)
@@ -52,7 +55,7 @@ def changes(
     out += tie_changes(deck, before, after)
     out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
-    if cards := added_cards(before, after, units, free):
+    if cards := [*added_cards(before, whole, units, free), *added.cards(before, units, free)]:
         out.append(Add(cards, "put in by the diagnosis"))
     return [*out, *support_changes(deck, before, after)]
 
@@ -90,7 +93,7 @@ def _materials(
                 out += _edited(deck, id, old, now, units)
                 continue
             new = next(free.materials)
-            out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
+            out.append(Add([material_card(now, new, units)], "of the parts that changed"))
             out += [_of_material(deck, after.parts[k], name, new, split) for k, name in at]
     oriented = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
     return out + (_axes(before, after, free) if oriented else [])
@@ -119,7 +122,7 @@ def _equal(a: Material, b: Material) -> bool:
 def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> list[Change]:
     """One card's values, or another card in its place."""
     if isinstance(now, Orthotropic) and isinstance(was, Isotropic):
-        return [Replace("MAT1", id, _card(now, units))]
+        return [Replace("MAT1", id, material_card(now, id, units))]
     if isinstance(now, Anisotropic) and id in _ids(deck, "MAT2"):
         return list(_stiffness(id, was, now, units))
     if type(was) is not type(now) or isinstance(now, Anisotropic):
@@ -151,19 +154,6 @@ def _stiffness(id: int, was: Material, now: Anisotropic, units: Units) -> Iterat
             yield SetField("MAT2", id, f"G{i + 1}{j + 1}", float(now.Q[i, j] / units.stress))
     if not np.isclose(was.rho, now.rho, rtol=1e-9, atol=0):
         yield SetField("MAT2", id, "RHO", now.rho / units.density)
-
-
-def _card(m: Material, units: Units) -> list[float | int | str | None]:
-    """MAT1 or MAT8."""
-    s, rho = units.stress, m.rho / units.density or None
-    if isinstance(m, Isotropic):
-        G = None if m.G is None else m.G / s
-        return ["MAT1", m.id, m.E / s, G, m.nu, rho, None, None, m.damping or None]
-    if not isinstance(m, Orthotropic):
-        raise ModelError(f"an Anisotropic material {m.id} of some of its parts cannot be changed")
-    moduli: list[float | int | str | None] = [m.E1 / s, m.E2 / s, m.nu12, m.G12 / s]
-    moduli += [m.G1z / s or None, m.G2z / s or None]
-    return ["MAT8", m.id, *moduli, rho, *[None] * 8, m.damping or None]
 
 
 def _axes(before: Assembly, after: Assembly, free: FreeIds) -> list[Change]:

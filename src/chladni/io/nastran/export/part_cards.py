@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ....errors import ModelError
 from ....model.assembly import Assembly
 from ....model.properties import (
     Anisotropic,
@@ -114,19 +115,57 @@ def beam_card(s: BeamSection, pid: int, mid: Value, units: Units) -> tuple[str, 
 
 def _material(m: Material, as_shear: bool, id: int, units: Units) -> list[str]:
     """MAT1, MAT8 or MAT2."""
+    if not isinstance(m, Anisotropic):
+        name, *values = material_card(m, id, units)
+        return card(str(name), values, _EXACT)
     p, rho = units.stress, m.rho / units.density or None
-    if isinstance(m, Isotropic):
-        G = None if m.G is None else m.G / p
-        return card("MAT1", [id, m.E / p, G, m.nu, rho, None, None, m.damping or None], _EXACT)
-    if isinstance(m, Orthotropic):
-        E = [m.E1 / p, m.E2 / p, m.nu12, m.G12 / p, m.G1z / p, m.G2z / p]
-        blank = [None] * 8
-        return card("MAT8", [id, *E, rho, *blank, m.damping or None], _EXACT)
     Q = np.zeros((3, 3)) if as_shear else m.Q / p
     if as_shear:
         Q[:2, :2] = m.G / p
     upper = Q[np.triu_indices(3)].tolist()
     return card("MAT2", [id, *upper, rho, *[None] * 4, m.damping or None], _EXACT)
+
+
+def material_card(m: Material, id: int, units: Units) -> list[Value]:
+    """MAT1 or MAT8 as (name, field, field, ...).
+
+    Raises
+    ------
+    ModelError
+        If the material is anisotropic: MAT2 stands with its users.
+    """
+    p, rho = units.stress, m.rho / units.density or None
+    if isinstance(m, Isotropic):
+        G = None if m.G is None else m.G / p
+        return ["MAT1", id, m.E / p, G, m.nu, rho, None, None, m.damping or None]
+    if not isinstance(m, Orthotropic):
+        raise ModelError(f"an Anisotropic material {m.id} of some of its parts cannot be changed")
+    moduli: list[Value] = [m.E1 / p, m.E2 / p, m.nu12, m.G12 / p]
+    moduli += [m.G1z / p or None, m.G2z / p or None]
+    return ["MAT8", id, *moduli, rho, *[None] * 8, m.damping or None]
+
+
+def beam_element(assembly: Assembly, row: int, pid: int, units: Units) -> list[Value]:
+    """CBAR, CBEAM or CROD; vectors in the displacement frames of their grids."""
+    b = assembly.beams
+    i, j = b.nodes[row].tolist()
+    kind = beam_kind(assembly.parts[b.part[row]])
+    head: list[Value] = [int(b.ids[row]), pid, *assembly.ids[[i, j]].tolist()]
+    if kind == "rod":
+        return ["CROD", *head]
+    frames = [np.eye(3) if assembly.axes is None else assembly.axes[r] for r in (i, j)]
+    values = [*head, *(frames[0] @ b.up[row]).tolist(), None]
+    values += [_packed(b.pins[row, end]) for end in (0, 1)]
+    if np.any(b.offset[row]):
+        for end in (0, 1):
+            values += (frames[end] @ b.offset[row, end] / units.length).tolist()
+    return ["CBAR" if kind == "bar" else "CBEAM", *values]
+
+
+def _packed(flags: np.ndarray) -> int | None:
+    """Components as one integer, 456; None where none is set."""
+    text = "".join(str(c + 1) for c in np.flatnonzero(flags))
+    return int(text) if text else None
 
 
 def material_direction(assembly: Assembly) -> list[float | int | None]:

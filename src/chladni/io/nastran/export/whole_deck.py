@@ -1,6 +1,7 @@
 """A fresh deck from an Assembly: every array comes back when it is read again."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -101,28 +102,11 @@ def _solids(assembly: Assembly, ids: Ids) -> Iterator[str]:
 
 
 def _beams(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
-    """CBAR, CBEAM, CROD; vectors in the displacement frames of their grids."""
-    b = assembly.beams
-    for k, (i, j) in enumerate(b.nodes.tolist()):
-        kind = part_cards.beam_kind(assembly.parts[b.part[k]])
-        ends = assembly.ids[[i, j]].tolist()
-        values: list[float | int | str | None] = [ids.beam[k], ids.part[b.part[k]], *ends]
-        if kind == "rod":
-            yield from card("CROD", values)
-            continue
-        frames = [np.eye(3) if assembly.axes is None else assembly.axes[r] for r in (i, j)]
-        values += [*(frames[0] @ b.up[k]).tolist(), None]
-        values += [_packed(b.pins[k, end]) for end in (0, 1)]
-        if np.any(b.offset[k]):
-            for end in (0, 1):
-                values += (frames[end] @ b.offset[k, end] / units.length).tolist()
-        yield from card("CBAR" if kind == "bar" else "CBEAM", values, 1e-9)
-
-
-def _packed(flags: np.ndarray) -> int | None:
-    """Components as one integer, 456; None where none is set."""
-    text = "".join(str(c + 1) for c in np.flatnonzero(flags))
-    return int(text) if text else None
+    """CBAR, CBEAM, CROD."""
+    numbered = replace(assembly, beams=replace(assembly.beams, ids=np.array(ids.beam, int)))
+    for k, part in enumerate(assembly.beams.part.tolist()):
+        name, *values = part_cards.beam_element(numbered, k, ids.part[part], units)
+        yield from card(str(name), values, 1e-9)
 
 
 def _scalars(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:

@@ -1,0 +1,57 @@
+"""Beams added to an assembly: stringers, ribs, brackets that a deck lacks."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import ModelError
+from .added_points import next_id
+from .assembly import Assembly, Beams
+from .properties import BeamSection, Part
+
+
+def with_beam_line(
+    assembly: Assembly,
+    grids: Sequence[int],
+    section: BeamSection,
+    up: Sequence[float] | np.ndarray,
+    name: str = "added beam",
+    offset: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+) -> Assembly:
+    """Add a line of beams, one between each two successive grids, as a part of their own.
+
+    Parameters
+    ----------
+    grids : ids of two or more grids of the assembly
+    section : areas and moments, about the reference line (SI)
+    up : (3,)       direction of plane 1, not along the line, basic frame
+    name : of the part
+    offset : (3,)   of the beams from their grids, basic frame [m]
+
+    Raises
+    ------
+    LabelError
+        If the assembly has no such grid.
+    ModelError
+        If a beam has no length, ``up`` lies along it, or a rod has an offset.
+    """
+    ends = assembly.rows(np.asarray(grids, np.int64))
+    nodes = np.column_stack([ends[:-1], ends[1:]])
+    v, along = np.asarray(up, float), np.diff(assembly.points[ends], axis=0)
+    if not len(nodes) or np.any(np.linalg.norm(np.cross(along, v), axis=1) < 1e-9):
+        raise ModelError(f"{name}: a beam needs two grids apart, and a direction across itself")
+    n, b, rod = len(nodes), assembly.beams, section.kind == "rod"
+    if rod and np.any(offset):
+        raise ModelError(f"{name}: a rod runs from grid to grid; only bars and beams have offsets")
+    new = Beams(
+        next_id(assembly) + np.arange(n),
+        nodes,
+        np.full(n, len(assembly.parts)),
+        np.tile(0 * v if rod else v / np.linalg.norm(v), (n, 1)),
+        np.broadcast_to(np.asarray(offset, float), (n, 2, 3)).copy(),
+        np.zeros((n, 2, 6), bool),
+    )
+    joined = {k: np.concatenate([x, getattr(new, k)]) for k, x in vars(b).items()}
+    part = Part(1 + max((p.id for p in assembly.parts), default=0), name, section)
+    return replace(assembly, beams=Beams(**joined), parts=(*assembly.parts, part))

@@ -1,0 +1,249 @@
+"""How results are put into words, drawn and saved: what the commands write, from Python."""
+
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..output import write_json
+from ..planning import Plan
+from ..results import View, show_by
+from ..studies.parameter_study import ParameterStudy
+from ..workflows.case_check import CaseCheck
+from ..workflows.correlate import Correlation
+from ..workflows.diagnosis_result import DiagnosisResult
+from ..workflows.evaluation import Evaluation
+from ..workflows.frf import FrequencyResponses
+from ..workflows.identify import Identification
+from ..workflows.map import MappedDeck
+from ..workflows.modes import NormalModes
+from ..workflows.other_modes import OtherModes
+from ..workflows.virtual_test import BenchResult
+from .blocks import Items, Live, PageParts, Picture, Section
+
+
+@dataclass(frozen=True)
+class _Paged:
+    """A result whose command writes one page of sections.
+
+    Attributes
+    ----------
+    module : of this room, with ``in_words`` and a function that draws the page
+    page : (module, folder, result) -> PageParts
+    json : name of the file with the result as plain data; "": none
+    files : writes more files into the folder and returns (name, what it is) of each
+    """
+
+    command: str
+    module: str
+    page: Callable[[ModuleType, Path, Any], PageParts]
+    json: str = ""
+    files: Callable[[Any, Path], Sequence[tuple[str, str]]] = lambda *_: ()
+    needs_origin: bool = True
+
+    def view(self) -> View:
+        """The view of such results."""
+        from importlib import import_module
+
+        module = import_module(f".{self.module}", __package__)
+        words: Callable[[Any], PageParts] = module.in_words
+        return View(
+            self.command,
+            lambda found: _text(words(found)),
+            lambda found: _html(self.command, words(found)),
+            lambda found: _drawn(lambda folder: _stills(self.page(module, folder, found))),
+            lambda found, folder, _: self._write(module, found, folder),
+            _inputs,
+            self.needs_origin,
+        )
+
+    def _write(self, module: ModuleType, found: Any, folder: Path) -> None:
+        from .page import write_sections
+        from .result_json import to_json
+
+        parts = self.page(module, folder, found)
+        files = [*self.files(found, folder), *parts.files]
+        if self.json:
+            write_json(folder / self.json, to_json(found))
+            files.append((self.json, "the result for other programs"))
+        body = [*parts.sections, *closing_sections(parts.notes, files)]
+        write_sections(
+            folder / "report.html", self.command, body, lead=parts.lead, drawings=parts.drawings
+        )
+
+
+def closing_sections(notes: Sequence[str], files: Sequence[tuple[str, str]]) -> list[Section]:
+    """The last sections of a page: notes, and the files beside it."""
+    from .blocks import Links
+
+    return [
+        Section("What was done, and why", [Items(notes)] if notes else []),
+        Section("Files", [Links(files)] if files else []),
+    ]
+
+
+def _text(parts: PageParts) -> str:
+    from .text_tables import section_lines
+
+    notes = [f"note: {text}" for text in parts.notes]
+    return "\n".join([parts.lead, *section_lines(parts.sections), *([""] if notes else []), *notes])
+
+
+def _html(title: str, parts: PageParts) -> str:
+    from .page import sections_page
+
+    notes = Section("What was done, and why", [Items(parts.notes)] if parts.notes else [])
+    return sections_page(title, [*parts.sections, notes], lead=parts.lead)
+
+
+def _stills(parts: PageParts) -> Iterator[Path]:
+    """All pictures of a page in its order."""
+    for section in parts.sections:
+        for block in section.blocks:
+            if isinstance(block, Picture):
+                yield block.path
+            elif isinstance(block, Live):
+                yield from (picture.path for picture in block.pictures)
+
+
+def _drawn(draw: Callable[[Path], Iterable[Path]]) -> Mapping[str, bytes]:
+    """The pictures that a function draws into a folder, by their names."""
+    with tempfile.TemporaryDirectory(prefix="chladni-") as folder:
+        return {path.stem: path.read_bytes() for path in draw(Path(folder))}
+
+
+def _inputs(found: Any) -> Sequence[Path]:
+    """The files of the deck."""
+    deck = getattr(found.origin, "deck", None)
+    return () if deck is None else tuple(s.path for s in deck.sources)
+
+
+def _diagnosis() -> View:
+    from .diagnosis_folder import shown, write_diagnosis
+    from .figures import figures
+    from .page import diagnosis_page
+    from .sentence import sentence
+    from .verdict import sections, three_numbers
+
+    def summary(found: DiagnosisResult) -> str:
+        from .blocks import Facts
+        from .next_steps import next_steps
+
+        steps = [f"next: {text}" for text in next_steps(found)]
+        first = Section("Before and after", [Facts(three_numbers(found))])
+        parts = PageParts(sentence(found), [first, *sections(found, {}, (), (), "")], ())
+        return "\n".join([_text(parts), *([""] if steps else []), *steps])
+
+    def pictures(found: DiagnosisResult) -> Mapping[str, bytes]:
+        return _drawn(lambda folder: figures(folder, found, shown(found.origin, found)).values())
+
+    def save(found: DiagnosisResult, folder: Path, home: Path) -> None:
+        write_diagnosis(folder, found.origin, found, home=home)
+
+    return View("diagnose", summary, diagnosis_page, pictures, save, _inputs)
+
+
+def _mapped(found: MappedDeck, folder: Path) -> Sequence[tuple[str, str]]:
+    from ..io.nastran import write_deck
+
+    write_deck(found.origin.deck, folder / "mapped.bdf", found.changes)
+    return [("mapped.bdf", "the deck with mapped thickness")]
+
+
+def _responses(module: ModuleType, folder: Path, found: FrequencyResponses) -> PageParts:
+    """The pages of all sets of responses as one."""
+    parts = [module.response_page(folder, one) for one in found.frfs]
+    return replace(
+        parts[0],
+        sections=[s for p in parts for s in p.sections],
+        notes=[*found.notes, *(text for p in parts for text in p.notes)],
+        files=[f for p in parts for f in p.files],
+    )
+
+
+def _bench(found: BenchResult, folder: Path) -> Sequence[tuple[str, str]]:
+    from .bench_folder import write_bench
+
+    return write_bench(folder, found.origin, found)
+
+
+def _tables(found: ParameterStudy, folder: Path) -> Sequence[tuple[str, str]]:
+    from ..studies.study_tables import write_csv
+
+    write_csv(folder / "samples.csv", found)
+    return [("samples.csv", "one line per sample")]
+
+
+def _arrays(found: FrequencyResponses, folder: Path) -> Sequence[tuple[str, str]]:
+    from ..io.tables.write_tables import write_csv, write_npz
+
+    files = []
+    for k, one in enumerate(found.frfs):
+        stem = f"frf_{k + 1}" if k else "frf"
+        write_npz(folder / f"{stem}.npz", one)
+        write_csv(folder / f"{stem}.csv", one)
+        files += [(f"{stem}.npz", "responses as arrays"), (f"{stem}.csv", "the same as a table")]
+    return files
+
+
+_PAGES: Mapping[type, _Paged] = {
+    NormalModes: _Paged(
+        "modes", "modes_page", lambda m, at, x: m.modes_page(at, x.origin, x), "modes.json"
+    ),
+    Correlation: _Paged(
+        "correlate",
+        "correlation_page",
+        lambda m, at, x: m.correlation_page(at, x.origin, x),
+        "correlation.json",
+    ),
+    OtherModes: _Paged(
+        "correlate",
+        "other_modes_page",
+        lambda m, at, x: m.other_modes_page(at, x.origin, x),
+        "correlation.json",
+    ),
+    Identification: _Paged(
+        "identify",
+        "identification_page",
+        lambda m, at, x: m.identification_page(at, x),
+        "identified.json",
+        needs_origin=False,
+    ),
+    Evaluation: _Paged(
+        "test",
+        "evaluation_page",
+        lambda m, at, x: m.evaluation_page(at, x),
+        "test.json",
+        needs_origin=False,
+    ),
+    Plan: _Paged("plan", "plan_page", lambda m, at, x: m.plan_page(at, x.origin, x), "plan.json"),
+    MappedDeck: _Paged(
+        "map", "map_page", lambda m, at, x: m.map_page(at, x), "mapping.json", _mapped
+    ),
+    CaseCheck: _Paged(
+        "check", "check_page", lambda m, at, x: m.check_page(at, x.origin, x), "check.json"
+    ),
+    BenchResult: _Paged(
+        "bench", "bench_page", lambda m, at, x: m.bench_page(at, x), "bench.json", _bench
+    ),
+    ParameterStudy: _Paged(
+        "study",
+        "study_page",
+        lambda m, at, x: m.study_page(at, x),
+        "study.json",
+        _tables,
+        needs_origin=False,
+    ),
+    FrequencyResponses: _Paged(
+        "frf", "response_page", _responses, files=_arrays, needs_origin=False
+    ),
+}
+
+
+def show_results() -> None:
+    """Let every result be shown by this room."""
+    show_by(DiagnosisResult, _diagnosis)
+    for kind, paged in _PAGES.items():
+        show_by(kind, paged.view)

@@ -1,0 +1,145 @@
+"""Results of all functions of the package: in words, drawn, saved, shown in a notebook."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .errors import LabelError, ModelError, did_you_mean, named
+from .output import atomic, run_folder
+
+
+@dataclass(frozen=True)
+class DrawnPicture:
+    """A picture as PNG, which a notebook shows and a script saves."""
+
+    png: bytes
+
+    def _repr_png_(self) -> bytes:
+        """The PNG for a notebook (IPython's rich display protocol)."""
+        return self.png
+
+    def save(self, path: Path | str) -> Path:
+        """Write the PNG; return its path."""
+        return atomic(path, lambda part: part.write_bytes(self.png))
+
+
+@dataclass(frozen=True)
+class View:
+    """How results of one type are shown; the room ``report`` provides one for each type.
+
+    Attributes
+    ----------
+    summary : result -> text
+    html : result -> a whole page without pictures
+    pictures : result -> PNG by name, the main one first
+    save : (result, folder, home): writes all files of the command into a folder, which is moved
+        to its home afterwards
+    command : that returns such a result
+    inputs : files that were read, which nothing may replace
+    needs_origin : whether pictures and files need the model or the case of the result
+    """
+
+    command: str
+    summary: Callable[[Any], str]
+    html: Callable[[Any], str]
+    pictures: Callable[[Any], Mapping[str, bytes]]
+    save: Callable[[Any, Path, Path], None]
+    inputs: Callable[[Any], Iterable[Path]] = lambda _: ()
+    needs_origin: bool = True
+
+
+_FRAME = (
+    '<iframe srcdoc="{}" sandbox="" title="{}" '
+    'style="width:100%;height:{}rem;border:1px solid #ccc;border-radius:8px"></iframe>'
+)
+_views: dict[type, Callable[[], View]] = {}
+
+
+def show_by(kind: type, view: Callable[[], View]) -> None:
+    """Let results of this type be shown by what the call returns at the first use."""
+    _views[kind] = view
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result:
+    """A result that explains itself.
+
+    Attributes
+    ----------
+    origin : the case or model that it was computed from; None if it was read from a file
+    """
+
+    origin: Any = field(default=None, kw_only=True)
+
+    @property
+    def _view(self) -> View:
+        return next(_views[kind] for kind in type(self).__mro__ if kind in _views)()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.summary().partition(chr(10))[0]}>"
+
+    def summary(self) -> str:
+        """Return the result in words: one sentence, then the main tables as text."""
+        return self._view.summary(self)
+
+    def plot(self, name: str = "") -> DrawnPicture:
+        """Draw a picture of the page of the command.
+
+        Parameters
+        ----------
+        name : of the picture; the main one without it
+
+        Raises
+        ------
+        LabelError
+            If there is no such picture; the sentence lists the names.
+        ModelError
+            If the result was read from a file, which does not hold the structure.
+        """
+        drawn = self._pictures()
+        if name and name not in drawn:
+            hint = did_you_mean(name, tuple(drawn))
+            raise LabelError(f"no picture {name!r}; {hint}there are {named(drawn, 20)}")
+        if not drawn:
+            raise LabelError("this result has nothing to draw")
+        return DrawnPicture(drawn[name or next(iter(drawn))])
+
+    def _pictures(self) -> Mapping[str, bytes]:
+        """Draw all pictures once."""
+        self._check_origin()
+        if "_drawn" not in self.__dict__:
+            object.__setattr__(self, "_drawn", self._view.pictures(self))
+        drawn: Mapping[str, bytes] = self.__dict__["_drawn"]
+        return drawn
+
+    def save(self, folder: Path | str) -> Path:
+        """Write the files that the command writes: JSON, tables, pictures, ``report.html``.
+
+        The folder holds the results of one command, as with ``--out``. Returns its path.
+
+        Raises
+        ------
+        FileError
+            If the folder holds results of another command, or cannot be written to.
+        ModelError
+            If the result was read from a file, which does not hold the structure.
+        """
+        self._check_origin()
+        place, view = Path(folder), self._view
+        with run_folder(place, view.command, view.inputs(self)) as scratch:
+            view.save(self, scratch, place)
+        return place
+
+    def _check_origin(self) -> None:
+        if self.origin is None and self._view.needs_origin:
+            raise ModelError(
+                f"this {type(self).__name__} was read from a file, which holds no structure to draw"
+            )
+
+    def _repr_html_(self) -> str:
+        """Return the page in a frame for a notebook: its sandbox runs no scripts."""
+        from html import escape
+
+        page = self._view.html(self)
+        return _FRAME.format(escape(page), type(self).__name__, 36)

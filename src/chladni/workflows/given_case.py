@@ -1,0 +1,63 @@
+"""The case of a call: one that was loaded, one in a folder, or a deck with its recordings."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+from ..case import Case, load_case
+from ..case.make_case import CaseWords, Measured, make_case
+from ..errors import FileError
+from ..io.nastran import assembly
+from ..io.nastran.edit.model_changes import changes
+from ..model.assembly import Assembly
+from .loaded_model import DeckModels, Model, is_case, similar_names
+
+Source = Case | Model | DeckModels | str | Path
+"""A case (or its folder), a deck (or its path), or a model that was loaded from a deck."""
+
+
+def given_case(
+    source: Source, recording: Measured | Sequence[Measured] = (), words: CaseWords | None = None
+) -> Case:
+    """Resolve the arguments of a call into a case.
+
+    Raises
+    ------
+    FileError, LabelError, ModelError
+        One sentence that names the argument, the offender and the alternatives.
+    """
+    words = {} if words is None else words
+    if isinstance(source, str | Path):
+        source = Path(source)
+        if not source.exists():
+            raise FileError(f"no file or folder {source}{similar_names(source)}")
+        if not is_case(source):
+            return make_case(source, recording, words=words)
+        source = load_case(source)
+    if isinstance(source, Case):
+        extra = [*(["recording"] if _any(recording) else []), *words]
+        if extra:
+            raise FileError(
+                f"{source.path} says everything itself; leave out {', '.join(extra)}, or give the "
+                "deck in place of the case"
+            )
+        return source
+    if source.deck is None:
+        raise FileError("this model was not read from a deck, so a diagnosis can change none")
+    if source.units is not None:
+        if words.get("units", source.units.name) != source.units.name:
+            raise FileError(f"argument units: the model was loaded in {source.units.name}")
+        words = cast(CaseWords, {**words, "units": source.units.name})
+    return make_case(source.deck, recording, _changed(source), words)
+
+
+def _changed(source: Model | DeckModels) -> Assembly | None:
+    """The structure of a model, where it has other numbers than its deck."""
+    if isinstance(source, DeckModels) or source.deck is None or source.units is None:
+        return None
+    own = assembly(source.deck, source.units)
+    return source.assembly if changes(source.deck, own, source.assembly, source.units) else None
+
+
+def _any(recording: object) -> bool:
+    return not (isinstance(recording, tuple | list) and not recording)

@@ -1,0 +1,100 @@
+"""Every result explains itself: in words, drawn, saved as its command does, in a notebook."""
+
+import json
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.errors import ChladniError
+from chladni.report.diagnosis_json import read_diagnosis
+from chladni.report.result_views import _PAGES
+from chladni.results import Result, _views
+from chladni.workflows.diagnosis_result import DiagnosisResult
+
+
+def with_own_modes(case):
+    """The model against the shapes it wrote itself."""
+    folder = chladni.modes(case, 12).save(case.path.parent / "own")
+    return chladni.other_modes(case, folder / "modes.unv")
+
+
+MADE = {  # (file of the result, a picture): call
+    "modes": ("modes.json", "modes", lambda case: chladni.modes(case, 8)),
+    "other modes": ("correlation.json", "mac", lambda case: with_own_modes(case)),
+    "frf": ("frf.npz", "", lambda case: chladni.frf(case)),
+    "correlate": ("correlation.json", "mac", lambda case: chladni.correlate(case)),
+    "identify": ("identified.json", "stabilisation", lambda case: chladni.identify(case)),
+    "test": ("test.json", "frf_grid", lambda case: chladni.evaluate_recordings(case)),
+    "check": ("check.json", "sensors", lambda case: chladni.check(case)),
+    "plan": (
+        "plan.json",
+        "sensors",
+        lambda case: chladni.plan(case, chladni.PlanSettings(sensors=6, modes=4, draws=0)),
+    ),
+    "study": (
+        "study.json",
+        "",
+        lambda case: chladni.study(case, ["t=90%:110%"], chladni.StudySettings(samples=4, modes=3)),
+    ),
+}
+
+
+def subclasses(kind: type) -> set[type]:
+    return {kind, *(s for one in kind.__subclasses__() for s in subclasses(one))}
+
+
+def test_every_type_of_result_has_a_view():
+    """No result can be added that prints as a heap of arrays."""
+    assert set(_views) == subclasses(Result) - {Result}
+    assert set(_views) == {*_PAGES, DiagnosisResult}
+
+
+@pytest.mark.parametrize("command", MADE)
+def test_a_result_explains_itself(case, tmp_path, command):
+    name, picture, call = MADE[command]
+    found = call(case)
+    said = found.summary()
+    assert said.splitlines()[0] in repr(found)
+    assert len(repr(found)) < 400
+    assert 'sandbox=""' in found._repr_html_(), "a notebook runs none of its scripts"
+    assert said.splitlines()[0][:40] in found._repr_html_()
+    assert found.plot(picture).png.startswith(b"\x89PNG")
+    with pytest.raises(ChladniError, match=r"no picture 'nothing'; .*there are \w+"):
+        found.plot("nothing")
+    place = found.save(tmp_path / "out")
+    assert {name, "report.html", "run.json"} <= {p.name for p in place.iterdir()}
+    assert said.splitlines()[0][:40] in (place / "report.html").read_text()
+    found.save(place)  # replaces what the same command wrote
+    if command != "modes":
+        with pytest.raises(ChladniError, match="holds the results of chladni"):
+            chladni.modes(case, 8).save(place)
+
+
+def test_a_diagnosis_is_saved_as_its_command_does(diagnosed, tmp_path):
+    place = diagnosed.save(tmp_path / "out")
+    names = {p.name for p in place.iterdir()}
+    assert {"diagnosis.json", "updated.bdf", "report.html"} <= names
+    found = json.loads((place / "diagnosis.json").read_text())
+    assert found["verdict"] == diagnosed.verdict
+    first, *rest = diagnosed.summary().splitlines()
+    assert diagnosed.effects[0].name in first
+    assert any("kg" in line for line in rest)
+    assert diagnosed.plot("where").png != diagnosed.plot("frequencies").png
+
+
+def test_a_result_of_a_file_says_that_it_holds_no_structure(diagnosed, tmp_path):
+    read = read_diagnosis(diagnosed.save(tmp_path / "out"))
+    assert read.summary().splitlines()[0] == diagnosed.summary().splitlines()[0]
+    for ask in (read.plot, lambda: read.save(tmp_path / "again")):
+        with pytest.raises(ChladniError, match="was read from a file"):
+            ask()
+
+
+def test_one_road_to_modes(case, folder):
+    """The function, the model and the path of the deck give the same frequencies."""
+    model = chladni.load(folder / "plate.bdf", "SI")
+    due = chladni.modes(case, 8).frequency
+    for found in (model.modes(8), chladni.modes(folder / "plate.bdf", 8, units="SI")):
+        np.testing.assert_allclose(found.frequency[6:], due[6:], rtol=1e-9)
+    assert type(model.modes(8)) is type(chladni.modes(case, 8))
