@@ -27,7 +27,7 @@ RUNS = DOCS / "_build" / "tutorials"
 RECORDINGS = DOCS.parents[1] / "shared" / "recordings"
 FENCE = re.compile(r"^```(\w+)?([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 PICTURE = re.compile(r"^!\[([^\]]*)\]\(\.\./_build/tutorials/[^)]*\)$", re.MULTILINE)
-PROGRESS = re.compile(r"^\[\d+ s\] .*\n?", re.MULTILINE)  # of a command that takes long
+PROGRESS = re.compile(r"^(?:\[\d+ s\] .*|\d+ of \d+ samples(?:, .* left)?)\n?", re.MULTILINE)
 SHOWN = 60  # lines of an output
 
 
@@ -101,7 +101,13 @@ def _run(page: Path, block: Block, folder: Path) -> str | None:
         return None
     bash = ["bash", "-euo", "pipefail", "-c", block.text]
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-    own = {"PATH": path, "COLUMNS": "100", "OMP_NUM_THREADS": "1", "RECORDINGS": str(RECORDINGS)}
+    own = {
+        "PATH": path,
+        "COLUMNS": "100",
+        "OMP_NUM_THREADS": "1",
+        "RECORDINGS": str(RECORDINGS),
+        "REPOSITORY": str(DOCS.parent),
+    }
     done = subprocess.run(
         bash, cwd=folder, env={**os.environ, **own}, text=True, encoding="utf-8",
         capture_output=True, stdin=subprocess.DEVNULL,
@@ -112,7 +118,11 @@ def _run(page: Path, block: Block, folder: Path) -> str | None:
         raise BlockError(
             f"{page.name}: exit code {done.returncode}, not {due}:\n{block.text}{said}"
         )
-    return said.replace(str(folder), "~").replace(str(RECORDINGS), "$RECORDINGS")
+    return (
+        said.replace(str(folder), "~")
+        .replace(str(RECORDINGS), "$RECORDINGS")
+        .replace(str(DOCS.parent), "$REPOSITORY")
+    )
 
 
 def shown(page: Path, outputs: list[str] | None) -> str:
@@ -145,8 +155,9 @@ def _short(output: str) -> str:
 
 
 def _key(page: Path) -> str:
-    """Changes with the page and with any file of the program."""
-    hashed = hashlib.sha256(page.read_bytes())
+    """Changes with the blocks of a page and with any file of the program."""
+    acting = [b for b in blocks(page.read_text(encoding="utf-8")) if _acts(b)]
+    hashed = hashlib.sha256(repr([(b.words, b.text) for b in acting]).encode())
     root = DOCS.parent
     for folder in ("src", "envs", "meshes"):
         for path in sorted((root / folder).rglob("*")):
