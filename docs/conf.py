@@ -62,15 +62,20 @@ def _bars(app: Any, what: str, name: str, value: object, options: object, lines:
 
 
 def setup(app: Any) -> None:
-    """Write the reference, and run a tutorial when its page is read."""
+    """Write the reference, run the tutorials, and show what they printed and drew."""
     mathml.setup(app)
     quick = app.tags.has("quick")
+    outputs: dict[str, list[str] | None] = {}
 
-    def run(app: Any, name: str, source: list[str]) -> None:
-        if name.startswith("tutorials/"):
-            page = DOCS / f"{name}.md"
-            source[0] = tutorial_blocks.shown(page, None if quick else tutorial_blocks.run(page))
+    def run(app: Any) -> None:
+        for page in sorted((DOCS / "tutorials").glob("*.md")):
+            outputs[f"tutorials/{page.stem}"] = None if quick else tutorial_blocks.run(page)
+
+    def show(app: Any, name: str, source: list[str]) -> None:
+        if "_build/tutorials" in source[0] or name in outputs:
+            source[0] = tutorial_blocks.shown(DOCS / f"{name}.md", outputs.get(name))
 
     reference_pages.write(DOCS / "reference")
-    app.connect("source-read", run)
+    app.connect("builder-inited", run)
+    app.connect("source-read", show)
     app.connect("autodoc-process-docstring", _bars, priority=600)  # after numpydoc

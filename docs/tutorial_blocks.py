@@ -26,7 +26,7 @@ DOCS = Path(__file__).parent
 RUNS = DOCS / "_build" / "tutorials"
 RECORDINGS = DOCS.parents[1] / "shared" / "recordings"
 FENCE = re.compile(r"^```(\w+)?([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-PICTURE = re.compile(r"^!\[([^\]]*)\]\(\.\./_build/tutorials/[^)]*\)$", re.MULTILINE)
+PICTURE = re.compile(r"^!\[([^\]]*)\]\(\.\./_build/tutorials/([^)]*)\)$", re.MULTILINE)
 PROGRESS = re.compile(r"^(?:\[\d+ s\] .*|\d+ of \d+ samples(?:, .* left)?)\n?", re.MULTILINE)
 SHOWN = 60  # lines of an output
 
@@ -126,13 +126,15 @@ def _run(page: Path, block: Block, folder: Path) -> str | None:
 
 
 def shown(page: Path, outputs: list[str] | None) -> str:
-    """The page with the output below every block of commands; without outputs, without pictures."""
-    text = page.read_text(encoding="utf-8")
-    text = "".join(_with_outputs(text, outputs or []))
-    if outputs is not None:
-        return text
-    why = missing(page) or "this is a quick build"
-    return PICTURE.sub(rf"*(No picture: {why}.)* \1", text)
+    """The page with the output below every block of commands, and with the pictures there are."""
+    text = "".join(_with_outputs(page.read_text(encoding="utf-8"), outputs or []))
+    why = missing(page) or "this build has not run the tutorials"
+
+    def picture(found: re.Match[str]) -> str:
+        there = (RUNS / found[2]).is_file()
+        return found[0] if there else f"*(No picture: {why}.)* {found[1]}"
+
+    return PICTURE.sub(picture, text)
 
 
 def _with_outputs(text: str, outputs: list[str]) -> Iterator[str]:
