@@ -6,6 +6,7 @@ of a deck, the effects, the environments and the Python interface.
 
 import dataclasses
 import inspect
+import json
 import re
 import runpy
 import types
@@ -221,7 +222,8 @@ def json_keys() -> list[tuple[str, str, str]]:
     from chladni.workflows.diagnosis_result import DiagnosisResult
 
     classes = {kind.__name__: kind for kind in _classes(DiagnosisResult, set())}
-    return [*_walk(diagnosis_json(_example(DiagnosisResult, frozenset())), "", classes, _Q)]
+    written = json.loads(json.dumps(diagnosis_json(_example(DiagnosisResult, frozenset()))))
+    return [*_walk(written, "", classes, _Q)]
 
 
 def _walk(
