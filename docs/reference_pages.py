@@ -553,15 +553,15 @@ def environments() -> str:
 
 
 def _sections(text: str) -> str:
-    """Headed paragraphs as a definition list; the parameters as a block."""
+    """Headed paragraphs with their head in bold; the parameters as a block."""
     before, _, after = text.partition("\nParameters\n")
     before = re.sub(r"^([A-Z]\w+)\n((?:    .*\n?)+)", _definition, before, flags=re.MULTILINE)
     rows, _, rest = re.sub(r"^-+\n", "", after).partition("\n\n")
-    return f"{before}\n\n```text\n{rows}\n```\n\n{rest}" if rows else before
+    return f"{before}\n\nParameters:\n\n```text\n{rows}\n```\n\n{rest}" if rows else before
 
 
 def _definition(found: re.Match[str]) -> str:
-    return f"**{found[1]}.** {' '.join(found[2].split())}\n"
+    return f"**{found[1]}.** {' '.join(found[2].split())}\n\n"
 
 
 # --- Python -------------------------------------------------------------------------------------
