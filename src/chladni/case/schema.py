@@ -70,16 +70,16 @@ SCHEMA = (
     Key("model", "thickness_units", "word", "", "the deck's", "The unit system of that file.",
         '"mm-t-s"', COMMANDS, tuple(UNITS)),
     Key("model", "thickness_place", "word", "", "as it lies",
-        "Whether its sheets lie on the deck's, or are brought onto them first, as a mirror image "
-        "if need be.", '"aligned"', COMMANDS, PLACES),
+        "Place of its sheets: on the deck's, brought onto them first, or brought onto them as a "
+        "mirror image.", '"aligned"', COMMANDS, PLACES),
     Key("model", "damping", "number, 0 to 0.5", "of critical", "0.01",
         "Damping the model is given where its responses are drawn or scored.", "0.01", _FRF),
     Key("model", "allow", "list of cards", "", "none",
         "Cards and case control commands that are passed over although they are not understood.",
         '["CWELD"]', COMMANDS),
     Key("model", "outside", "true or false", "", "false",
-        "Whether files of the case may lie outside of its folder (`../`, or a whole path); of a "
-        "case from somebody else it stays false.", "true", COMMANDS),
+        "True: files of the case may lie outside of its folder (`../`, or a whole path). Leave it "
+        "false in a case from somebody else.", "true", COMMANDS),
     Key("test", "recordings", "list of files", "", "none",
         "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data, whose FRFs are "
         "estimated as `chladni test` does. One file may hold several articles or levels. The "
@@ -129,8 +129,8 @@ SCHEMA = (
         "One more recording, or one of `recordings` of which more is to be said.",
         '"article_B.uff"', _READ),
     Key("recording", "article", "text", "", "what the file says",
-        "Which of several nominally equal objects it is. Repeats and articles give the spread that "
-        "no fit is asked to go below.", '"B"', _READ),
+        "Which of several nominally equal objects it is. Repeats and articles give the spread "
+        "below which no fit has to go.", '"B"', _READ),
     Key("recording", "level", "number", "N or m/s²", "what the file says",
         "Amplitude that was held: of the force, of the base, or of the response as `control` says. "
         "`identify` and `diagnose` hold frequency and damping against it.", "2.0", _READ),

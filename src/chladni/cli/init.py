@@ -14,8 +14,10 @@ from .run import Allow, Out, Units, place_of, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="DECK")],
-    recordings: Annotated[list[Path] | None, typer.Argument(metavar="RECORDING")] = None,
+    source: Annotated[Path, typer.Argument(metavar="DECK", help="A Nastran deck.")],
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(metavar="RECORDING", help="Files of FRFs or time data.")
+    ] = None,
     sensors: Annotated[
         Path | None, typer.Option(help="Table of sensors, in the form of chladni plan.")
     ] = None,

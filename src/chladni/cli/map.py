@@ -16,8 +16,8 @@ from .run import Allow, Out, Units, started
 
 
 def run(
-    deck: Annotated[Path, typer.Argument(metavar="DECK")],
-    formed: Annotated[Path, typer.Argument(metavar="FORMED")],
+    deck: Annotated[Path, typer.Argument(metavar="DECK", help="A Nastran deck.")],
+    formed: Annotated[Path, typer.Argument(metavar="FORMED", help="The sheet after forming.")],
     units: Units = None,
     formed_units: Annotated[
         str | None, typer.Option(help="Unit system of the formed file; default: that of the deck.")

@@ -5,7 +5,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Estimate:
-    """A physical value with its 95 % interval."""
+    """A physical value with its 95 % interval.
+
+    Attributes
+    ----------
+    name : of the parameter
+    unit : in which the value is given
+    value : the most probable one
+    low, high : ends of the interval that holds the value with 95 % if the explanation is right
+    """
 
     name: str
     value: float
@@ -18,8 +26,15 @@ class Estimate:
 class Location:
     """Place of an effect in words and, if known, in numbers.
 
-    ``radius_m`` is the extent of a distributed effect, or the uncertainty of the place of a local
-    one.
+    Attributes
+    ----------
+    text : in words
+    parts : names of parts
+    grids : ids of grids
+    point_m : place in the basic frame [m]
+    radius_m : extent of a distributed effect, or uncertainty of the place of a local one [m]
+    band_hz : band that it concerns [Hz]
+    channels : labels of the channels that it concerns
     """
 
     text: str = ""

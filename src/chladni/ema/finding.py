@@ -44,7 +44,13 @@ class Finding:
 
 @dataclass(frozen=True)
 class Check:
-    """One check and its result in words; ``passed`` is None if the check was not possible."""
+    """One check and its result.
+
+    Attributes
+    ----------
+    name, result : in words
+    passed : None if the check was not possible
+    """
 
     name: str
     result: str
@@ -53,7 +59,14 @@ class Check:
 
 @dataclass(frozen=True)
 class Screening:
-    """Checks of a recording and their findings."""
+    """Checks of a recording and their findings.
+
+    Attributes
+    ----------
+    name : of the recording
+    findings, checks : what was found, and what was looked at
+    sentence : the summary
+    """
 
     name: str
     findings: tuple[Finding, ...] = ()

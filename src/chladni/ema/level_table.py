@@ -16,8 +16,15 @@ NORMAL_95 = 1.96  # standard deviations of a 95 % interval
 class LevelRow:
     """A mode at one level: measured, by the best element, and predicted if it was held out.
 
-    ``stiffness`` and ``loss`` are the effect of the element at that amplitude: κ' and κ'' over the
-    stiffness of the mode. ``..._low`` and ``..._high`` bound the 95 % interval due to noise.
+    Attributes
+    ----------
+    level : of excitation or response, as the case controls it
+    amplitude_m : displacement of the output [m]
+    frequency_hz, frequency_sd_hz, damping, damping_sd : measured
+    fitted_hz, fitted_damping : by the best element
+    foretold_hz, foretold_damping : predicted, if the level was held out
+    stiffness, loss : κ' and κ'' of the element at that amplitude, over the mode's stiffness
+    frequency_low_hz, frequency_high_hz, damping_low, damping_high : 95 % interval due to noise
     """
 
     level: float
@@ -40,7 +47,13 @@ class LevelRow:
 
 @dataclass(frozen=True)
 class ElementNumber:
-    """A number of an element with its 95 % interval."""
+    """A number of an element with its 95 % interval.
+
+    Attributes
+    ----------
+    name, value, unit : of the number
+    low, high : its interval
+    """
 
     name: str
     value: float
@@ -51,7 +64,16 @@ class ElementNumber:
 
 @dataclass(frozen=True)
 class TriedElement:
-    """An element that was fitted to all levels of a mode."""
+    """An element that was fitted to all levels of a mode.
+
+    Attributes
+    ----------
+    name : of the element
+    chi2, data : what it leaves, and the number of data
+    bic : Bayesian information criterion; the lowest is best
+    p : of its χ²
+    numbers : of the element
+    """
 
     name: str
     chi2: float
@@ -67,6 +89,9 @@ class LevelTable:
 
     Attributes
     ----------
+    output : label of the output at which it was seen
+    signature : the kind of change: linear, drift, or a nonlinearity
+    p_frequency, p_damping : chance of such differences of a mode with one frequency, one damping
     sentence : its change with level and the nonlinearity indicated; "" if it does not change
     explained : True if the first element explains it
     rows, elements : levels rising; elements, best first

@@ -9,8 +9,13 @@ from ..effects.estimate import Estimate, Location
 class NamedEffect:
     """Physics that was found missing, or the fault of a channel.
 
-    ``log_evidence`` is that of all named effects together; ``gain`` what -2 ln evidence loses
-    without this one, all others fitted again.
+    Attributes
+    ----------
+    name, claim : of the effect in the catalogue
+    log_evidence : ln evidence of all named effects together
+    where : its place
+    parameters : its numbers, as they were found
+    gain : increase of -2 ln evidence without this one, all others fitted again
     """
 
     name: str
@@ -23,7 +28,15 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Alternative:
-    """An explanation that was tried and is not the answer."""
+    """An explanation that was tried and is not the answer.
+
+    Attributes
+    ----------
+    name : of the effect, or "calibration only"
+    log_evidence : its ln evidence
+    why_not : why it is less probable, or was refused
+    where : its place; no key where it has none
+    """
 
     name: str
     log_evidence: float | None = None
@@ -68,7 +81,8 @@ class RecordingScore:
 
     Attributes
     ----------
-    name, relation : what it is beside the recording that was fitted: repeat, article, level
+    name : of the recording
+    relation : to the recording that was fitted: repeat, article, level
     apart : Q of the fitted recording itself on this one: no deck is asked to do better
     nominal, calibrated, with_effect : of the decks as they are written
     """
@@ -89,9 +103,10 @@ class Agreement:
     ----------
     fitted, held_out : Scores
     what : the held-out data in words
-    two_log_bayes_factor : of the named effect over calibration; None: none is named
-    largest_two_log_bayes_factor : of any effect that was tried
-    threshold : of 2 ln Bayes factor, from which an effect is named
+    two_log_bayes_factor : 2 ln Bayes factor of the named effect over calibration; None: none is
+        named
+    largest_two_log_bayes_factor : the largest one of any effect that was tried
+    threshold : 2 ln Bayes factor from which an effect is named
     """
 
     fitted: Scores = Scores()
@@ -104,13 +119,15 @@ class Agreement:
 
 @dataclass(frozen=True)
 class CalibratedParameter:
-    """A calibration parameter that was fitted, beside the values of the decks.
+    """A calibration parameter that was fitted, with the values of the decks.
 
     Attributes
     ----------
+    where : the parts or the material
     estimate : beside all that is known to err
-    deck_value, written_value : of the deck that was given and of the one that is written, which
-        has no scatter, joints and folds of its own to stand for and may need another value
+    deck_value : of the deck that was given
+    written_value : of the deck that is written, which has no scatter, joints and folds of its own
+        to stand for and may need another value
     """
 
     where: str
@@ -121,7 +138,13 @@ class CalibratedParameter:
 
 @dataclass(frozen=True)
 class MassComparison:
-    """What the scales say and what the updated deck weighs [kg]."""
+    """Weighed mass and mass of the updated deck.
+
+    Attributes
+    ----------
+    weighed_kg : the mass in ``[test]`` of the case; None: it was not weighed
+    model_kg : mass of the updated deck
+    """
 
     weighed_kg: float | None = None
     model_kg: float | None = None
@@ -131,7 +154,12 @@ class MassComparison:
 class FrequencyRow:
     """A frequency of the test and its partner in every deck [Hz]; None: it has none.
 
-    ``damping`` is the ratio that was identified.
+    Attributes
+    ----------
+    test_hz : natural frequency of the test
+    before_hz, calibrated_hz, after_hz : of the given, the calibrated and the updated deck
+    mac_before, mac_calibrated, mac_after : MAC of each with the shape of the test
+    damping : the damping ratio that was identified
     """
 
     test_hz: float
@@ -146,7 +174,12 @@ class FrequencyRow:
 
 @dataclass(frozen=True)
 class FrequencyError:
-    """Root mean square of ln(model/test) over the first paired frequencies [%]."""
+    """Root mean square of ln(model/test) over the first paired frequencies [%].
+
+    Attributes
+    ----------
+    before, calibrated, after : of the given, the calibrated and the updated deck
+    """
 
     before: float | None = None
     calibrated: float | None = None
@@ -155,7 +188,14 @@ class FrequencyError:
 
 @dataclass(frozen=True)
 class Remainder:
-    """Whether what calibration leaves is structured or noise."""
+    """The residual of calibration: structured, or noise.
+
+    Attributes
+    ----------
+    structured : True if it is more than what is known to err
+    left, known : Q that calibration leaves, and Q that is known to err
+    sentence : the same in words
+    """
 
     structured: bool
     left: float
@@ -167,7 +207,11 @@ class Remainder:
 class FitStatistic:
     """A statistic of what an explanation leaves, and its range over draws of the model itself.
 
-    ``low`` to ``high`` holds 99 % of the draws.
+    Attributes
+    ----------
+    name : the statistic in words
+    value : of the recording
+    median, low, high : of the draws; ``low`` to ``high`` holds 99 % of them
     """
 
     name: str
@@ -179,7 +223,16 @@ class FitStatistic:
 
 @dataclass(frozen=True)
 class LeftPlace:
-    """Where what an explanation leaves sits: in words, by mode, by part and on the mesh."""
+    """Where what an explanation leaves sits: in words, by mode, by part and on the mesh.
+
+    Attributes
+    ----------
+    text : in words
+    modes_hz : frequencies of the modes that show it [Hz]
+    parts : names of parts
+    grid : id of the nearest grid
+    point_m : its place in the basic frame [m]
+    """
 
     text: str
     modes_hz: tuple[float, ...] = ()
@@ -190,7 +243,16 @@ class LeftPlace:
 
 @dataclass(frozen=True, eq=False)
 class Adequacy:
-    """The absolute test of the best explanation."""
+    """The absolute test of the best explanation.
+
+    Attributes
+    ----------
+    passes : True if the recording could come from this explanation
+    p : rank of the recording among draws of the explanation's own predictions
+    what : the result in words
+    where : places that do not fit
+    statistics : what was compared
+    """
 
     passes: bool
     p: float

@@ -73,13 +73,18 @@ class DiagnosisResult(Result):
 
     Attributes
     ----------
-    verdict : a public verdict
-    effects, alternatives : the named effects, and all others that were tried, best first
+    verdict : missing physics, calibration only, nothing missing, measurement fault, nonlinear, or
+        not in catalogue
+    effects : the named effects, the one that gains most first
+    alternatives : all others that were tried, best first
     agreement : Q of every deck
     calibrated : E, rho, t, ... that were fitted
+    mass : of scales and model
     frequencies : test and decks side by side
+    frequency_error : of the paired frequencies
     structured : whether calibration alone leaves more than noise
-    adequate, one_of : the absolute test, and explanations that the data cannot separate
+    adequate : the absolute test of the best explanation
+    one_of : groups of explanations that the data cannot separate
     notes : how the recording was read, what was done and why
     distrust : reasons not to trust the result; the command then exits with 3
     compared : whether responses or natural frequencies were compared
@@ -142,7 +147,13 @@ class DiagnosisResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class StateResult:
-    """One state of an object, and its result."""
+    """One state of an object, and its result.
+
+    Attributes
+    ----------
+    name : of the state; beside it stand all keys of the state's own diagnosis
+    result : of this state
+    """
 
     name: str
     result: DiagnosisResult

@@ -1,0 +1,81 @@
+"""The documentation site: MyST pages, and reference pages that the program itself writes.
+
+``sphinx-build -W docs docs/_build/html`` builds all of it and runs the tutorials (minutes, the
+first time); ``-t quick`` leaves the tutorials' results out.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).parent
+sys.path.insert(0, str(DOCS))
+
+import mathml  # noqa: E402
+import reference_pages  # noqa: E402
+import tutorial_blocks  # noqa: E402
+
+from chladni.output import own_version  # noqa: E402
+
+project = "chladni"
+copyright = "the authors of chladni"
+version = release = own_version()
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+]
+myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build", "first_day.ipynb"]
+suppress_warnings = ["config.cache"]
+highlight_language = "none"
+
+autodoc_typehints = "none"  # the signature of a docstring says shapes and units
+autodoc_member_order = "bysource"
+autosummary_generate = False
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = "chladni"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_math_renderer = "mathml"
+html_theme_options = {
+    "navigation_with_keys": False,
+    "show_toc_level": 2,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "navbar_align": "left",
+}
+
+
+def _bars(app: Any, what: str, name: str, value: object, options: object, lines: list[str]) -> None:
+    """Escape the bars of formulas, |φ|², which reStructuredText takes for substitutions."""
+    lines[:] = [x if x.lstrip().startswith(">>>") else x.replace("|", r"\|") for x in lines]
+
+
+def setup(app: Any) -> None:
+    """Write the reference, run the tutorials, and show what they printed and drew."""
+    mathml.setup(app)
+    quick = app.tags.has("quick")
+    outputs: dict[str, list[str] | None] = {}
+
+    def run(app: Any) -> None:
+        for page in sorted((DOCS / "tutorials").glob("*.md")):
+            outputs[f"tutorials/{page.stem}"] = None if quick else tutorial_blocks.run(page)
+
+    def show(app: Any, name: str, source: list[str]) -> None:
+        if "_build/tutorials" in source[0] or name in outputs:
+            source[0] = tutorial_blocks.shown(DOCS / f"{name}.md", outputs.get(name))
+
+    reference_pages.write(DOCS / "reference")
+    app.connect("builder-inited", run)
+    app.connect("source-read", show)
+    app.connect("autodoc-process-docstring", _bars, priority=600)  # after numpydoc

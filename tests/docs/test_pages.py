@@ -1,0 +1,154 @@
+"""The documents hang together, and what is written from the program is whole; without Sphinx."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from chladni.cli import app
+from chladni.effects import registry
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+LINK = re.compile(r"(?<!`)\[[^\]\[]*\]\(([^)\s]+)\)")
+
+
+def module(name):
+    """A script of the folder of documents."""
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = made
+    spec.loader.exec_module(made)
+    return made
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return module("reference_pages")
+
+
+@pytest.fixture(scope="module")
+def tutorial_blocks():
+    return module("tutorial_blocks")
+
+
+@pytest.fixture(scope="module")
+def pages(reference):
+    """Every page of the site by its path, with its text; "" for those that the build writes."""
+    kept = [p for p in DOCS.rglob("*.md") if "_build" not in p.parts]
+    made = {DOCS / "reference" / f"{name}.md": "" for name in reference.pages()}
+    return {**{p: p.read_text(encoding="utf-8") for p in kept}, **made}
+
+
+def plain(text):
+    """A page without its blocks and code."""
+    return re.sub(r"`[^`\n]*`", "", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+
+
+def anchors(text):
+    """Anchors of the headings, as GitHub and MyST make them."""
+    heads = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", h.lower()).strip().replace(" ", "-") for h in heads}
+
+
+def test_every_page_is_in_a_table_of_contents(pages):
+    listed = set()
+    for page, text in pages.items():
+        for tree in re.findall(r"```\{toctree\}\n(.*?)```", text, re.DOTALL):
+            names = [n for n in tree.split() if not n.startswith(":") and not n.isdigit()]
+            listed |= {(page.parent / f"{n}.md").resolve() for n in names}
+    assert set(pages) - listed == {DOCS / "index.md"}
+    assert not listed - set(pages)
+
+
+def test_every_link_within_leads_to_a_page_and_a_heading(pages):
+    lost = []
+    for page, text in {**pages, ROOT / "README.md": (ROOT / "README.md").read_text()}.items():
+        for target in LINK.findall(plain(text)):
+            if re.match(r"[a-z]+:", target) or "_build" in target:
+                continue
+            name, _, anchor = target.partition("#")
+            path = (page.parent / name).resolve() if name else page
+            there = path in pages or path.exists()
+            if not there or (anchor and pages.get(path) and anchor not in anchors(pages[path])):
+                lost.append((page.name, target))
+    assert not lost
+
+
+def test_every_key_of_a_diagnosis_is_explained(reference):
+    keys = reference.json_keys()
+    assert {
+        "verdict", "effects[].where.point_m", "fit.held_out.Q_with_effect",
+        "levels[].elements[].numbers[].low", "states[].state",
+    } <= {key for key, _, _ in keys}  # fmt: skip
+    assert not [key for key, _, meaning in keys if not meaning and key.count(".") == 0]
+
+
+def test_a_key_that_no_class_documents_is_refused(reference, monkeypatch):
+    monkeypatch.setitem(reference._CLASSES, "mass", ("Remainder",))
+    with pytest.raises(KeyError, match=r"mass\.weighed_kg"):
+        reference.json_keys()
+
+
+def test_every_command_is_on_its_page(reference):
+    page = reference.commands()
+    assert [name for name in app.COMMANDS if f"# chladni {name}" not in page] == []
+    assert "`--detect`" in page
+
+
+def test_every_word_and_option_has_a_meaning(reference):
+    rows = re.findall(r"^\| (`[^|]*) \| ([^|]*) \|", reference.commands(), re.MULTILINE)
+    assert rows
+    assert not [word for word, meaning in rows if not meaning.strip()]
+
+
+def test_every_exit_code_has_a_meaning(reference):
+    """The constants of the command line, and no other."""
+    codes = {n for n, v in vars(app).items() if n.isupper() and type(v) is int}
+    assert codes == set(reference._CODES)
+
+
+def test_cards_and_rules_are_listed(reference):
+    from chladni.decision.decision_rules import DecisionRules
+    from chladni.io.nastran.text.cards import FIELDS
+
+    cards, rules = reference.cards(), reference.decision_rules()
+    assert not [n for n in FIELDS if f"| `{n}` |" not in cards]
+    assert not [n for n in DecisionRules.__dataclass_fields__ if f"| `{n}` |" not in rules]
+
+
+def test_an_effect_states_claim_formula_prior_and_what_it_is_mistaken_for(reference):
+    text = reference._effect(registry.family("point-mass"), reference._Grounds())
+    for part in ("M + m Σ bᵀb", "`CONM2`", "[mass-patch](#mass-patch)", "| M | kg |", "weigh"):
+        assert part in text, part
+
+
+def test_blocks_run_in_order_and_show_what_they_print(tutorial_blocks, tmp_path, monkeypatch):
+    monkeypatch.setattr(tutorial_blocks, "RUNS", tmp_path / "runs")
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```python file=a/one.txt\nhello\n```\n\n```sh\ncat a/one.txt\n```\n\n"
+        "```sh exit=2\necho no >&2\nexit 2\n```\n\n```sh run=no\nexit 5\n```\n"
+    )
+    outputs = tutorial_blocks.run(page)
+    assert outputs == ["hello\n", "no\n"]
+    shown = tutorial_blocks.shown(page, outputs)
+    assert shown.index("cat a/one.txt") < shown.index(":class: output") < shown.index("exit=2")
+    page.write_text("```sh\nexit 3\n```\n")
+    with pytest.raises(tutorial_blocks.BlockError, match="exit code 3, not 0"):
+        tutorial_blocks.run(page)
+
+
+def test_a_page_without_its_data_is_shown_without_pictures(tutorial_blocks, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("<!-- needs: nowhere -->\n![Of it](../_build/tutorials/page/a.png)\n")
+    assert tutorial_blocks.run(page) is None
+    assert "a.png" not in tutorial_blocks.shown(page, None)
+
+
+@pytest.mark.parametrize("page", sorted((DOCS / "tutorials").glob("*.md")), ids=lambda p: p.stem)
+def test_every_picture_of_a_tutorial_comes_from_its_own_run(page):
+    for path in re.findall(r"!\[[^\]]*\]\(([^)]*)\)", page.read_text(encoding="utf-8")):
+        assert path.startswith(f"../_build/tutorials/{page.stem}/"), path
