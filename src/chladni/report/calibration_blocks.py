@@ -1,6 +1,6 @@
 """What a calibration knows beside its values: tables of the page, and ``calibration.json``."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -28,14 +28,14 @@ _PROFILE = (
 )
 
 
-def study_sections(study: CalibrationStudy | None) -> list[Section]:
+def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = ()) -> list[Section]:
     """Sections of a calibration's page; none after a diagnosis."""
     if study is None:
         return []
     return [
         Section("What the data can know", _known(study.identifiability)),
         Section("Basins of the fit", _basins(study)),
-        Section("How sure the values are", _profiles(study)),
+        Section("How sure the values are", [*_profiles(study), *pictures]),
     ]
 
 

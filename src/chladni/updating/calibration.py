@@ -7,6 +7,7 @@
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from .calibration_result import (
     Identifiability,
     LikelihoodProfile,
     NamedValue,
+    ResponseBand,
 )
 from .diagnosis import (
     Diagnosis,
@@ -44,6 +46,7 @@ BEST = 10  # basins that are reported
 REACH = 0.02  # probability beyond each end of the hypercube: two standard deviations of a prior
 SAME = 1.0  # in -2 ln evidence and in standard deviations: fits as near as that are one basin
 PROFILED = (-2.0, -1.0, 1.0, 2.0)  # standard deviations from the best at which a profile is taken
+BANDS, DRAWS = 4, 60  # channels whose predicted response is kept, and draws of the posterior
 PROFILE_STEPS = 6  # of a fit with one parameter held; it starts where the covariance says
 SEED = 20250102
 
@@ -82,7 +85,7 @@ def calibration(
     null = _restarted(problem, null, ends)
     basins = _basins(null, ends)
     progress("profiles", 0.75)
-    profiled = tuple(profiles(problem, null))
+    profiled, predicted = tuple(profiles(problem, null)), tuple(bands(problem, null))
     null = replace(null, fit=_with_frozen(whole, problem, null))
     found = Diagnosis(
         nominal, null, fit_of_the_deck(problem, null), (), notes=tuple(_notes(known, basins, ends))
@@ -91,7 +94,7 @@ def calibration(
     study = CalibrationStudy(
         known, STARTS, basins[:BEST], tuple(_names(null.fit)), tuple(null.fit.x[own].tolist()),
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
-        profiled,
+        profiled, predicted,
     )  # fmt: skip
     return Calibrated(problem, named_by_fits(problem, found), study)
 
@@ -291,3 +294,32 @@ def _held_cost(null: HypothesisFit, mass: MassMeasurement | None, k: int, z: flo
     except ModelError:
         return float("inf")
     return float(r @ r)
+
+
+def bands(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[ResponseBand]:
+    """90 % bands of the responses over draws of the posterior, of held-out channels first.
+
+    Parameters and nuisances are drawn together from their Gaussian posterior, frozen parameters
+    held: what these could change, the free ones undo in the responses.
+    """
+    data, found = null.data, null.fit
+    if not isinstance(data, Responses):
+        return
+    held = ~data.use.any(axis=0)
+    order = np.argsort(~held, kind="stable")[:BANDS]
+    root = np.linalg.cholesky((found.covariance + found.covariance.T) / 2)
+    rng = np.random.default_rng(SEED)
+    draws = []
+    for _ in range(DRAWS):
+        with suppress(ModelError):
+            x = found.x + root @ rng.normal(size=len(found.x))
+            deviation = data.deviation(evaluate(null.model, found.effects, x, False))
+            draws.append(np.abs(data.values * 10**deviation)[:, order, 0])
+    if not draws:
+        return
+    low, high = np.quantile(draws, (0.05, 0.95), axis=0)
+    f, measured = data.s.imag / (2 * np.pi), np.abs(data.values[..., 0])
+    for n, k in enumerate(order):
+        columns = (f, measured[:, k], low[:, n], high[:, n])
+        label = problem.labels[k] if k < len(problem.labels) else f"channel {k + 1}"
+        yield ResponseBand(label, bool(held[k]), *(tuple(c.tolist()) for c in columns))

@@ -113,6 +113,25 @@ class LikelihoodProfile:
 
 
 @dataclass(frozen=True)
+class ResponseBand:
+    """Magnitude of the response of one channel as the posterior predicts it, beside the test.
+
+    Attributes
+    ----------
+    held_out : whether the fit never saw the channel
+    frequency : (n,) Hz, with the damping of the search on both sides
+    measured, low, high : (n,) |H|; 90 % of the draws lie between the last two
+    """
+
+    label: str
+    held_out: bool
+    frequency: tuple[float, ...]
+    measured: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class CalibrationStudy:
     """All that a calibration knows beside the fitted values.
 
@@ -123,6 +142,7 @@ class CalibrationStudy:
     basins : the ten best places where they ended, best first
     names, mean, covariance : of the free parameters x after the fit, frozen ones at their priors
     profiles : of the free parameters
+    bands : responses that the posterior predicts
     compensating : reasons why the values stand for something else; empty where none does
     """
 
@@ -133,4 +153,5 @@ class CalibrationStudy:
     mean: tuple[float, ...] = ()
     covariance: tuple[tuple[float, ...], ...] = ()
     profiles: tuple[LikelihoodProfile, ...] = ()
+    bands: tuple[ResponseBand, ...] = ()
     compensating: tuple[str, ...] = ()
