@@ -19,8 +19,10 @@ from chladni.updating.calibration import (
     profiles,
 )
 from chladni.updating.compensation import compensating
+from chladni.updating.deciding import _leaves_the_scales
 from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.updating.map_fit import Fit, MassMeasurement, Status, fit
+from chladni.updating.reduced_model import evaluate
 from chladni.updating.result import Agreement, MassComparison, Scores
 
 NOISE = 0.1
@@ -190,3 +192,14 @@ def test_bands_are_as_wide_as_the_posterior_and_show_held_out_channels_first(
     else:
         assert 0.5 * sd < width.max() < 50 * sd
         assert (np.array(every[0].low) <= np.array(every[0].measured) * 1.001).mean() > 0.9
+
+
+@pytest.mark.parametrize(("off", "leaves"), [(0.0, False), (0.005, False), (0.02, True)])
+def test_a_calibration_does_not_keep_a_deck_that_leaves_the_scales(reduced, off, leaves):
+    effect = calibration_parameter(reduced.groups, "rho", [0])
+    weight = evaluate(reduced.model, [effect], np.zeros(1)).weight
+    mass = MassMeasurement(weight + off, 0.004)
+    given = UpdatingProblem(reduced, Offsets(np.zeros(0)), mass, (effect,), (), None)
+    null = SimpleNamespace(model=reduced.model)
+    assert _leaves_the_scales(given, null, np.zeros(1)) is leaves
+    assert not _leaves_the_scales(replace(given, mass_measurement=None), null, np.zeros(1))

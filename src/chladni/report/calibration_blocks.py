@@ -13,7 +13,8 @@ Made = TypeVar("Made")
 _NONE = "–"
 _FAR = 1.0  # standard deviation of ln value from which a parameter counts as unbounded
 _KNOWN = (
-    "Standard deviations before the fit, at the deck's values. Single: all other parameters "
+    "Plausible: values beyond stand for something else. Standard deviations before the fit, at the "
+    "deck's values. Single: all other parameters "
     "known. All: every parameter free. Both from the data alone; mesh error, scatter, joints and "
     "folds free. With priors: what the fit can reach. A parameter is frozen where the data tell "
     "less than its prior; the intervals of the others count its prior."
@@ -41,17 +42,19 @@ def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = (
 
 def _known(found: Identifiability) -> list[Block]:
     rows = [
-        (p.name, _percent(p.prior_sd), _percent(p.sd_single), _percent(p.sd_data),
+        (p.name, _plausible(p), _percent(p.prior_sd), _percent(p.sd_single), _percent(p.sd_data),
          _percent(p.sd_after), _verdict(p))
         for p in found.parameters
     ]  # fmt: skip
     if not rows:
         return []
-    heads = ("parameter", "prior", "single", "all", "with priors", "verdict")
+    heads = ("parameter", "plausible", "prior", "single", "all", "with priors", "verdict")
     index = _NONE if found.collinearity is None else number(found.collinearity, 3)
     caption = f"{_KNOWN} Collinearity index: {index} (above 10 to 15 the set trades off)."
     table = Table(heads, rows, ("parameter", "verdict"), caption)
-    texts = [p.why for p in found.parameters if p.why]
+    reasons = {p.name.split(" of ")[0]: p.reason for p in found.parameters if p.reason}
+    texts = [f"prior of {name}: {reason}" for name, reason in reasons.items()]
+    texts += [p.why for p in found.parameters if p.why]
     texts += [
         f"the data do not tell {', '.join(f'{c:+.2f} % of {name}' for name, c in direction)} apart "
         "from no change"
@@ -60,6 +63,12 @@ def _known(found: Identifiability) -> list[Block]:
     ]
     texts += [_along(p) for p in found.parameters if p.along]
     return [table, *([Items(texts)] if texts else [])]
+
+
+def _plausible(p: ParameterKnowledge) -> str:
+    if p.low is None or p.high is None:
+        return _NONE
+    return f"{quantity(p.low, p.unit)} to {quantity(p.high, p.unit)}"
 
 
 def _verdict(p: ParameterKnowledge) -> str:

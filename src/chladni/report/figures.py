@@ -80,8 +80,10 @@ def _study(folder: Path, study: CalibrationStudy | None) -> dict[str, Path]:
         made["corner"] = calibration_plots.corner(folder / "corner.png", study.names, C)
     if study.bands:
         bands = [
-            (f"{b.label}, {'held out' if b.held_out else 'fitted'}",
-             *(np.array(v) for v in (b.frequency, b.measured, b.low, b.high)))
+            (
+                f"{b.label}, {'held out' if b.held_out else 'fitted'}", np.array(b.frequency),
+                np.array(b.measured), np.array(b.low), np.array(b.high),
+            )
             for b in study.bands
         ]  # fmt: skip
         made["bands"] = calibration_plots.response_bands(folder / "bands.png", bands)

@@ -305,7 +305,7 @@ def bands(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[ResponseBan
     data, found = null.data, null.fit
     if not isinstance(data, Responses):
         return
-    held = ~data.use.any(axis=0)
+    held = np.asarray(~data.use.any(axis=0))
     order = np.argsort(~held, kind="stable")[:BANDS]
     root = np.linalg.cholesky((found.covariance + found.covariance.T) / 2)
     rng = np.random.default_rng(SEED)

@@ -32,6 +32,8 @@ class ParameterKnowledge:
     sd_after : from data and priors, the frozen parameters held
     frozen : whether it is held at its prior mean
     why : reason why it is frozen, or what settles it
+    low, high : values beyond which it stands for something else
+    reason : for its prior
     along : what the data know of it at other values
     """
 
@@ -44,6 +46,9 @@ class ParameterKnowledge:
     sd_after: float
     frozen: bool
     why: str = ""
+    low: float | None = None
+    high: float | None = None
+    reason: str = ""
     along: tuple[ValueAndSpread, ...] = ()
 
 

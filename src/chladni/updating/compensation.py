@@ -11,12 +11,11 @@ import numpy as np
 
 from ..effects.effect import Effect
 from .implausible_values import implausible_values
-from .map_fit import Fit, MassMeasurement
+from .map_fit import APART, Fit, MassMeasurement
 from .residual_localisation import ResidualLocalisation
 from .result import Agreement, MassComparison
 from .result_parts import foretells_worse
 
-APART = 1.96  # standard deviations of the weighing: a mass farther off than that has left it
 BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0}  # powers in the bending stiffness of a part
 
 

@@ -14,7 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.calibration_parameters import REASONS
 from ..effects.effect import Effect
+from ..effects.model_families import FAR
+from ..effects.user_parameters import UserParameter
 from .calibration_result import Identifiability, ParameterKnowledge, ValueAndSpread
 from .hypothesis_fit import UpdatingProblem
 from .likelihood import Data
@@ -165,7 +168,7 @@ def _in_words(
     settled : effects among the frozen ones that a weighing would settle
     """
     names = parameter_names(effects)
-    every = unknowns(effects)
+    every, plausible = unknowns(effects), [r for e in effects for r in _plausible(e)]
     prior = np.array([p.sd for p in every])
     F = told.total()
     held = np.array([k for f in frozen for k in at[f]], int)
@@ -183,7 +186,7 @@ def _in_words(
             _why(k, names, prior, F) + (_BY_SCALES if k in by_scales else "")
             if k in held
             else _settled(k, told, held),
-            curves.get(k, ()),
+            *plausible[k], REASONS.get(every[k].name, ""), curves.get(k, ()),
         )
         for k in range(len(names))
     )  # fmt: skip
@@ -192,6 +195,16 @@ def _in_words(
         rows, tuple(map(tuple, C.tolist())), collinearity(F), tuple(_directions(F, names, prior)),
         told.weighed,
     )  # fmt: skip
+
+
+def _plausible(effect: Effect) -> Iterator[tuple[float, float]]:
+    """Values of each parameter beyond which it stands for something else."""
+    for p in effect.parameters:
+        low, high = (p.value(p.mean + z * FAR * p.sd) for z in (-1, 1))
+        if isinstance(effect, UserParameter) and len(effect.parameters) == 1:
+            low = max(low, p.value(effect.low)) if np.isfinite(effect.low) else low
+            high = min(high, p.value(effect.high)) if np.isfinite(effect.high) else high
+        yield low, high
 
 
 def parameter_names(effects: Sequence[Effect]) -> list[str]:
