@@ -1,4 +1,4 @@
-"""What a calibration knows beside its values: tables of the page, and ``calibration.json``."""
+"""Tables of a calibration's page: information, basins, profiles; and ``calibration.json``."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
@@ -80,7 +80,7 @@ def _verdict(p: ParameterKnowledge) -> str:
 
 
 def _along(p: ParameterKnowledge) -> str:
-    """What the data know of a parameter along its range, in one sentence."""
+    """Information on a parameter along its range, in one sentence."""
     points = ", ".join(f"{_percent(v.sd_data)} at {number(v.value, 3)}" for v in p.along)
     return f"standard deviation of {p.name} from the data alone, all others known: {points}"
 
@@ -123,7 +123,7 @@ def calibration_json(result: DiagnosisResult) -> dict[str, Any]:
 
 
 def study_json(study: CalibrationStudy | None) -> dict[str, Any] | None:
-    """All that a calibration knows beside its values; None after a diagnosis."""
+    """Information, basins, covariance and profiles of a calibration; None after a diagnosis."""
     return None if study is None else asdict(study)
 
 

@@ -1,7 +1,7 @@
 """Calibration without new physics: what can be known, many starts, and how sure the result is.
 
-1. What the data cannot know is frozen at its prior (:mod:`.identifiability`).
-2. The null hypothesis of a diagnosis is fitted: free parameters beside all nuisances.
+1. Parameters that the data cannot know are frozen at its prior (:mod:`.identifiability`).
+2. The null hypothesis of a diagnosis is fitted: free parameters and all nuisances.
 3. Fits from a Latin hypercube of starts map the basins of the same objective.
 4. The covariance counts the priors of frozen parameters as well.
 """
@@ -77,7 +77,7 @@ def calibration(
     learned = getattr(getattr(null.data, "error", None), "delta", None)
     if freeze and known.frozen and learned is not None:
         again = identifiability(_about_nominal(whole, learned))
-        if set(again.frozen) < set(known.frozen):  # the model errs less than was allowed for
+        if set(again.frozen) < set(known.frozen):  # the error of form is smaller than its prior
             known = again
             problem, null = without_effects(_without(whole, known.frozen))
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
@@ -126,8 +126,8 @@ def _frozen(effect: Effect, frozen: Sequence[str]) -> bool:
 def _with_frozen(whole: UpdatingProblem, problem: UpdatingProblem, null: HypothesisFit) -> Fit:
     """The fit with a covariance that counts the priors of frozen parameters.
 
-    With H = [[H_ff, H_fz], [H_zf, ·]] the information of data and priors, frozen parameters z of
-    prior covariance P move the fit by -G z, G = H_ff⁻¹ H_fz, so that C = H_ff⁻¹ + G P Gᵀ
+    H = [[H_ff, H_fz], [H_zf, ·]] is the information of data and priors.  Frozen parameters z move
+    the fit by -G z, G = H_ff⁻¹ H_fz.  With their prior covariance P, C = H_ff⁻¹ + G P Gᵀ
     (Tapley, Schutz and Born 2004, Statistical Orbit Determination, ch. 6: consider covariance).
     """
     found = null.fit

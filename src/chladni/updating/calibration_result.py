@@ -21,7 +21,7 @@ class ValueAndSpread:
 
 @dataclass(frozen=True)
 class ParameterKnowledge:
-    """What the data can tell of one parameter, before any fit.
+    """Information of the data on one parameter, before any fit.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class ParameterKnowledge:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What the data can tell of all parameters, before any fit.
+    """Information of the data on all parameters, before any fit.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class LikelihoodProfile:
 
 @dataclass(frozen=True)
 class ResponseBand:
-    """Magnitude of the response of one channel as the posterior predicts it, beside the test.
+    """Magnitude of the response of one channel as the posterior predicts it, and the test.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class ResponseBand:
 
 @dataclass(frozen=True)
 class CalibrationStudy:
-    """All that a calibration knows beside the fitted values.
+    """Information, basins, covariance and profiles of a calibration.
 
     Attributes
     ----------

@@ -234,7 +234,7 @@ def _calibrated(
 
 
 def _leaves_the_scales(problem: UpdatingProblem, null: HypothesisFit, x: np.ndarray) -> bool:
-    """Whether the deck's own mass is not the weighed one: a calibration alone cannot keep it."""
+    """True where the deck's mass is not the weighed one: a calibration alone cannot keep it."""
     weighed = problem.mass_measurement
     if weighed is None:
         return False

@@ -1,12 +1,12 @@
 """Identifiability of calibration parameters, from slopes at the nominal state, before any fit.
 
 J are the slopes of the whitened data by the parameters θ and the nuisances ν, each in standard
-deviations of its prior.  F = J_θᵀ J_θ - J_θᵀ J_ν (J_νᵀ J_ν + I)⁻¹ J_νᵀ J_θ is the information of
-the data on θ with the nuisances free (Walter and Pronzato 1997, Identification of Parametric
-Models, ch. 4 and 6).  With priors the covariance is (F + I)⁻¹.  A parameter is known to the data
-where this variance is at most half of the prior's: the data then tell more than the prior.
-Parameters that trade off share one combination.  They are frozen one at a time, the least known
-first, until the data know the rest.
+deviations of its prior.  The information of the data on θ with the nuisances free is F = J_θᵀ J_θ -
+J_θᵀ J_ν (J_νᵀ J_ν + I)⁻¹ J_νᵀ J_θ (Walter and Pronzato 1997, Identification of Parametric Models,
+ch. 4 and 6).  With priors the covariance is (F + I)⁻¹.  A parameter is known to the data where this
+variance is at most half of the prior's: the data then tell more than the prior.  Parameters that
+trade off share one combination.  They are frozen one at a time, the least known first, until the
+data know the rest.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -135,7 +135,7 @@ def _known_somewhere(curves: Curves, at: np.ndarray) -> bool:
 def _curves(
     problem: UpdatingProblem, mean: np.ndarray
 ) -> Iterator[tuple[int, tuple[ValueAndSpread, ...]]]:
-    """What the data know of each uncertain parameter along its range, all others at their mean."""
+    """Information on each uncertain parameter along its range, all others at their mean."""
     every = unknowns(problem.base)
     for k, column in enumerate(calibration_positions(problem.base)):
         p = every[column]
