@@ -1,8 +1,8 @@
 """Recovery of known values by calibration: truth inside the model class, on another mesh.
 
-Two sheets, welds, a screw and a bead of adhesive.  Ten values are drawn from their priors, the
-article is meshed twice as fine, its responses get 1 % noise and its mass 0.1 %.  ``calibrate``
-answers; its 95 % intervals and what it freezes are compared with the truth.
+Two sheets, welds, a screw and a bead of adhesive.  Ten values are drawn from their priors. The
+article is meshed twice as fine. Its responses get 1 % noise and its mass 0.1 %.  ``calibrate``
+answers. Its 95 % intervals and what it freezes are compared with the truth.
 """
 
 import json
@@ -59,7 +59,7 @@ class Recovered:
 
     @property
     def inside(self) -> bool | None:
-        """Whether the interval holds the truth; None where the value was frozen."""
+        """True if the interval holds the truth; None where the value was frozen."""
         if self.low is None or self.high is None:
             return None
         return self.low <= self.truth <= self.high

@@ -14,12 +14,15 @@ from chladni.updating.calibration import (
     _basins,
     _with_frozen,
     _without,
+    bands,
     latin_hypercube,
     profiles,
 )
 from chladni.updating.compensation import compensating
+from chladni.updating.deciding import _leaves_the_scales
 from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.updating.map_fit import Fit, MassMeasurement, Status, fit
+from chladni.updating.reduced_model import evaluate
 from chladni.updating.result import Agreement, MassComparison, Scores
 
 NOISE = 0.1
@@ -166,3 +169,37 @@ def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
     first, last = compensating(calibrated_plate(reduced, 0.0), result, SCALES)
     assert "weighs 1.5 kg" in first
     assert "the deck keeps its values" in last
+
+
+@pytest.mark.parametrize("sd", [1e-9, 0.02])
+def test_bands_are_as_wide_as_the_posterior_and_show_held_out_channels_first(
+    reduced, responses, sd
+):
+    effect = calibration_parameter(reduced.groups, "E", [0])
+    use = responses.use.copy()
+    use[:, 2] = False
+    data = replace(responses, use=use)
+    given = UpdatingProblem(reduced, data, None, (effect,), (), None, ("a", "b", "c", "d"))
+    found = fit(reduced.model, [effect], data, None, np.array([0.04]))
+    null = HypothesisFit(Effect(), replace(found, covariance=np.array([[sd**2]])), reduced.model)
+    every = list(bands(given, null))
+    assert [b.label for b in every] == ["c", "a", "b", "d"]
+    assert [b.held_out for b in every] == [True, False, False, False]
+    width = np.log(np.array(every[0].high) / every[0].low)
+    if sd < 1e-6:
+        assert_allclose(every[0].low, every[0].measured, rtol=1e-2)
+        assert width.max() < 1e-6
+    else:
+        assert 0.5 * sd < width.max() < 50 * sd
+        assert (np.array(every[0].low) <= np.array(every[0].measured) * 1.001).mean() > 0.9
+
+
+@pytest.mark.parametrize(("off", "leaves"), [(0.0, False), (0.005, False), (0.02, True)])
+def test_a_calibration_does_not_keep_a_deck_that_leaves_the_scales(reduced, off, leaves):
+    effect = calibration_parameter(reduced.groups, "rho", [0])
+    weight = evaluate(reduced.model, [effect], np.zeros(1)).weight
+    mass = MassMeasurement(weight + off, 0.004)
+    given = UpdatingProblem(reduced, Offsets(np.zeros(0)), mass, (effect,), (), None)
+    null = SimpleNamespace(model=reduced.model)
+    assert _leaves_the_scales(given, null, np.zeros(1)) is leaves
+    assert not _leaves_the_scales(replace(given, mass_measurement=None), null, np.zeros(1))

@@ -56,6 +56,8 @@ def test_frequencies_of_a_thin_plate_tell_e_times_t_squared_and_no_more(bare):
     assert second[0] == T
     assert second[1] == pytest.approx(-0.5, abs=0.01)
     assert found.frozen == (E,)
+    assert 170e9 < rows(found)[E].low < 210e9 < rows(found)[E].high < 260e9
+    assert "alloy" in rows(found)[E].reason
     assert "% of t of plate" in rows(found)[E].why
     assert "weighing the article would settle it" in rows(found)[E].why
     assert found.collinearity > 100

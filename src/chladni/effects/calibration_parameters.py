@@ -22,6 +22,15 @@ from .effect import ChannelChange, Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
 
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05, "wall": 0.05}  # prior sd of ln(value / deck's value)
+REASONS = {  # of the priors, by the field
+    "E": "moduli of one alloy differ by 2 to 3 %, those of an unknown sheet by more",
+    "rho": "alloys of one kind differ by 2 %; paint and sealant lie on the sheet and in no deck",
+    "t": "rolling tolerance is 3 to 5 %; forming thins a sheet and thickens it",
+    "wall": "tubes are drawn to 5 to 10 % of their wall",
+    "nu": "metals lie between 0.27 and 0.34",
+    "K": "the stiffness of a joint is seldom known to a third",
+    "R": "nugget and heat-affected zone end within some millimetres of a weld",
+}
 OF_FIELDS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
 SHEET, TUBE = ("E", "rho", "t"), ("E", "rho", "wall")  # of a part of shells, and of beams
 _AREAS = ("area", "I1", "I2", "I12", "J")  # proportional to the wall of a thin tube

@@ -157,7 +157,7 @@ def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
 
 
 def _whole_families(assembly: Assembly, free: FreeParameter) -> Iterator[str]:
-    """Families of joints whose factor is this parameter, so that they need none beside it."""
+    """Families of joints whose factor is this parameter, so that they need no other."""
     for name, soft in (("adhesive", True), ("welds", False)):
         parts = {int(assembly.solids[g].part[r]) for g, rows in solid_parts(assembly, soft)
                  for r in rows}  # fmt: skip

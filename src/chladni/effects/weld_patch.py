@@ -1,10 +1,11 @@
 """Weld patch: the sheet around welds has another modulus than the part, over a free radius.
 
-E of a shell is multiplied by e^{x q}, q = R²/s exp(-d²/2s), s = R² + v: a bell of radius R about
-the nearest weld at distance d, averaged over a shell of variance v = area/12.  q is smooth in R,
-also where R is smaller than a shell.  Shells are collected in rings of nearly equal q, which a deck
-holds as properties of their own.  The patch stands for nugget, heat-affected zone and the mesh of
-the joint (Echaniz Granado 2015, section 5.4: shells that touch weld solids get a material).
+E of a shell is multiplied by e^{x q}, q = R²/s exp(-d²/2s), s = R² + v.  q is a bell of radius R
+about the nearest weld at distance d.  It is averaged over a shell of variance v = area/12.  It is
+smooth in R, also where R is smaller than a shell.  Shells are collected in rings of nearly equal q,
+which a deck holds as properties of their own.  The patch stands for nugget, heat-affected zone and
+the mesh of the joint (Echaniz Granado 2015, section 5.4: shells that touch weld solids get a
+material).
 """
 
 from dataclasses import dataclass, field

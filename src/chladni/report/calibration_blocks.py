@@ -1,6 +1,6 @@
-"""What a calibration knows beside its values: tables of the page, and ``calibration.json``."""
+"""Tables of a calibration's page: information, basins, profiles; and ``calibration.json``."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -13,7 +13,8 @@ Made = TypeVar("Made")
 _NONE = "–"
 _FAR = 1.0  # standard deviation of ln value from which a parameter counts as unbounded
 _KNOWN = (
-    "Standard deviations before the fit, at the deck's values. Single: all other parameters "
+    "Plausible: values beyond stand for something else. Standard deviations before the fit, at the "
+    "deck's values. Single: all other parameters "
     "known. All: every parameter free. Both from the data alone; mesh error, scatter, joints and "
     "folds free. With priors: what the fit can reach. A parameter is frozen where the data tell "
     "less than its prior; the intervals of the others count its prior."
@@ -28,30 +29,32 @@ _PROFILE = (
 )
 
 
-def study_sections(study: CalibrationStudy | None) -> list[Section]:
+def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = ()) -> list[Section]:
     """Sections of a calibration's page; none after a diagnosis."""
     if study is None:
         return []
     return [
         Section("What the data can know", _known(study.identifiability)),
         Section("Basins of the fit", _basins(study)),
-        Section("How sure the values are", _profiles(study)),
+        Section("How sure the values are", [*_profiles(study), *pictures]),
     ]
 
 
 def _known(found: Identifiability) -> list[Block]:
     rows = [
-        (p.name, _percent(p.prior_sd), _percent(p.sd_single), _percent(p.sd_data),
+        (p.name, _plausible(p), _percent(p.prior_sd), _percent(p.sd_single), _percent(p.sd_data),
          _percent(p.sd_after), _verdict(p))
         for p in found.parameters
     ]  # fmt: skip
     if not rows:
         return []
-    heads = ("parameter", "prior", "single", "all", "with priors", "verdict")
+    heads = ("parameter", "plausible", "prior", "single", "all", "with priors", "verdict")
     index = _NONE if found.collinearity is None else number(found.collinearity, 3)
     caption = f"{_KNOWN} Collinearity index: {index} (above 10 to 15 the set trades off)."
     table = Table(heads, rows, ("parameter", "verdict"), caption)
-    texts = [p.why for p in found.parameters if p.why]
+    reasons = {p.name.split(" of ")[0]: p.reason for p in found.parameters if p.reason}
+    texts = [f"prior of {name}: {reason}" for name, reason in reasons.items()]
+    texts += [p.why for p in found.parameters if p.why]
     texts += [
         f"the data do not tell {', '.join(f'{c:+.2f} % of {name}' for name, c in direction)} apart "
         "from no change"
@@ -60,6 +63,12 @@ def _known(found: Identifiability) -> list[Block]:
     ]
     texts += [_along(p) for p in found.parameters if p.along]
     return [table, *([Items(texts)] if texts else [])]
+
+
+def _plausible(p: ParameterKnowledge) -> str:
+    if p.low is None or p.high is None:
+        return _NONE
+    return f"{quantity(p.low, p.unit)} to {quantity(p.high, p.unit)}"
 
 
 def _verdict(p: ParameterKnowledge) -> str:
@@ -71,7 +80,7 @@ def _verdict(p: ParameterKnowledge) -> str:
 
 
 def _along(p: ParameterKnowledge) -> str:
-    """What the data know of a parameter along its range, in one sentence."""
+    """Information on a parameter along its range, in one sentence."""
     points = ", ".join(f"{_percent(v.sd_data)} at {number(v.value, 3)}" for v in p.along)
     return f"standard deviation of {p.name} from the data alone, all others known: {points}"
 
@@ -114,7 +123,7 @@ def calibration_json(result: DiagnosisResult) -> dict[str, Any]:
 
 
 def study_json(study: CalibrationStudy | None) -> dict[str, Any] | None:
-    """All that a calibration knows beside its values; None after a diagnosis."""
+    """Information, basins, covariance and profiles of a calibration; None after a diagnosis."""
     return None if study is None else asdict(study)
 
 

@@ -10,8 +10,9 @@ from ..dynamics.frf import FRF, UNIT
 from ..effects.estimate import Location
 from ..ema.correlation import deviation
 from ..geometry.cells import point_means
+from ..updating.calibration_result import CalibrationStudy
 from ..updating.result import Alternative, NamedEffect, Scores
-from ..view import annotations, plots, scene
+from ..view import annotations, calibration_plots, plots, scene
 from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult
 from .level_blocks import draw_levels
@@ -62,7 +63,31 @@ def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pa
     made |= _scores(folder, result) | _left(folder, result, shown)
     made |= frequencies(folder, rows) | mac_picture(folder, shown) | _modes(folder, result, shown)
     made |= {path.stem: path for path in draw_levels(folder, result.levels).values()}
-    return made | curves(folder, shown)
+    return made | _study(folder, result.study) | curves(folder, shown)
+
+
+def _study(folder: Path, study: CalibrationStudy | None) -> dict[str, Path]:
+    """Draw profiles, the posterior by pairs and response bands of a calibration."""
+    made: dict[str, Path] = {}
+    if study is None:
+        return made
+    if study.profiles:
+        rows = [(p.name, p.neg2_log_likelihood, p.quadratic) for p in study.profiles]
+        path = folder / "profiles.png"
+        made["profiles"] = calibration_plots.likelihood_profiles(path, rows)
+    if len(study.names) > 1:
+        C = np.array(study.covariance)
+        made["corner"] = calibration_plots.corner(folder / "corner.png", study.names, C)
+    if study.bands:
+        bands = [
+            (
+                f"{b.label}, {'held out' if b.held_out else 'fitted'}", np.array(b.frequency),
+                np.array(b.measured), np.array(b.low), np.array(b.high),
+            )
+            for b in study.bands
+        ]  # fmt: skip
+        made["bands"] = calibration_plots.response_bands(folder / "bands.png", bands)
+    return made
 
 
 def _places(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:

@@ -61,6 +61,19 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
         "Grey: the test is blind there; half of the stiffness or mass could be missing.",
     ),
     "deviation": ("scores", "Remaining deviation by channel and band."),
+    "profiles": (
+        "study",
+        "Profile likelihood of each parameter, and the parabola that its interval assumes; grey: "
+        "the limit of 95 %.",
+    ),
+    "corner": (
+        "study",
+        "Posterior of each pair of parameters, change in %: one and two standard deviations.",
+    ),
+    "bands": (
+        "study",
+        "Responses with the damping of the search: 90 % of the posterior, and the test.",
+    ),
     "frequencies": ("modes", "Deviation of each frequency from the test."),
     "mac": ("modes", "Modal assurance criterion, test against model."),
     "modes": ("modes", "Mode shapes of the model after."),
@@ -167,7 +180,7 @@ def sections(
         level_section(result.levels, of_levels),
         Section("Joints at each level", _joints(result)),
         Section("Calibrated parameters", _calibrated(result)),
-        *study_sections(result.study),
+        *study_sections(result.study, shown("study")),
         Section("Test and model", shown("frf")),
         Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),
         Section("Frequencies", [*_frequencies(result), *shown("modes")]),

@@ -1,12 +1,13 @@
 """Calibration without new physics: what can be known, many starts, and how sure the result is.
 
-1. What the data cannot know is frozen at its prior (:mod:`.identifiability`).
-2. The null hypothesis of a diagnosis is fitted: free parameters beside all nuisances.
+1. Parameters that the data cannot know are frozen at its prior (:mod:`.identifiability`).
+2. The null hypothesis of a diagnosis is fitted: free parameters and all nuisances.
 3. Fits from a Latin hypercube of starts map the basins of the same objective.
 4. The covariance counts the priors of frozen parameters as well.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from .calibration_result import (
     Identifiability,
     LikelihoodProfile,
     NamedValue,
+    ResponseBand,
 )
 from .diagnosis import (
     Diagnosis,
@@ -44,6 +46,7 @@ BEST = 10  # basins that are reported
 REACH = 0.02  # probability beyond each end of the hypercube: two standard deviations of a prior
 SAME = 1.0  # in -2 ln evidence and in standard deviations: fits as near as that are one basin
 PROFILED = (-2.0, -1.0, 1.0, 2.0)  # standard deviations from the best at which a profile is taken
+BANDS, DRAWS = 4, 60  # channels whose predicted response is kept, and draws of the posterior
 PROFILE_STEPS = 6  # of a fit with one parameter held; it starts where the covariance says
 SEED = 20250102
 
@@ -74,7 +77,7 @@ def calibration(
     learned = getattr(getattr(null.data, "error", None), "delta", None)
     if freeze and known.frozen and learned is not None:
         again = identifiability(_about_nominal(whole, learned))
-        if set(again.frozen) < set(known.frozen):  # the model errs less than was allowed for
+        if set(again.frozen) < set(known.frozen):  # the error of form is smaller than its prior
             known = again
             problem, null = without_effects(_without(whole, known.frozen))
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
@@ -82,7 +85,7 @@ def calibration(
     null = _restarted(problem, null, ends)
     basins = _basins(null, ends)
     progress("profiles", 0.75)
-    profiled = tuple(profiles(problem, null))
+    profiled, predicted = tuple(profiles(problem, null)), tuple(bands(problem, null))
     null = replace(null, fit=_with_frozen(whole, problem, null))
     found = Diagnosis(
         nominal, null, fit_of_the_deck(problem, null), (), notes=tuple(_notes(known, basins, ends))
@@ -91,7 +94,7 @@ def calibration(
     study = CalibrationStudy(
         known, STARTS, basins[:BEST], tuple(_names(null.fit)), tuple(null.fit.x[own].tolist()),
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
-        profiled,
+        profiled, predicted,
     )  # fmt: skip
     return Calibrated(problem, named_by_fits(problem, found), study)
 
@@ -123,8 +126,8 @@ def _frozen(effect: Effect, frozen: Sequence[str]) -> bool:
 def _with_frozen(whole: UpdatingProblem, problem: UpdatingProblem, null: HypothesisFit) -> Fit:
     """The fit with a covariance that counts the priors of frozen parameters.
 
-    With H = [[H_ff, H_fz], [H_zf, ·]] the information of data and priors, frozen parameters z of
-    prior covariance P move the fit by -G z, G = H_ff⁻¹ H_fz, so that C = H_ff⁻¹ + G P Gᵀ
+    H = [[H_ff, H_fz], [H_zf, ·]] is the information of data and priors.  Frozen parameters z move
+    the fit by -G z, G = H_ff⁻¹ H_fz.  With their prior covariance P, C = H_ff⁻¹ + G P Gᵀ
     (Tapley, Schutz and Born 2004, Statistical Orbit Determination, ch. 6: consider covariance).
     """
     found = null.fit
@@ -291,3 +294,32 @@ def _held_cost(null: HypothesisFit, mass: MassMeasurement | None, k: int, z: flo
     except ModelError:
         return float("inf")
     return float(r @ r)
+
+
+def bands(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[ResponseBand]:
+    """90 % bands of the responses over draws of the posterior, of held-out channels first.
+
+    Parameters and nuisances are drawn together from their Gaussian posterior, frozen parameters
+    held: what these could change, the free ones undo in the responses.
+    """
+    data, found = null.data, null.fit
+    if not isinstance(data, Responses):
+        return
+    held = np.asarray(~data.use.any(axis=0))
+    order = np.argsort(~held, kind="stable")[:BANDS]
+    root = np.linalg.cholesky((found.covariance + found.covariance.T) / 2)
+    rng = np.random.default_rng(SEED)
+    draws = []
+    for _ in range(DRAWS):
+        with suppress(ModelError):
+            x = found.x + root @ rng.normal(size=len(found.x))
+            deviation = data.deviation(evaluate(null.model, found.effects, x, False))
+            draws.append(np.abs(data.values * 10**deviation)[:, order, 0])
+    if not draws:
+        return
+    low, high = np.quantile(draws, (0.05, 0.95), axis=0)
+    f, measured = data.s.imag / (2 * np.pi), np.abs(data.values[..., 0])
+    for n, k in enumerate(order):
+        columns = (f, measured[:, k], low[:, n], high[:, n])
+        label = problem.labels[k] if k < len(problem.labels) else f"channel {k + 1}"
+        yield ResponseBand(label, bool(held[k]), *(tuple(c.tolist()) for c in columns))

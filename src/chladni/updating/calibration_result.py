@@ -21,7 +21,7 @@ class ValueAndSpread:
 
 @dataclass(frozen=True)
 class ParameterKnowledge:
-    """What the data can tell of one parameter, before any fit.
+    """Information of the data on one parameter, before any fit.
 
     Attributes
     ----------
@@ -32,6 +32,8 @@ class ParameterKnowledge:
     sd_after : from data and priors, the frozen parameters held
     frozen : whether it is held at its prior mean
     why : reason why it is frozen, or what settles it
+    low, high : values beyond which it stands for something else
+    reason : for its prior
     along : what the data know of it at other values
     """
 
@@ -44,12 +46,15 @@ class ParameterKnowledge:
     sd_after: float
     frozen: bool
     why: str = ""
+    low: float | None = None
+    high: float | None = None
+    reason: str = ""
     along: tuple[ValueAndSpread, ...] = ()
 
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What the data can tell of all parameters, before any fit.
+    """Information of the data on all parameters, before any fit.
 
     Attributes
     ----------
@@ -113,8 +118,27 @@ class LikelihoodProfile:
 
 
 @dataclass(frozen=True)
+class ResponseBand:
+    """Magnitude of the response of one channel as the posterior predicts it, and the test.
+
+    Attributes
+    ----------
+    held_out : whether the fit never saw the channel
+    frequency : (n,) Hz, with the damping of the search on both sides
+    measured, low, high : (n,) |H|; 90 % of the draws lie between the last two
+    """
+
+    label: str
+    held_out: bool
+    frequency: tuple[float, ...]
+    measured: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class CalibrationStudy:
-    """All that a calibration knows beside the fitted values.
+    """Information, basins, covariance and profiles of a calibration.
 
     Attributes
     ----------
@@ -123,6 +147,7 @@ class CalibrationStudy:
     basins : the ten best places where they ended, best first
     names, mean, covariance : of the free parameters x after the fit, frozen ones at their priors
     profiles : of the free parameters
+    bands : responses that the posterior predicts
     compensating : reasons why the values stand for something else; empty where none does
     """
 
@@ -133,4 +158,5 @@ class CalibrationStudy:
     mean: tuple[float, ...] = ()
     covariance: tuple[tuple[float, ...], ...] = ()
     profiles: tuple[LikelihoodProfile, ...] = ()
+    bands: tuple[ResponseBand, ...] = ()
     compensating: tuple[str, ...] = ()

@@ -1,7 +1,7 @@
 """Signs that calibrated values compensate for something that the model lacks.
 
-A fit compensates where it predicts held-out data worse than the deck did, leaves the weighed mass
-by more than the error of the weighing, or ends on a bound of what a value can be.
+There are three: the fit predicts held-out data worse than the deck did; it leaves the weighed mass
+by more than the error of the weighing; it ends on a bound of what a value can be.
 """
 
 from collections.abc import Iterator
@@ -11,12 +11,11 @@ import numpy as np
 
 from ..effects.effect import Effect
 from .implausible_values import implausible_values
-from .map_fit import Fit, MassMeasurement
+from .map_fit import APART, Fit, MassMeasurement
 from .residual_localisation import ResidualLocalisation
 from .result import Agreement, MassComparison
 from .result_parts import foretells_worse
 
-APART = 1.96  # standard deviations of the weighing: a mass farther off than that has left it
 BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0}  # powers in the bending stiffness of a part
 
 
@@ -67,7 +66,7 @@ def _leaves_the_scales(
 
 
 def _stands_for(fit: Fit, place: str) -> str:
-    """What the changes of each part amount to in the words of mass and stiffness."""
+    """The changes of each part in the words of mass and stiffness."""
     stiff: dict[str, float] = {}
     heavy: dict[str, float] = {}
     for effect in filter(_is_factor, fit.effects):
@@ -95,7 +94,7 @@ def _stands_for(fit: Fit, place: str) -> str:
 
 
 def _is_factor(effect: Effect) -> bool:
-    """Whether an effect is one factor on a value of the deck."""
+    """True for one factor on a value of the deck."""
     single = effect.kind == "calibration" and len(effect.parameters) == 1
     return single and effect.parameters[0].kind == "log"
 

@@ -26,10 +26,10 @@ from .adequacy import FitTest
 from .basis_refinement import Refinement
 from .diagnosis import Diagnosis, fit_test
 from .held_out_evidence import held_out_evidence
-from .hypothesis_fit import HypothesisFit
+from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Responses
 from .local_damping_test import heard_of_damping
-from .map_fit import fit
+from .map_fit import APART, fit
 from .pole_data import Poles
 from .question import Prepared
 from .reduced_model import evaluate
@@ -221,13 +221,25 @@ def _calibrated(
         return tuple(data.Q(state, data.use) for state in each)
 
     if deck is CalibratedDeck.GIVEN:
-        return known.with_Q(deck, Q(problem.base, given(problem, null)))
+        x = given(problem, null)
+        if not found.hypotheses and _leaves_the_scales(problem, null, x):
+            return known.with_Q(deck, (np.inf, np.inf))
+        return known.with_Q(deck, Q(problem.base, x))
     try:
         made = numbers(prepared, found, known, deck)
     except ModelError:  # without scatter its numbers belong to no physical structure
         return known.with_Q(deck, ())
     known = replace(known, decks={**known.decks, deck: made})
     return known.with_Q(deck, Q(made.fit.effects, made.fit.x))
+
+
+def _leaves_the_scales(problem: UpdatingProblem, null: HypothesisFit, x: np.ndarray) -> bool:
+    """True where the deck's mass is not the weighed one: a calibration alone cannot keep it."""
+    weighed = problem.mass_measurement
+    if weighed is None:
+        return False
+    state = evaluate(null.model, problem.base, x, False)
+    return bool(abs(state.weight - weighed.mass) > APART * weighed.sd)
 
 
 def numbers(

@@ -1,12 +1,12 @@
 """Identifiability of calibration parameters, from slopes at the nominal state, before any fit.
 
 J are the slopes of the whitened data by the parameters θ and the nuisances ν, each in standard
-deviations of its prior.  F = J_θᵀ J_θ - J_θᵀ J_ν (J_νᵀ J_ν + I)⁻¹ J_νᵀ J_θ is the information of
-the data on θ with the nuisances free (Walter and Pronzato 1997, Identification of Parametric
-Models, ch. 4 and 6).  With priors the covariance is (F + I)⁻¹.  A parameter is known to the data
-where this variance is at most half of the prior's: the data then tell more than the prior.
-Parameters that trade off share one combination.  They are frozen one at a time, the least known
-first, until the data know the rest.
+deviations of its prior.  The information of the data on θ with the nuisances free is F = J_θᵀ J_θ -
+J_θᵀ J_ν (J_νᵀ J_ν + I)⁻¹ J_νᵀ J_θ (Walter and Pronzato 1997, Identification of Parametric Models,
+ch. 4 and 6).  With priors the covariance is (F + I)⁻¹.  A parameter is known to the data where this
+variance is at most half of the prior's: the data then tell more than the prior.  Parameters that
+trade off share one combination.  They are frozen one at a time, the least known first, until the
+data know the rest.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -14,7 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.calibration_parameters import REASONS
 from ..effects.effect import Effect
+from ..effects.model_families import FAR
+from ..effects.user_parameters import UserParameter
 from .calibration_result import Identifiability, ParameterKnowledge, ValueAndSpread
 from .hypothesis_fit import UpdatingProblem
 from .likelihood import Data
@@ -132,7 +135,7 @@ def _known_somewhere(curves: Curves, at: np.ndarray) -> bool:
 def _curves(
     problem: UpdatingProblem, mean: np.ndarray
 ) -> Iterator[tuple[int, tuple[ValueAndSpread, ...]]]:
-    """What the data know of each uncertain parameter along its range, all others at their mean."""
+    """Information on each uncertain parameter along its range, all others at their mean."""
     every = unknowns(problem.base)
     for k, column in enumerate(calibration_positions(problem.base)):
         p = every[column]
@@ -165,7 +168,7 @@ def _in_words(
     settled : effects among the frozen ones that a weighing would settle
     """
     names = parameter_names(effects)
-    every = unknowns(effects)
+    every, plausible = unknowns(effects), [r for e in effects for r in _plausible(e)]
     prior = np.array([p.sd for p in every])
     F = told.total()
     held = np.array([k for f in frozen for k in at[f]], int)
@@ -183,7 +186,7 @@ def _in_words(
             _why(k, names, prior, F) + (_BY_SCALES if k in by_scales else "")
             if k in held
             else _settled(k, told, held),
-            curves.get(k, ()),
+            *plausible[k], REASONS.get(every[k].name, ""), curves.get(k, ()),
         )
         for k in range(len(names))
     )  # fmt: skip
@@ -192,6 +195,16 @@ def _in_words(
         rows, tuple(map(tuple, C.tolist())), collinearity(F), tuple(_directions(F, names, prior)),
         told.weighed,
     )  # fmt: skip
+
+
+def _plausible(effect: Effect) -> Iterator[tuple[float, float]]:
+    """Values of each parameter beyond which it stands for something else."""
+    for p in effect.parameters:
+        low, high = (p.value(p.mean + z * FAR * p.sd) for z in (-1, 1))
+        if isinstance(effect, UserParameter) and len(effect.parameters) == 1:
+            low = max(low, p.value(effect.low)) if np.isfinite(effect.low) else low
+            high = min(high, p.value(effect.high)) if np.isfinite(effect.high) else high
+        yield low, high
 
 
 def parameter_names(effects: Sequence[Effect]) -> list[str]:

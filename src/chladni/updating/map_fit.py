@@ -17,6 +17,8 @@ from .likelihood import Data
 from .matrix_stack import along
 from .reduced_model import Reduced, State, evaluate, slices
 
+APART = 1.96  # standard deviations of a weighing: a mass farther off has left the scales
+
 
 class Status(Enum):
     """Outcome of a fit."""

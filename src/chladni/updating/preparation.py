@@ -301,7 +301,7 @@ def updating_problem(
 ) -> UpdatingProblem:
     """The updating problem of a diagnosis: calibration parameters and nuisances are free.
 
-    A family of joints that the user frees as a whole has no nuisance of its own beside it.
+    A family of joints that the user frees as a whole has no nuisance of its own.
     """
     own = freed_by(question, reduced, f_max)
     gone = {name for e in own for name in e.replaces}

@@ -1,10 +1,15 @@
 """Fit the calibration parameters of a deck alone."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Unpack
 
+import numpy as np
+
+from ..case import Case
 from ..case.make_case import CaseWords, Measured
+from ..effects.joints import solid_parts
+from ..effects.weld_patch import FIELD as WELD_PATCH
 from ..progress import Progress, silent
 from .diagnosis_result import DiagnosisResult
 from .given_case import Source, given_case
@@ -32,4 +37,21 @@ def calibrate(
         One sentence that names the argument (or file and line), the offender and the alternatives.
     """
     case = given_case(source, recording, words)
-    return replace(diagnose_states(case, False, progress), origin=case)
+    found = diagnose_states(case, False, progress)
+    return replace(found, notes=(*found.notes, *proposed(case)), origin=case)
+
+
+def proposed(case: Case) -> Iterator[str]:
+    """Sentences on joints that a case may free besides the default parameters of its deck."""
+    if case.parameters or not len(case.assembly.shells):
+        return
+    for soft, field, what in (
+        (True, "adhesive-stiffness", "adhesive, over decades with sd = 2"),
+        (False, WELD_PATCH, "the sheet about its welds"),
+    ):
+        rows = {int(p) for group, at in solid_parts(case.assembly, soft)
+                for p in np.unique(case.assembly.solids[group].part[at])}  # fmt: skip
+        if rows:
+            names = ", ".join(f'"{case.assembly.parts[k].name}"' for k in sorted(rows))
+            parts = f" and parts = [{names}]" if soft else ""
+            yield f'a [[parameter]] with field = "{field}"{parts} frees {what}'

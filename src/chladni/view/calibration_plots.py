@@ -1,0 +1,114 @@
+"""Pictures of a calibration: profiles of the likelihood, the posterior by pairs, response bands."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .paper import AFTER, BEFORE, LEGEND, TEST, save
+
+MOST = 8  # parameters in a picture of pairs
+_ANGLE = np.linspace(0, 2 * np.pi, 90)
+_SIGNIFICANT = 3.84  # χ² of one degree of freedom at 95 %
+
+
+def likelihood_profiles(
+    path: Path | str, profiles: Sequence[tuple[str, Sequence[float], Sequence[float]]]
+) -> Path:
+    """Plot the profile of each parameter over the parabola of its covariance.
+
+    Parameters
+    ----------
+    profiles : (name, -2 ln likelihood above the best, parabola), at -2, -1, 1, 2 sd
+    """
+    columns = min(4, len(profiles))
+    rows = -(-len(profiles) // columns)
+    figure = Figure(figsize=(2.5 * columns, 2.3 * rows), layout="constrained")
+    axes = np.ravel(figure.subplots(rows, columns, squeeze=False))
+    for ax, (name, found, parabola) in zip(axes, profiles, strict=False):
+        at, zero = [-2, -1, 0, 1, 2], lambda v: [*v[:2], 0.0, *v[2:]]
+        ax.plot(at, zero(list(parabola)), color=BEFORE, ls=(0, (4, 2)), lw=1.2, label="interval")
+        ax.plot(at, zero(list(found)), color=AFTER, marker="o", ms=3.5, lw=1.4, label="profile")
+        ax.axhline(_SIGNIFICANT, color="#999999", lw=0.6)
+        ax.set_title(name, fontsize=8, loc="left")
+        ax.set_ylim(min(-1.0, *found), max(6.0, 1.1 * max(v for v in found if np.isfinite(v))))
+        ax.set_xticks(at)
+        ax.tick_params(labelsize=7)
+    for ax in axes[len(profiles) :]:
+        ax.set_visible(False)
+    axes[0].legend(**LEGEND)
+    figure.supxlabel("standard deviations from the best", fontsize=9)
+    figure.supylabel("-2 ln profile likelihood", fontsize=9)
+    return save(figure, path)
+
+
+def corner(path: Path | str, names: Sequence[str], covariance: np.ndarray) -> Path:
+    """Plot the Gaussian posterior of every pair of parameters: 39 % and 86 % ellipses, in per cent.
+
+    Parameters
+    ----------
+    covariance : (p, p)   of ln value
+    """
+    names, C = list(names[:MOST]), 1e4 * np.asarray(covariance)[:MOST, :MOST]
+    p = len(names)
+    side = max(1.25 * p, 2.6)
+    figure = Figure(figsize=(side + 0.8, side), layout="constrained")
+    axes = figure.subplots(p, p, squeeze=False)
+    for i in range(p):
+        for j in range(p):
+            ax = axes[i, j]
+            if j > i:
+                ax.set_visible(False)
+                continue
+            _pair(ax, C, i, j)
+            ax.tick_params(labelsize=6, labelbottom=i == p - 1, labelleft=j == 0 and i > 0)
+            if i == p - 1:
+                ax.set_xlabel(names[j], fontsize=7, rotation=20, ha="right")
+            if j == 0 and i:
+                ax.set_ylabel(names[i], fontsize=7, rotation=70, ha="right")
+    return save(figure, path)
+
+
+def _pair(ax: Axes, C: np.ndarray, i: int, j: int) -> None:
+    """One density on the diagonal, else two ellipses."""
+    if i == j:
+        z = np.linspace(-3, 3, 61)
+        ax.plot(z * np.sqrt(C[i, i]), np.exp(-(z**2) / 2), color=AFTER, lw=1.2)
+        ax.set_yticks([])
+        return
+    at = np.ix_((j, i), (j, i))
+    root = np.linalg.cholesky(C[at] + 1e-12 * np.trace(C[at]) * np.eye(2))
+    for k, strength in ((1, 0.35), (2, 0.15)):
+        x, y = k * root @ np.stack([np.cos(_ANGLE), np.sin(_ANGLE)])
+        ax.fill(x, y, color=AFTER, alpha=strength, lw=0)
+    for axis, n in ((ax.set_xlim, j), (ax.set_ylim, i)):
+        axis(-3 * np.sqrt(C[n, n]), 3 * np.sqrt(C[n, n]))
+
+
+def response_bands(
+    path: Path | str,
+    bands: Sequence[tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]],
+    unit: str = "",
+) -> Path:
+    """Plot 90 % bands of predicted magnitudes and the measured ones, one channel above another.
+
+    Parameters
+    ----------
+    bands : (title, frequency [Hz], measured, low, high)
+    """
+    figure = Figure(figsize=(8.2, 1.9 * len(bands) + 0.4), layout="constrained")
+    axes = np.ravel(figure.subplots(len(bands), 1, sharex=True, squeeze=False))
+    for ax, (title, f, measured, low, high) in zip(axes, bands, strict=True):
+        ax.fill_between(f, low, high, color=AFTER, alpha=0.35, lw=0, label="90 % of the posterior")
+        ax.plot(f, measured, color=TEST, lw=1.3, label="test")
+        ax.set_yscale("log")
+        ax.set_title(title, fontsize=9, loc="left")
+        ax.grid(lw=0.3, alpha=0.5)
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, **LEGEND
+    )
+    figure.supxlabel("frequency [Hz]", fontsize=9)
+    figure.supylabel(f"|H| [{unit}]" if unit else "|H|", fontsize=9)
+    return save(figure, path)

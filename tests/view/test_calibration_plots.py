@@ -1,0 +1,21 @@
+"""Pictures of a calibration are drawn of few and of many parameters."""
+
+import numpy as np
+import pytest
+
+from chladni.view.calibration_plots import corner, likelihood_profiles, response_bands
+
+
+@pytest.mark.parametrize("count", [1, 2, 11])
+def test_profiles_and_pairs_of_any_number_of_parameters(tmp_path, count):
+    names = [f"E of part {k}" for k in range(count)]
+    rows = [(n, (4.0, 1.0, 1.1, np.inf), (4.0, 1.0, 1.0, 4.0)) for n in names]
+    assert likelihood_profiles(tmp_path / "profiles.png", rows).stat().st_size > 1000
+    C = 1e-4 * np.ones((count, count))  # all of them trade off: no ellipse has a width
+    assert corner(tmp_path / "corner.png", names, C).stat().st_size > 1000
+
+
+def test_bands_of_several_channels(tmp_path):
+    f = np.linspace(10, 100, 40)
+    rows = [("1:+Z, held out", f, 1 + f, f, 2 + f), ("2:+Z, fitted", f, f, f, f)]
+    assert response_bands(tmp_path / "bands.png", rows, "kg⁻¹").stat().st_size > 1000
