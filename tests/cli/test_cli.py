@@ -373,7 +373,7 @@ def test_calibrated_laminate_is_written_into_its_layers(case, tmp_path):
     d = calibrated(case, out)
     assert d["files"]["deck"] == "updated.bdf"
     assert any("of 5 starts, 4 of them random, ended within 1" in note for note in d["notes"])
-    assert "missing physics was not looked for" in (out / "report.html").read_text()
+    assert "missing physics was not searched" in (out / "report.html").read_text()
     f, before = (
         first_elastic(deck, tmp_path) for deck in (out / "updated.bdf", case / "plate.bdf")
     )

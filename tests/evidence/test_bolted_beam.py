@@ -89,4 +89,4 @@ def test_diagnosis_says_nonlinear_and_names_friction(beam):
     found = chladni.diagnose(chladni.load_case(beam))
     assert found.verdict == "nonlinear"
     assert [e.name for e in found.effects] == ["joint-friction"]
-    assert "levels alone do not say where" in found.effects[0].where.text
+    assert "levels alone do not show where" in found.effects[0].where.text

@@ -117,7 +117,7 @@ def test_a_tube_of_flat_strips_has_places_in_their_middle(divisions):
     assert (places.side == np.sign(np.einsum("ij,ij->i", places.normals[:, :2],
                                              places.points[:, :2]))).all()  # fmt: skip
     found = plan(tube, PlanSettings(sensors=8, modes=4))
-    assert "whole foot" in " ".join(notes(found))
+    assert "whole base" in " ".join(notes(found))
 
 
 def test_a_wide_sheet_asks_for_a_whole_foot():
@@ -135,4 +135,4 @@ def test_a_small_structure_takes_as_many_sensors_as_it_has_room_for():
     """Asked for thirty, as by default, it is planned with those that fit."""
     found = plan(plate(0.1, 0.08, 4, 4, 1e-3), PlanSettings(sensors=30, modes=4))
     assert len(found.layout) == len(found.places) == found.settings.sensors < 30
-    assert any("Every place bears a sensor" in note for note in notes(found))
+    assert any("Every place has a sensor" in note for note in notes(found))

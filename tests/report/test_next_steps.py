@@ -27,7 +27,7 @@ def test_every_verdict_says_what_to_do(verdict, mass):
 
 def test_a_finding_is_looked_for_first_at_its_place_and_with_its_size():
     first, second, *_ = steps(verdict="missing physics", effects=[LUMP])
-    assert first.startswith("Near grid 18: look")
+    assert first.startswith("Near grid 18: check")
     assert "0.05 to 0.07" in first or "50 to 70" in first
     assert "confirms point-mass" in second
 
@@ -35,8 +35,8 @@ def test_a_finding_is_looked_for_first_at_its_place_and_with_its_size():
 def test_what_cannot_be_told_apart_is_settled_first():
     tied = {"one_of": [["point-mass", "stiffness-patch"]], "effects": [LUMP]}
     first, second, *_ = steps(verdict="missing physics", **tied)
-    assert "tells point-mass apart" in first
-    assert "tells stiffness-patch apart" in second
+    assert "distinguishes point-mass from the others" in first
+    assert "distinguishes stiffness-patch" in second
 
 
 def test_a_fault_is_measured_again():
@@ -65,7 +65,7 @@ def test_a_calibration_measures_what_moved_most():
 
 
 def test_a_structure_that_was_not_weighed_is_weighed():
-    weigh = [any(s.startswith("Weigh the structure as") for s in
+    weigh = [any(s.startswith("Weigh the test article as") for s in
                  steps(verdict="nothing missing", mass={"model_kg": 2.0, "weighed_kg": kg}))
              for kg in (None, 2.0)]  # fmt: skip
     assert weigh == [True, False]

@@ -42,7 +42,7 @@ def test_one_recording_is_not_named_in_its_notes():
 
 
 def test_where_nothing_is_found_that_is_said():
-    assert lead_of([recording(n) for n in "abc"]) == "3 recordings; nothing found in any of them"
+    assert lead_of([recording(n) for n in "abc"]) == "3 recordings; no fault found"
 
 
 def test_tables_hold_what_is_alike_once():

@@ -118,7 +118,7 @@ def test_others_read_it_in_one_line(out):
 
 def test_the_page_tells_what_moves_what(out):
     page = (out / "report.html").read_text(encoding="utf-8")
-    for word in ("What moves what", "sheet", "open_dataset", "suspension", "first elastic one"):
+    for word in ("Sensitivities", "sheet", "open_dataset", "suspension", "first elastic one"):
         assert word in page
     for name in ("slopes.png", "parallel.png", "responses.png", "design.csv", "study_begun.json"):
         assert (out / name).is_file()

@@ -55,7 +55,7 @@ def test_what_has_become_the_named_effect_is_told_as_that():
     mass, lump = tried("point-mass", 0.0), tried("local-resonator", 2.0, "point-mass")
     null = SimpleNamespace(neg2_log_evidence=500.0, data=None)
     diagnosis = Diagnosis(null, null, null, (mass, lump), "missing physics")
-    assert "it is point-mass" in why_not(diagnosis, lump, mass)
+    assert "its fitted form from point-mass" in why_not(diagnosis, lump, mass)
 
 
 def test_a_lump_tuned_above_the_highest_line_is_a_point_mass():
@@ -65,7 +65,7 @@ def test_a_lump_tuned_above_the_highest_line_is_a_point_mass():
     assert LocalResonator.becomes(effect, [0, 0, 0, 299.0]) == ""
 
 
-RUBS = "1 of 5 modes are damped by 2.0%"
+RUBS = "1 of 5 modes have a damping of 2.0%"
 
 
 @pytest.mark.parametrize(
@@ -73,8 +73,8 @@ RUBS = "1 of 5 modes are damped by 2.0%"
     [
         (2.0, True, "mesh error and scatter within the parts account for it as well as any"),
         (TIED + 20, True, "point-mass accounts for more of it"),
-        (2.0, False, "nothing that was tried accounts for it"),
-        (TIED + 200, False, "nothing that was tried accounts for it"),
+        (2.0, False, "no effect tried accounts for it"),
+        (TIED + 200, False, "no effect tried accounts for it"),
     ],
 )
 def test_mesh_error_is_not_made_the_reason_of_what_it_does_not_explain(gain, passes, said):
@@ -97,9 +97,9 @@ def test_a_leader_that_is_refused_is_told_with_what_refused_it():
     lead, second = tried("local-resonator", -183.0), tried("point-mass", -180.0)
     answer = Diagnosis(
         null, null, null, (lead, second), "not in catalogue",
-        refused=f"what it leaves is not explained: {RUBS}",
+        refused=f"its residual is not explained: {RUBS}",
     )  # fmt: skip
-    assert why_not(answer, lead, null).endswith(f"but what it leaves is not explained: {RUBS}")
+    assert why_not(answer, lead, null).endswith(f"but its residual is not explained: {RUBS}")
     assert why_not(answer, second, null).endswith("but local-resonator, ahead of it, is not named")
 
 

@@ -45,7 +45,7 @@ def words(made):
     known = Measured(
         made, fits, tests, refinements=refinements, failed={"crack": "it is no structure"}
     )
-    asked = SimpleNamespace(too_little="2 modes cannot bear a name")
+    asked = SimpleNamespace(too_little="2 modes cannot support a name")
     return DecisionWords(asked, found, known), found
 
 
@@ -55,27 +55,33 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
 @pytest.mark.parametrize(
     ("made", "said"),
     [
-        (table(*SINGLES), ("crack on data that no fit saw: the data held out +50",)),
-        (table(row("crack", 0.7 * DUE, votes=FOR)), (f"together more than the {ONE:.0f} that",)),
+        (table(*SINGLES), ("crack on held-out data: the data held out +50",)),
+        (
+            table(row("crack", 0.7 * DUE, votes=FOR)),
+            (f"together more than the required {ONE:.0f}",),
+        ),
         (
             table(row("crack", 200.0, left=WORSE)),
-            ("held-out Q 1 calibrated, 2 with it", "the deck with it is worse"),
+            ("held-out Q 1 calibrated, 2 with it", "the deck with it fits the held-out data worse"),
         ),
         (
             table(row("crack", 200.0, votes=Votes(-900.0)), null=row("", 0.0)),
-            ("the data that no fit saw speak against it", f"crack at grid 7{UNEXPLAINED}"),
+            ("the held-out data speak against it", f"crack at grid 7{UNEXPLAINED}"),
         ),
         (
             table(row("crack", 200.0, left=MORE, p=0.95)),
-            ("no more than errors of the model's form",),
+            ("no more than form errors of models",),
         ),
         (
             table(row("crack", 200.0, left=WORSE), row("point-mass", 199.0)),
-            ("crack is not the answer: the deck with it is worse", "; point-mass is next"),
+            ("crack is refused: the deck with it fits", "; point-mass is next"),
         ),
         (
             table(row("point-mass", 30.0), row("crack", 10.0), enough=False),
-            ("2 modes cannot bear a name; these explain", "calibration alone, point-mass, crack"),
+            (
+                "2 modes cannot support a name; these explain",
+                "calibration alone, point-mass, crack",
+            ),
         ),
         (
             table(row("hem-contact", 200.0), row("adhesive-stiffness", 199.0)),
@@ -83,19 +89,22 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
         ),
         (
             table(row("crack", 15.0, votes=Votes(0.0))),
-            (f"by 15.0 in -2 ln evidence, of which {ONE:.0f} are needed", "settle it"),
+            (f"by 15.0 in -2 ln evidence; {ONE:.0f} are required", "settle it"),
         ),
         (
             table(*SINGLES, sets=[PAIR, PAID]),
             (
-                f"crack {2 * DUE:.0f}, point-mass {2 * DUE:.0f} ({DUE:.0f} are needed)",
-                "point-mass added to crack, on data",
+                f"crack {2 * DUE:.0f}, point-mass {2 * DUE:.0f} (required: {DUE:.0f})",
+                "point-mass added to crack, on held-out data",
             ),
         ),
         (table(*SINGLES, sets=[BAD]), ("too little for point-mass added to crack",)),
-        (table(*SINGLES, sets=[TIES]), ("behind it in -2 ln evidence: hem-contact by 4", "odd")),
+        (table(*SINGLES, sets=[TIES]), ("behind in -2 ln evidence: hem-contact by 4", "odd")),
         (table(row("crack", 200.0, p=0.005)), (f"near 7 Hz{UNEXPLAINED}",)),
-        (table(nominal=100.0, **WORN), ("its own, which stay: what is left is of mesh",)),
+        (
+            table(nominal=100.0, **WORN),
+            ("keeps its numbers: no plausible calibrated values fit better; the residual",),
+        ),
     ],
 )
 def test_each_step_is_said_with_its_numbers(made, said):
@@ -131,6 +140,6 @@ def test_why_another_is_not_named_is_said_of_each():
     words_, found = words(replace(made))
     over = [words_.refusal(name, why) for name, why in found.passed_over]
     assert over == [
-        "the deck with it is worse on the data that no fit saw",
+        "the deck with it fits the held-out data worse",
         "it could not be fitted again: it is no structure",
     ]

@@ -236,7 +236,7 @@ def test_one_effect_stays_one(reduced):
     problem = problem_of(reduced, [lump(reduced, HERE, 1.5)], 1.5 * weight)
     search = several(problem, singles_of(problem), DUE, False)
     assert not search.sets
-    assert "are needed" in search.note
+    assert "are required" in search.note
 
 
 def test_a_mass_of_sensors_beside_a_lump(reduced):

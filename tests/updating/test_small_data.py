@@ -89,7 +89,7 @@ def test_few_poles_calibrate_and_name_nothing(tmp_path: Path, count: int) -> Non
     found = diagnose(case)
     assert (found.verdict, found.effects) == ("not in catalogue", ())
     assert found.one_of[0][0] == "calibration alone"
-    with pytest.raises(AccuracyError, match=r"modes? cannot bear a name: 8 modes"):
+    with pytest.raises(AccuracyError, match=r"modes? cannot support a name: 8 modes"):
         found.trusted()
     assert len(correlate(case).f_test) == count
 
@@ -131,7 +131,7 @@ def test_recordings_without_a_mode_are_said_to_have_none(tmp_path: Path) -> None
     assert len(correlate(case).f_test) == 0
     assert identify(case).distrust
     for workflow in (calibrate, diagnose):
-        with pytest.raises(ChladniError, match="no mode stands out"):
+        with pytest.raises(ChladniError, match="no mode is above the noise"):
             workflow(case)
 
 

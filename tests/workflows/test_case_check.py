@@ -54,16 +54,16 @@ def test_what_the_command_writes(copied, tmp_path):
     assert json.loads((out / "check.json").read_text()) == plain(to_json(chladni.check(case)))
     assert (out / "sensors.png").stat().st_size > 10_000
     page = (out / "report.html").read_text(encoding="utf-8")
-    for word in ("sensors.png", "What will be used", *case.outputs.labels):
+    for word in ("sensors.png", "Data and settings in use", *case.outputs.labels):
         assert word in page
 
 
 @pytest.mark.parametrize(
     ("faults", "rest", "said"),
     [
-        (1, 0, "1 thing is to be mended first."),
-        (2, 1, "2 things are to be mended first, 1 thing is worth a look."),
-        (0, 2, "2 things are worth a look."),
+        (1, 0, "1 thing is to be corrected first."),
+        (2, 1, "2 things are to be corrected first, 1 thing is to be checked."),
+        (0, 2, "2 things are to be checked."),
         (0, 0, "Nothing looks wrong with the case."),
     ],
 )

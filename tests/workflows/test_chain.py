@@ -134,10 +134,10 @@ def test_a_plan_tells_what_it_would_find(planned, tmp_path):
     deck, _ = planned
     words = ["--units", "mm-t-s", "--sensors", 8, "--modes", 5, "--drawn", 0, "--detect"]
     done = call("plan", deck, *words, "--out", tmp_path)
-    assert "What this layout would find" in done.output
+    assert "Smallest effects this layout can find" in done.output
     assert "\nsoftening " in done.output  # the table, on the terminal too
     rows = json.loads((tmp_path / "smallest.json").read_text())["mass"]
     weight = chladni.modes(chladni.load(deck, "mm-t-s"), 7).mass
     assert all(row["mass_kg"] is None or 0 < row["mass_kg"] < weight for row in rows)
     assert (tmp_path / "smallest_mass.png").is_file()
-    assert "What this layout would find" in (tmp_path / "report.html").read_text()
+    assert "Smallest effects this layout can find" in (tmp_path / "report.html").read_text()

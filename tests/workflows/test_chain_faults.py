@@ -66,7 +66,7 @@ SPOILT = {  # how, and what is said: kind, line that mends it
     "quantity": (
         lambda c: with_frf(c, quantity="mobility"), "wrong quantity", 'quantity = "accelerance"',
     ),
-    "force": (lambda c: with_frf(c, values=-c.frfs[0].values), "reversed force", "turn the direct"),
+    "force": (lambda c: with_frf(c, values=-c.frfs[0].values), "reversed force", "reverse the"),
     "drive point": (lambda c: elsewhere(c, 46), "misplaced force", "input 2:+Z the grid 2,"),
 }  # fmt: skip
 

@@ -29,7 +29,7 @@ def test_the_page_is_written_again_from_its_folder(run_folder, tmp_path):
     )
     assert done.exit_code == 0, done.output
     second = (tmp_path / "report.html").read_text()
-    for section in ("Scores", "What was calibrated", "Frequencies", "Why not something else"):
+    for section in ("Scores", "Calibrated parameters", "Frequencies", "Why not something else"):
         a, b = (t[t.index(f"<h2>{section}</h2>") :] for t in (first, second))
         assert a[: a.index("<figure")] == b[: b.index("<figure")] if "<figure" in a else True
 
@@ -55,7 +55,7 @@ def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_
     result = write_diagnosis(tmp_path, case, calibrated)
     assert {c.where: c.deck_value for c in result.calibrated}
     page = (tmp_path / "report.html").read_text()
-    assert "What was calibrated" in page
+    assert "Calibrated parameters" in page
     assert page.count("<td") > 0
     E = next(c for c in result.calibrated if c.estimate.name == "E")
     assert E.deck_value == pytest.approx(2.1e11)
@@ -70,7 +70,7 @@ def test_figures_of_the_page_are_named_for_what_they_are(run_folder):
         assert q["Q_with_mesh_error"] is not None
     page = (run_folder / "report.html").read_text()
     assert "floor: the recording&#39;s noise alone" in page
-    assert "what scatter could explain" in page
+    assert "that scatter can explain" in page
     assert "noise, repeats" not in page
 
 
@@ -91,8 +91,8 @@ def test_a_page_of_frequencies_claims_no_fitted_response(case, folder, tmp_path)
     assert result.compared == "frequencies"
     page = (tmp_path / "out" / "report.html").read_text()
     assert "frequencies were compared" in page
-    assert "that was fitted" not in page
-    assert "the fit never saw" not in page.split("</header>")[1]
+    assert "A fitted channel" not in page
+    assert "held-out channel" not in page.split("</header>")[1]
     assert not (tmp_path / "out" / "frf_fitted.png").exists()
     assert (tmp_path / "out" / "frf.png").exists()
 

@@ -79,7 +79,7 @@ def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(case, tmp_path, 
     assert "1.00% off" in done.stderr
     d = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert "not to be trusted" in d["distrust"][0]
-    assert "Not to be trusted" in (tmp_path / "out" / "report.html").read_text()
+    assert "Reasons for doubt" in (tmp_path / "out" / "report.html").read_text()
     assert (tmp_path / "out" / "updated.bdf").exists()
 
 

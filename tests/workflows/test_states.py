@@ -183,4 +183,4 @@ def test_two_shakers_an_article_and_a_level(tmp_path):
     assert "other.npz and the recording that is fitted differ by" in notes
     assert "nonlinear: natural frequencies move with level: " in notes
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert "no deck is asked to come nearer" in page
+    assert "no deck can be expected to come closer" in page

@@ -94,7 +94,11 @@ def test_time_data_give_the_frfs_beside_them(folder):
 
 def test_the_page_shows_a_stretch_of_time_and_an_frf(folder):
     page = (folder / "report.html").read_text()
-    for words in ("Driven at", "One block as the front end recorded it", "off the ideal FRF"):
+    for words in (
+        "Driven at",
+        "One block of time data from the front end",
+        "deviation from the ideal FRF",
+    ):
         assert words in page
     assert (folder / "time.png").stat().st_size > 5000
 

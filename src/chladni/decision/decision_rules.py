@@ -25,67 +25,78 @@ class DecisionRules:
     chance_of_responses: float = _rule(
         1e-5,
         1.0,
-        "chance of a false alarm, of responses: nulls gained up to 24, where 1e-3 asks 18",
+        "chance of a false alarm from responses: null cases gained up to 24, a chance of 1e-3 "
+        "requires 18",
     )
-    chance_of_poles: float = _rule(1e-3, 1.0, "chance of a false alarm, of natural frequencies")
+    chance_of_poles: float = _rule(1e-3, 1.0, "chance of a false alarm from natural frequencies")
     expected_due: float = _rule(
-        TIED, math.inf, "gain that is enough for what a material has as a rule (grain of wood)"
+        TIED, math.inf, "gain required of a property that the material usually has (grain of wood)"
     )
-    changed: float = _rule(6.0, 0.0, "gain that E, rho and t must bring to be called calibrated")
+    changed: float = _rule(
+        6.0, 0.0, "gain of E, rho and t from which the deck counts as calibrated"
+    )
     fits: float = _rule(0.01, 0.0, "p below which an explanation does not fit")
     fits_damping: float = _rule(
-        0.01, 0.0, "p below which damping follows an elastic change: it is not the whole truth"
+        0.01, 0.0, "p below which damping follows an elastic change, which is then incomplete"
     )
-    enough_data: bool = _rule(True, False, "too few modes or numbers bear no name")
+    enough_data: bool = _rule(True, False, "too few modes or numbers support no name")
     good_part: float = _rule(
-        GOOD_PART, 1.0, "part of the gain due that fitted responses bring where other data agree"
+        GOOD_PART, 1.0, "part of the required gain that fitted responses bring if other data agree"
     )
     poles_together: bool = _rule(
         True, False, "fitted and predicted natural frequencies reach the required gain together"
     )
     opposed: float = _rule(
-        1.0, math.inf, "times the gain due: data that no fit saw refuse a name from there on"
+        1.0, math.inf, "times the required gain: from there on held-out data refuse a name"
     )
     sets: bool = _rule(True, False, "several effects may be named together")
     sets_in_part: bool = _rule(
-        True, False, "sets whose fitted data pay a part of the price are asked as well"
+        True, False, "sets that reach a part of the required gain on fitted data are tested too"
     )
-    plainly: float = _rule(0.05, 0.0, "p of a set where one effect alone does not fit")
+    plainly: float = _rule(0.05, 0.0, "p required of a set if one effect alone does not fit")
     harm: float = _rule(
-        1.5, math.inf, "times held-out Q of calibration: a deck with more is no better"
+        1.5, math.inf, "times the held-out Q of calibration: above it a deck counts as worse"
     )
     faint: float = _rule(
-        2.0, 0.0, "times the gain due, below which a deck must be better on held-out data at all"
+        2.0, 0.0, "times the required gain: below it a deck must improve held-out data"
     )
     most_left: float = _rule(
-        0.5, math.inf, "of Q of calibration: beyond it a name leaves more than it explains"
+        0.5, math.inf, "share of the Q of calibration: above it a name leaves more than it explains"
     )
     conflict: float = _rule(
-        2.0, math.inf, "times the gain due: what was fitted refutes calibration by itself"
+        2.0, math.inf, "times the required gain: fitted data alone refute calibration"
     )
     all_data: float = _rule(
-        1.0, math.inf, "times the gain due: all data together refute calibration"
+        1.0, math.inf, "times the required gain: all data together refute calibration"
     )
-    usual: float = _rule(0.9, 1.0, "p above which what is left is what the model's form errs by")
-    most_usual_left: float = _rule(0.8, 0.5, "of Q: so much may be left where that is usual")
+    usual: float = _rule(
+        0.9, 1.0, "p above which the residual is no more than the model's form error"
+    )
+    most_usual_left: float = _rule(
+        0.8, 0.5, "share of Q that may remain if the residual is a usual form error"
+    )
     alternatives: bool = _rule(
-        True, False, "where the leader is refused, what comes behind it is asked"
+        True, False, "if the leader is refused, the next explanation is tested"
     )
     running: float = _rule(
-        2.0, math.inf, "times the gain due: a rival further behind the leader is not asked"
+        2.0,
+        math.inf,
+        "times the required gain: an alternative further behind the leader is not tested",
     )
     refuted: float = _rule(
-        1.0, math.inf, "times the gain due: a refused leader so far ahead refutes a rival"
+        1.0,
+        math.inf,
+        "times the required gain: a refused leader this far ahead refutes an alternative",
     )
     tied: float = _rule(TIED, 0.0, "gap up to which two explanations are one answer")
     doubt: bool = _rule(
-        True, False, "a leader that gains too little makes calibration one of several"
+        True, False, "if the leader gains too little, calibration is one of several answers"
     )
     strained: bool = _rule(
-        True, False, "joints that took more than joints scatter are calibrated, or in doubt"
+        True, False, "joints that changed by more than joints scatter are calibrated, or in doubt"
     )
     prudent: bool = _rule(
-        True, False, "numbers of a calibration must not serve worse than those of the deck"
+        True, False, "calibrated numbers must not fit worse than those of the deck"
     )
 
     def without(self, name: str) -> "DecisionRules":

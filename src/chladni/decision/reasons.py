@@ -6,7 +6,7 @@ from enum import Enum, auto
 from .hypothesis_table import CalibratedDeck, Row, SetRow, Votes
 
 ALONE = "calibration alone"
-BEYOND = "something that the catalogue does not hold"
+BEYOND = "an effect outside the catalogue"
 
 
 class Reason(Enum):

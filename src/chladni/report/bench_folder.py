@@ -55,7 +55,7 @@ def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
             files.append((f"case/{name}_time.uff", "its time data, for chladni test"))
     write_text(place / "case.toml", _toml(case, found, names))
     write_json(folder / "sealed" / "truth.json", found.truth)
-    files.append(("sealed/truth.json", "what was concealed: open it when the answer is on disk"))
+    files.append(("sealed/truth.json", "the concealed effects: open it when the answer is on disk"))
     return files
 
 

@@ -27,13 +27,13 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
         f, delay, measure = lines.T
         drive = _drive(found)
         bench_plots.sine_schedule(path, f, delay, measure, first.force, first.transient, drive)
-        blocks.append(Picture(path, "The schedule; force and transient of every line of article "
-                              f"{first.article}, all sweeps (largest transient of any channel, "
-                              "antiresonances included)."))  # fmt: skip
+        blocks.append(Picture(path, "The schedule: force and transient of every line of article "
+                                    f"{first.article}, all sweeps (largest transient of any "
+                                    "channel, antiresonances included)."))  # fmt: skip
         files.append((path.name, "the schedule of the stepped sine"))
     if first.sample is not None:
         path = _time(folder / "time.png", first, _drive(found))
-        blocks.append(Picture(path, "One block as the front end recorded it."))
+        blocks.append(Picture(path, "One block of time data from the front end."))
         files.append(("time.png", "one block of time data"))
     k = _typical(first)
     path = folder / "frf.png"
@@ -44,8 +44,8 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
         path, frf.frequency, frf.values[:, k, 0], first.truth[:, k], coherence, name,
         UNIT.get(frf.quantity, ""),
     )  # fmt: skip
-    blocks.append(Picture(path, "An FRF as it was estimated, and as an ideal front end with ideal "
-                          "sensors at the same places would have it."))  # fmt: skip
+    blocks.append(Picture(path, "An estimated FRF, and the FRF of ideal sensors and an ideal "
+                                "front end at the same places."))  # fmt: skip
     files.append((path.name, "an FRF and its coherence"))
     return PageParts(lead(found), [Section("The test", blocks)], found.notes, files)
 
@@ -101,7 +101,7 @@ def _facts(found: BenchResult) -> list[tuple[str, str]]:
         ("Weighed", f"{number(found.mass, 5)} kg"),
         ("Lines", str(len(first.frf.frequency))),
         ("Articles", f"{s.articles}, " + ("the deck's own" if s.exact else "scattered")),
-        *([("The room moves them by", f"{number(s.room, 3)} m/s² rms")] if s.room else []),
+        *([("Vibration from the room", f"{number(s.room, 3)} m/s² rms")] if s.room else []),
     ]
 
 
@@ -118,10 +118,10 @@ def _table(found: BenchResult) -> Table:
         "article",
         f"level [{level_unit(found.inputs)}]",
         "coherence",
-        "off the ideal FRF [%]",
+        "deviation from the ideal FRF [%]",
         "overloaded",
     )
-    caption = "Medians over lines and channels; overloads with blocks or lines they happened in."
+    caption = "Medians over lines and channels; overloads with their blocks or lines."
     return Table(heads, rows, ("article", "overloaded"), caption)
 
 

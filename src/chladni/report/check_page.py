@@ -40,8 +40,8 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
     facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
     told = [Section(f"For {who}", [Items(said)]) for who, said in _told(found.unused)]
     sections = [
-        Section("What looks wrong", [Items(looks)] if looks else []),
-        Section("What will be used", [Facts(facts)]),
+        Section("Possible errors", [Items(looks)] if looks else []),
+        Section("Data and settings in use", [Facts(facts)]),
         Section("Sensors", blocks),
         *told,
     ]
@@ -64,8 +64,8 @@ def _told(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
 def _lead(found: CaseCheck) -> str:
     faults, rest = len(found.faults), len(found.findings) - len(found.faults)
     said = [
-        *([counted(faults, "thing is", "things are") + " to be mended first"] if faults else []),
-        *([counted(rest, "thing is", "things are") + " worth a look"] if rest else []),
+        *([counted(faults, "thing is", "things are") + " to be corrected first"] if faults else []),
+        *([counted(rest, "thing is", "things are") + " to be checked"] if rest else []),
     ]
     return f"{', '.join(said) or 'Nothing looks wrong with the case'}."
 

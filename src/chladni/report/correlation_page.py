@@ -21,33 +21,35 @@ _SAME = 1e-6  # Q of responses that nobody could tell apart
 _DRAWN = 8  # pairs of shapes
 _WORST = 10  # sensors in the table
 _MEANING = (
-    "δ = log10(H model / H test), a complex number at every line of every channel: its real part "
-    "is 0.3 where the model moves twice as much as the test, its imaginary part 0.68 where its "
-    "phase is 90° off. Q is the mean of |δ|²: 0 is perfect, resonances and anti-resonances count "
-    "alike. Here the model is {off} off. A resonance a few per cent off costs more than a level."
+    "δ = log10(H model / H test) is a complex number at every line of every channel. Its real "
+    "part is 0.3 where the model moves twice as much as the test. Its imaginary part is 0.68 "
+    "where its phase differs by 90°. Q is the mean of |δ|²: 0 is perfect, resonances and "
+    "anti-resonances count equally. Here the model differs by {off}. A resonance that is off by "
+    "a few per cent raises Q more than a wrong level."
 )
 _COMAC = (
-    "CoMAC, over all paired modes: 1 where the sensor moves as the model does there. One that is "
-    "much below the others may sit elsewhere, point elsewhere, or see what the model lacks."
+    "CoMAC, over all paired modes: 1 where sensor and model move equally. A sensor far below the "
+    "others may have a wrong place or direction, or the model lacks physics there."
 )
 _WORTH = (
-    "MAC, and what the noise of the recording leaves of it at best. Seen on: sensors whose motion "
-    "is beyond three standard deviations of its noise, and the MAC on them alone. By chance: how "
-    "likely it is that the best of random shapes, as many as the model has modes here, reaches "
-    "that; sensors that move together count once. With neighbours: share of the test's shape that "
-    "the model's modes within 5 % in frequency make up together; close modes may mix."
+    "MAC, and its largest value with the noise of the recording. Seen on: sensors whose motion "
+    "exceeds three standard deviations of its noise, and the MAC on them alone. By chance: "
+    "probability that the best of random shapes, as many as the model has modes here, reaches "
+    "that value; sensors that move together count once. With neighbours: share of the test's "
+    "shape that the model's modes within 5 % in frequency represent together; close modes may "
+    "mix."
 )
 _HALVES = (
-    "The half of the sensors on which the pair is most alike. It says where a MAC is lost, not "
-    "that the pair is right, where random mixtures of the model's modes do as well on their best "
+    "The half of the sensors on which the pair agrees best. It shows where a MAC is low. It does "
+    "not prove the pair: random mixtures of the model's modes may agree as well on their best "
     "half."
 )
 _CAPTIONS = {
     "mac": "Modal assurance criterion in per cent; framed: the pairs of the table.",
-    "shapes": "Each pair twice: what the test's sensors saw, and the model's shape with what it "
-    "says at the same sensors. Arrows are shares of the largest; orange along, blue against the "
-    "sensor's direction.",
-    "setup": "Where sensors and shaker sit.",
+    "shapes": "Each pair twice: the test's motion at the sensors, and the model's shape with its "
+    "motion at the same sensors. Arrows are shares of the largest motion; orange "
+    "along, blue against the sensor's direction.",
+    "setup": "Sensors and shaker.",
     "frequencies": "Deviation of each frequency from the test.",
 }
 
@@ -91,10 +93,10 @@ def _lead(found: Correlation) -> str:
     off = np.abs(found.f_model[p.model] / found.f_test[p.test] - 1)
     mean = f"{number(100 * float(off.mean()), 2)} %" if len(off) else "–"
     q = found.quality
-    said = "" if q is None else f" Responses are {_off_by(q)} off (Q = {number(q.Q, 3)})."
+    said = "" if q is None else f" Responses differ by {_off_by(q)} (Q = {number(q.Q, 3)})."
     return (
-        f"{len(off)} of {len(found.f_test)} test modes have a partner in the model, "
-        f"{mean} off in frequency on average.{said}"
+        f"{len(off)} of {len(found.f_test)} test modes have a partner in the model; the mean "
+        f"frequency error is {mean}.{said}"
     )
 
 
@@ -186,14 +188,14 @@ def _worth(found: Correlation) -> list[Block]:
 
 def _alone(found: Correlation) -> str:
     """List modes without a partner, on either side, and how modes are counted."""
-    said = ["Modes of the model are numbered with its rigid motions, as `chladni modes` does."]
+    said = ["Mode numbers of the model include its rigid motions, as in `chladni modes`."]
     p, top = found.pairs, found.f_test.max(initial=0.0)
     test = [hertz(f) for f in found.f_test[p.alone_test]]
     model = [hertz(f) for f in found.f_model[p.alone_model] if f <= top]
     if test:
         said.append(f"Test modes without a partner in the model: {', '.join(test)} Hz.")
     if model:
-        said.append(f"Model modes the test did not show: {', '.join(model)} Hz.")
+        said.append(f"Model modes without a partner in the test: {', '.join(model)} Hz.")
     return " ".join(said)
 
 
@@ -204,7 +206,7 @@ def _sensors(found: Correlation) -> list[Block]:
     order = np.argsort(found.comac, kind="stable")[:_WORST]
     rows = [(found.sensors[k], criterion(float(found.comac[k]))) for k in order]
     more = len(found.comac) - len(rows)
-    rest = f" The other {more} have no less than {rows[-1][1]}." if more else ""
+    rest = f" The other {more} have at least {rows[-1][1]}." if more else ""
     return [Table(("sensor", "CoMAC"), rows, ("sensor",), caption=_COMAC + rest)]
 
 
@@ -220,7 +222,7 @@ def _scores(found: Correlation) -> list[Block]:
     ]
     facts = [
         ("Q", number(q.Q)),
-        ("of it size, phase", f"{number(q.magnitude, 3)}, {number(q.phase, 3)}"),
+        ("magnitude, phase", f"{number(q.magnitude, 3)}, {number(q.phase, 3)}"),
         ("Σ|δ|², not averaged", number(q.total)),
     ]
     return [

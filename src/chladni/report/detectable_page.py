@@ -13,12 +13,12 @@ from .words import number, quantity, rounded
 
 _HEADS = ("what", "at the best place", "at half of the places", "at the worst", "nowhere found")
 _CAPTION = (
-    "Predicted from the model alone: the smallest mass at one place, softening (share of E) and "
-    "thinning (share of t) over a tenth of the sheet's size that a diagnosis would name, with E, "
-    "rho and t of the parts free, an error of the model's form of 1 % and noise of {noise:.2g} % "
-    "of |H|. A finding must lower -2 ln p by {due:.0f}: the threshold of a diagnosis and the "
-    "places tried. Nowhere found: share of the places where 30 % of the mass, or 90 % of E or t, "
-    "would not do."
+    "Predicted from the model alone: the smallest mass at one place that a diagnosis would name, "
+    "and the smallest softening (share of E) and thinning (share of t) over a tenth of the "
+    "sheet's size. E, rho and t of the parts are free, the form error is 1 % and the noise "
+    "{noise:.2g} % of |H|. A finding must lower -2 ln p by {due:.0f}: the threshold of a "
+    "diagnosis and the places tried. Nowhere found: share of the places where 30 % of the mass, "
+    "or 90 % of E or t, would not be enough."
 )
 
 
@@ -34,12 +34,12 @@ def detectable_section(folder: Path, model: Model, found: Detectable, noise: flo
     caption = _CAPTION.format(noise=100 * noise, due=found.due)
     blocks: list[Block] = [Table(_HEADS, rows, ("what",), caption=caption)]
     grams = on_faces(model.seen, 1e3 * _of_shells(model, found))
-    name = "smallest mass that would be found"
+    name = "smallest mass that a diagnosis finds"
     limits = scene.usual_limits(model.seen, grams)
     path = scene.scalar_map(
         folder / "smallest_mass.png", model.seen, grams, name, "g", "YlOrRd", limits
     )
-    return Section("What this layout would find", [*blocks, Picture(path)])
+    return Section("Smallest effects this layout can find", [*blocks, Picture(path)])
 
 
 def detectable_json(found: Detectable) -> dict[str, Any]:

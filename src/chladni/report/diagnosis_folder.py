@@ -97,10 +97,10 @@ def _changed(case: Case, result: DiagnosisResult) -> list[Section]:
         return []
     lines = changed_lines(case.deck, changes)
     more = len(lines) - _CHANGED
-    text = f"Lines of the deck, as they were (-) and as they are in {result.files['deck']} (+)."
+    text = f"Changed lines: the given deck (-) and {result.files['deck']} (+)."
     if more > 0:
-        text += f" {more} lines more differ."
-    return [Section("What changed in the deck", [Text([text]), Code(lines[:_CHANGED])])]
+        text += f" {more} further lines differ."
+    return [Section("Changes in the deck", [Text([text]), Code(lines[:_CHANGED])])]
 
 
 def shown(case: Case, result: DiagnosisResult) -> Shown:

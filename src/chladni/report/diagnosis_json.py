@@ -240,11 +240,11 @@ def read_diagnosis(folder: Path) -> DiagnosisResult:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise FileError(f"{path}: {error.strerror}; a run of `chladni diagnose` has one") from error
+        raise FileError(f"{path}: {error.strerror}; `chladni diagnose` writes this file") from error
     except (ValueError, RecursionError) as error:
         raise FileError(f"{path} is no JSON: {error}") from error
     if not isinstance(found, dict) or "verdict" not in found:
-        raise FileError(f"{path} holds no verdict, so it is no diagnosis")
+        raise FileError(f"{path} has no verdict, so it is not a diagnosis")
     try:
         result = from_json(found)
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:

@@ -76,7 +76,7 @@ def _blocks(
         evaluation_plots.lines_over_frequency(
             path, frf.frequency, lines, "coherence [-]", (0.0, 1.02)
         )
-        blocks.append(Picture(path, "Coherence: where it is low, noise or leakage is left."))
+        blocks.append(Picture(path, "Coherence: low values show noise or leakage."))
         files.append((path.name, "coherence"))
     distortion = r.estimate.distortion if r.estimate is not None else None
     if distortion is not None:
@@ -134,4 +134,4 @@ def _decays(decays: tuple[RingDown, ...]) -> Table:
         for d in decays
     ]
     heads = ("output", "Hz", "damping [%]", "damping, loud to faint [%]", "Hz, loud to faint")
-    return Table(heads, rows, ("output",), "Free decays, each followed down to its noise.")
+    return Table(heads, rows, ("output",), "Free decays, each followed until it reaches its noise.")

@@ -5,17 +5,19 @@ GLOSSARY = {
     "of 2 (rms).",
     "MAC": "Modal assurance criterion: squared cosine between two shapes at the sensors; 1: the "
     "same shape.",
-    "CoMAC": "MAC at one sensor over all paired modes. One that is low may sit or point elsewhere.",
-    "held out": "Sensors and bands that were not fitted. They judge: a wrong explanation does "
-    "not improve them.",
+    "CoMAC": "MAC at one sensor over all paired modes. A low value may mean a wrong place or "
+    "direction.",
+    "held out": "Sensors and bands that were not fitted. They test the result: a wrong "
+    "explanation does not improve them.",
     "log evidence": "Logarithm of the probability of the recording under an explanation, all its "
-    "parameters averaged over. Free parameters that do not earn their keep lower it.",
+    "parameters averaged over. Free parameters that do not improve the fit lower "
+    "it.",
     "Bayes factor": "The ratio of two such probabilities: how many times better one explanation "
     "predicts the recording than another.",
-    "95 % interval": "The value lies in it in 19 of 20 cases, if the explanation is right.",
+    "95 % interval": "If the explanation is right, it contains the true value in 19 of 20 cases.",
     "damping": "Ratio ζ to critical damping; a peak is 1/2ζ times as high as the static response.",
-    "drive point": "Where the force acts.",
-    "floor": "Q that the noise of the recording alone leaves.",
+    "drive point": "Place where the force acts.",
+    "floor": "Q from the noise of the recording alone.",
     "off": "Deviation from the test.",
     "FRF": "Frequency response function: motion over force at every frequency.",
 }
@@ -23,7 +25,7 @@ _HEADS = {  # heads of tables and names of facts that hold a word of the glossar
     "Q, fitted data": "Q", "Q, held-out data": "held out", "Held-out misfit Q": "held out",
     "Q fitted": "Q", "Q held out": "held out", "MAC before": "MAC", "MAC after": "MAC",
     "value (95 % interval)": "95 % interval", "found (95 % interval)": "95 % interval",
-    "against the best": "Bayes factor", "damping [%]": "damping", "off ": "off",
+    "compared with the best": "Bayes factor", "damping [%]": "damping", "off ": "off",
 }  # fmt: skip
 
 

@@ -94,19 +94,22 @@ def _table(r: RecordingModes) -> Table:
         )
         for k, (f, sf, z, sz, c, v, s) in enumerate(zip(*columns, strict=True))
     ]
-    heads = ("mode", "Hz", "± Hz", "damping [%]", "± %", "MPC", "shape ± %", "of the orders [%]")
+    heads = ("mode", "Hz", "± Hz", "damping [%]", "± %", "MPC", "shape ± %", "orders [%]")
     caption = (
-        f"Residual over noise: {number(r.modes.chi, 3)} (1: only noise is left). MPC: 1 where all "
-        "channels move in phase. Shape: what noise moves it by, of its own length. Of the orders: "
-        "in how many of the richer ones of the "
-        "stabilisation diagram, another method's, the pole stands."
+        f"Residual over noise: {number(r.modes.chi, 3)} (1: only noise remains). MPC: 1 where all "
+        "channels move in phase. Shape: its standard deviation from noise, relative to its norm. "
+        "Orders: share of the higher orders of the stabilisation diagram, from another method, "
+        "that have the pole."
     )
     struck, weak = r.modes.frequency[r.struck], int((~r.firm & ~r.struck).sum())
     if weak:
-        caption += f" {weak} more poles shape the curve but are too uncertain to be called modes."
+        caption += (
+            f" {weak} further poles contribute to the curve but are too uncertain to count as "
+            "modes."
+        )
     if len(struck):
         said = ", ".join(number(f, 4) for f in struck)
-        caption += f" Struck out, no peak stands there and no other order shows them: {said} Hz."
+        caption += f" Rejected, because they have no peak and no other order has them: {said} Hz."
     return Table(heads, rows, caption=caption)
 
 
@@ -137,18 +140,20 @@ def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Picture]:
     chosen = dict(list(channels.items())[:_SHOWN])
     plots.frf_grid(path["fit"], chosen, unit, columns=min(2, len(chosen)))
     blocks = [
-        Picture(path["stabilisation"], "Poles of every order; lines: what was kept."),
+        Picture(path["stabilisation"], "Poles of every order; lines: the poles kept."),
         Picture(path["indicators"], "Singular values of the responses; share in quadrature."),
         Picture(path["fit"]),
     ]
     if len(kept):
         modal_plots.nyquist_grid(path["circles"], _circles(r))
-        blocks.append(Picture(path["circles"], "Each mode at the channel that shows it best."))
+        blocks.append(Picture(path["circles"], "Each mode at the channel where it is clearest."))
     if 1 < len(kept) <= _MATRIX and len(frf.outputs) > 1:
         labels = [hertz(x) for x in kept]
         psi = driven_shapes(modal.sel(r.firm))
         plots.mac_matrix(path["automac"], auto_mac(psi), labels, labels, "AutoMAC of the test [Hz]")
-        blocks.append(Picture(path["automac"], "Off the diagonal: modes that look alike here."))
+        blocks.append(
+            Picture(path["automac"], "Off the diagonal: modes that are similar at these sensors.")
+        )
     return blocks
 
 

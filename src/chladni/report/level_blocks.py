@@ -15,9 +15,10 @@ from .words import interval, number
 
 SHOWN = 6  # modes that are drawn
 _WHAT = (
-    "Measured; 'element': by the first of the elements below, fitted to all levels; 'foretold': by "
-    "one that was chosen and fitted without these levels; 'linear': the mean of the levels it was "
-    "fitted to. The amplitude is the displacement of the output at which the mode was seen."
+    "Measured; 'element': from the first of the elements below, fitted to all levels; "
+    "'predicted': from one that was chosen and fitted without these levels; 'linear': the mean "
+    "of the fitted levels. The amplitude is the displacement of the output at which the mode was "
+    "seen."
 )
 
 
@@ -58,8 +59,9 @@ def _summary(tables: Sequence[LevelTable]) -> Table:
     ]
     heads = ("mode", "Hz, lowest level", "highest", "damping [%], lowest", "highest ", "levels",
              "p of one frequency", "p of one damping", "signature")  # fmt: skip
-    return Table(heads, rows, ("signature",), "Modes over levels; p: chance of such differences "
-                 "of a mode that has one frequency and one damping.")  # fmt: skip
+    return Table(heads, rows, ("signature",), "Modes over levels; p: probability of such "
+                                              "differences if the mode has one frequency and one "
+                                              "damping.")  # fmt: skip
 
 
 def _every_level(tables: Sequence[LevelTable]) -> Table:
@@ -72,10 +74,14 @@ def _every_level(tables: Sequence[LevelTable]) -> Table:
             r = held.get(level)
             rows.append((str(k), number(level), *(_measured(r) if r else ("–",) * 5)))
     heads = ("mode", "level", "amplitude [mm]", "Hz", "Hz, 95 %", "damping [%]", "damping, 95 %")
-    return Table(heads, rows, (), "Every mode at every level, with the 95 % interval that the "
-                 "recording's noise leaves; runs repeat to 0.05 % in frequency and 5 % in damping. "
-                 "The amplitude is the displacement of the output at which the mode was seen; "
-                 "–: not found at that level.")  # fmt: skip
+    return Table(
+        heads,
+        rows,
+        (),
+        "Every mode at every level, with the 95 % interval from the recording's noise; runs "
+        "repeat to 0.05 % in frequency and 5 % in damping. The amplitude is the displacement of "
+        "the output at which the mode was seen; –: not found at that level.",
+    )
 
 
 def _measured(r: LevelRow) -> tuple[str, ...]:
@@ -106,8 +112,8 @@ def _levels(t: LevelTable) -> Table:
         )
         for r in t.rows
     ]
-    heads = ("level", "amplitude [mm]", "Hz", "element", "foretold", "linear",
-             "damping [%]", "element ", "foretold ", "linear ")  # fmt: skip
+    heads = ("level", "amplitude [mm]", "Hz", "element", "predicted", "linear",
+             "damping [%]", "element ", "predicted ", "linear ")  # fmt: skip
     return Table(heads, rows, caption=f"{t.output}. {_WHAT}")
 
 
@@ -124,9 +130,13 @@ def _elements(t: LevelTable) -> Table:
         for e in t.elements
     ]
     heads = ("element", "χ²", "data", "BIC", "p", "numbers (95 %)")
-    return Table(heads, rows, ("element", "numbers (95 %)"),
-                 "Best first. Runs of one level are taken to repeat to 0.05 % in frequency and 5 % "
-                 "in damping. p below 0.01: the element does not explain the levels.")  # fmt: skip
+    return Table(
+        heads,
+        rows,
+        ("element", "numbers (95 %)"),
+        "Best first. Runs of one level are assumed to repeat to 0.05 % in frequency and 5 % in "
+        "damping. p below 0.01: the element does not explain the levels.",
+    )
 
 
 def _p(p: float | None) -> str:

@@ -16,21 +16,21 @@ from .figures import Shown, q_steps
 
 MOST_MODES = 60  # of a matrix that can be read
 _FRF = (
-    "Drag to zoom, double click for all of it, click a name to hide its curve. White: fitted; "
-    "grey: not. Each mode of a deck has the damping that was identified of its partner in the "
-    "test, one without a partner that of the case. Q is of the channel, over all lines."
+    "Drag to zoom, double-click to see all, click a name to hide its curve. White: fitted; grey: "
+    "not fitted. Each mode of a deck has the damping identified for its partner in the test; "
+    "without a partner, the damping of the case. Q belongs to the channel, over all lines."
 )
 _CAPTIONS = {
     "where": "Drag to turn, scroll to zoom, point at anything for its name.",
     "left": "Gain of a small local change of stiffness or mass, with the named effects in place. "
-    "Grey: the test is blind there; half of either could be gone.",
-    "shapes": "The test moves its sensors; the decks move all of the structure. Colour: share of "
-    "the largest motion.",
+    "Grey: the test is blind there; half of the stiffness or mass could be missing.",
+    "shapes": "The test shows motion at its sensors; the decks show the whole structure. Colour: "
+    "share of the largest motion.",
     "mac": "Modal assurance criterion, test against model; framed: the pairs of the table.",
     "ladder": "Deviation of each frequency from the test.",
     "steps": "Deviation Q, step by step; dashed: the noise of the recording alone.",
-    "odds": "2 ln Bayes factor of the best explanation against each; up to 2 tells nothing, more "
-    "than 10 is very strong (Kass and Raftery, 1995). Point at a bar for its reason.",
+    "odds": "2 ln Bayes factor of the best explanation against each; up to 2 is no evidence, "
+    "more than 10 is very strong (Kass and Raftery, 1995). Point at a bar for its reason.",
 }
 
 

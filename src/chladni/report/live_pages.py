@@ -18,10 +18,11 @@ from .figures import Shown
 _MOST_POLES = 5000
 _KINDS = {"o": "new", "f": "frequency", "d": "and damping", "v": "and shape", "s": "all steady"}
 _SHAPES = "Choose a mode; drag to turn, scroll to zoom. Colour: share of the largest motion."
-_FRF = "Drag to zoom, double click for all of it, click a name to hide its curve."
+_FRF = "Drag to zoom, double-click to see all, click a name to hide its curve."
 _POLES = (
-    "Poles of every order, steady against the order before (Heylen, Lammens and Sas, 1997); lines: "
-    "what was kept, dotted: struck out. Point at a pole for its numbers, click it to pick it."
+    "Poles of every order, compared with the order before (Heylen, Lammens and Sas, 1997). "
+    "Lines: poles kept; dotted: poles rejected. Point at a pole for its numbers, click it to "
+    "pick it."
 )
 
 

@@ -15,14 +15,14 @@ from .words import number
 _HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
           "was [kg]", "error of t [%]")  # fmt: skip
 _CAPTION = (
-    "Covered: share of the area that found its sheet; 95 % within: how far that sheet was; error "
-    "of t: thickness mapped onto the deck and back, against what the file holds, rms. Shells that "
-    "found nothing keep the deck's thickness."
+    "Covered: share of the area with a matching sheet; 95 % within: distance of that sheet; "
+    "error of t: thickness mapped onto the deck and back, compared with the file, rms. Shells "
+    "without a match keep the deck's thickness."
 )
 _GUESS = (
-    "Thinning guessed from curvature. Left out and guessed from the others, a part's thickness is "
-    "off by so much; the last column is what keeping the gauge would have cost. A part drawn "
-    "deeper than all of them thins more than they let expect."
+    "Thinning estimated from curvature. Each part was left out and estimated from the others: "
+    "the table gives the error of its thickness. The last column is the error of the unchanged "
+    "sheet gauge. A part drawn deeper than all others thins more than this estimate."
 )
 
 
@@ -42,7 +42,7 @@ def map_page(folder: Path, found: MappedDeck) -> PageParts:
     blocks: list[Block] = [Facts(facts), Picture(after), Picture(changed), _parts(found)]
     sections = [Section("Thickness", blocks)]
     if found.thinning is not None:
-        sections.append(Section("Parts the file lacks", _guessed(found)))
+        sections.append(Section("Parts missing from the file", _guessed(found)))
     files = [("thickness.png", "thickness"), ("change.png", "change of thickness")]
     return PageParts(_lead(found), sections, found.notes, files)
 
@@ -85,7 +85,7 @@ def _guessed(found: MappedDeck) -> list[Block]:
     out: list[Block] = []
     if guessed:
         out.append(Table(("guessed part", "standard deviation [%]"), guessed, ("guessed part",)))
-    heads = ("part", "guess is off [%]", "gauge is off [%]")
+    heads = ("part", "error of the estimate [%]", "error of the gauge [%]")
     return [*out, Table(heads, known, ("part",), caption=_GUESS)]
 
 

@@ -44,7 +44,7 @@ def _mend(result: DiagnosisResult) -> list[str]:
     if result.screening is None:
         return []
     return [
-        f"Mend the recording, {f.kind}{' of ' + named(f.channels, 3) if f.channels else ''}: "
+        f"Correct the recording, {f.kind}{' of ' + named(f.channels, 3) if f.channels else ''}: "
         f"{f.repair or f.text}."
         for f in result.screening.faults
     ]
@@ -56,7 +56,10 @@ def _settle(result: DiagnosisResult) -> list[str]:
     tried = {e.name: e.where.text for e in result.effects}
     tried |= {a.name: a.where.text for a in result.alternatives if a.where is not None}
     names = [name for group in result.one_of for name in group if known.get(name)]
-    return [_at(tried.get(name, ""), f"{known[name]}, which tells {name} apart") for name in names]
+    return [
+        _at(tried.get(name, ""), f"{known[name]}, which distinguishes {name} from the others")
+        for name in names
+    ]
 
 
 def _at(place: str, what: str) -> str:
@@ -73,9 +76,7 @@ def _confirm(result: DiagnosisResult) -> list[str]:
     for e in result.effects:
         size = ", ".join(f"{p.name} {interval(p.value, p.low, p.high, p.unit)}"
                          for p in e.parameters[:2])  # fmt: skip
-        steps.append(
-            _at(e.where.text, f"look whether {e.claim or e.name}{f' ({size})' * bool(size)}")
-        )
+        steps.append(_at(e.where.text, f"check if {e.claim or e.name}{f' ({size})' * bool(size)}"))
         if known.get(e.name) and e.name not in tied:
             steps.append(_at("", f"{known[e.name]}, which confirms {e.name}"))
     return [*steps, *_take_the_deck(result), *_validate(result)]
@@ -92,7 +93,7 @@ def _validate(result: DiagnosisResult) -> list[str]:
     """Suggest a second test, which is worth more than a second fit."""
     if result.recordings:
         return []
-    return ["Measure once more with another drive point, and diagnose again with both recordings."]
+    return ["Measure again with another drive point, and diagnose with both recordings."]
 
 
 def _measure_again(result: DiagnosisResult) -> list[str]:
@@ -106,46 +107,50 @@ def _measure_again(result: DiagnosisResult) -> list[str]:
         "and diagnose the other channels."
         for e in faults
     ]
-    return [*again, *until] or ["Measure again once the fault is mended, and diagnose again."]
+    return [*again, *until] or ["Correct the fault, measure again and diagnose again."]
 
 
 def _levels(result: DiagnosisResult) -> list[str]:
     moving = [t.sentence for t in result.levels if t.sentence]
     steps = [f"{SETTLED_BY[0].upper()}{SETTLED_BY[1:]}."] if moving else []
     if not result.levels:
-        steps.append("Measure at three levels and more, each in a recording of its own.")
+        steps.append("Measure at three or more levels, each in its own recording.")
     if result.joints:
-        steps.append("Choose the level of service, and take K and GE of the joints at that level.")
+        steps.append("Choose the service level, and use K and GE of the joints at that level.")
     return [*steps, *_take_the_deck(result)]
 
 
 def _look(result: DiagnosisResult) -> list[str]:
     """Advise if no effect of the catalogue fits: place first, then recording, then more data."""
     spots = [w for w in (result.adequate.where if result.adequate else ())]
-    steps = [
-        f"Look at the structure {'near grid ' + str(w.grid) if w.grid else 'there'}"
-        f"{' on ' + named(w.parts, 3) if w.parts else ''} for what the deck does not have: "
-        f"{w.text}."
-        for w in spots
-    ]
+    steps = []
+    for w in spots:
+        place = f"near grid {w.grid}" if w.grid else "there"
+        parts = f" on {named(w.parts, 3)}" if w.parts else ""
+        steps.append(
+            f"Look at the structure {place}{parts} for physics that the deck lacks: {w.text}."
+        )
     steps += _odd_checks(result)
     if not result.levels:
         steps.append(
-            "Measure at half and at twice the level: what moves with the level is not linear, and "
-            "no linear effect explains it."
+            "Measure at half and at twice the level: modes that change with the level are not "
+            "linear, and no linear effect explains them."
         )
     if any(w.grid for w in spots):
-        steps.append("Measure again with more sensors round that place, and another drive point.")
+        steps.append("Measure again with more sensors near that place, and another drive point.")
     near = [a for a in result.alternatives if a.log_evidence is not None][:1]
     known = {f.name: f.settled_by for f in families()}
     steps += [
-        _at(a.where.text if a.where else "", f"{known[a.name]}, for {a.name} comes nearest")
+        _at(
+            a.where.text if a.where else "",
+            f"{known[a.name]}, because {a.name} is the closest explanation",
+        )
         for a in near
         if known.get(a.name)
     ]
     steps.append(
-        "Check how the deck idealises the structure there: mesh, ties, supports. Physics of your "
-        "own is added as an effect (docs/extending.md)."
+        "Check the idealisation of the structure there: mesh, ties, supports. You can add your "
+        "own effects (docs/extending.md)."
     )
     return steps
 
@@ -157,7 +162,10 @@ def _odd_checks(result: DiagnosisResult) -> list[str]:
 
 def _check_values(result: DiagnosisResult) -> list[str]:
     if not result.searched:
-        return [*_take_the_deck(result), "Run chladni diagnose, which looks for missing physics."]
+        return [
+            *_take_the_deck(result),
+            "Run chladni diagnose, which searches for missing physics.",
+        ]
     return [*_measured(result.calibrated), *_take_the_deck(result), *_validate(result)]
 
 
@@ -170,7 +178,7 @@ def _measured(calibrated: Sequence[CalibratedParameter]) -> list[str]:
     ]
     return [
         f"Measure {c.where} on the article: the deck has "
-        f"{quantity(c.deck_value, c.estimate.unit)}, the recording asks for "
+        f"{quantity(c.deck_value, c.estimate.unit)}, the recording indicates "
         f"{quantity(c.estimate.value, c.estimate.unit)} "
         f"({percent(c.estimate.value, c.deck_value)})."
         for _, c in sorted(moved, key=lambda one: -one[0])[:2]
@@ -180,12 +188,12 @@ def _measured(calibrated: Sequence[CalibratedParameter]) -> list[str]:
 def _keep(result: DiagnosisResult) -> list[str]:
     """Advise if no effect is named."""
     if result.distrust:
-        return ["Settle the reasons under Not to be trusted, and diagnose again.",
+        return ["Settle the reasons for doubt, and diagnose again.",
                 *_odd_checks(result)]  # fmt: skip
     return [
-        "Keep the deck: the recording asks for no change that its errors do not allow.",
+        "Keep the deck: it agrees with the recording within the allowed errors.",
         *_odd_checks(result),
-        "For a finer answer refine the mesh where it bends most, measure with more sensors, or "
+        "For a finer result, refine the mesh where it bends most, measure with more sensors, or "
         "widen the band.",
     ]
 
@@ -194,6 +202,6 @@ def _weigh(result: DiagnosisResult) -> list[str]:
     if result.mass is None or result.mass.weighed_kg:
         return []
     return [
-        "Weigh the structure as it was tested, and write mass and mass_sd under [test]: without "
-        "it only their patterns distinguish mass from stiffness."
+        "Weigh the test article as tested, and write mass and mass_sd under [test]: a weighed "
+        "mass separates mass from stiffness."
     ]

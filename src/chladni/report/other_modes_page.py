@@ -14,8 +14,8 @@ _SHOWN = 12  # shapes in a picture
 _MOST = 60  # modes of a MAC matrix that can be read
 _HEADS = ("its mode", "its [Hz]", "model's mode", "model's [Hz]", "off", "MAC", "in the span")
 _CAPTION = (
-    "In the span: share of its shape that the model's modes within 1 % of its frequency can make "
-    "up. Modes of one frequency may mix, so that each MAC is low and this is 1."
+    "In the span: share of its shape that the model's modes within 1 % of its frequency can "
+    "represent. Modes with one frequency may mix; then each MAC is low and this share is 1."
 )
 
 
@@ -53,8 +53,8 @@ def _lead(found: OtherModes) -> str:
     alike = np.maximum(p.mac, found.in_span[p.test])
     return (
         f"{len(p)} of {count} elastic modes of {found.source.name} have a partner in the model; "
-        f"frequencies are {100 * float(off.max()):.2g} % off at most, MAC is "
-        f"{criterion(alike.min())} at least, close modes taken together."
+        f"the largest frequency error is {100 * float(off.max()):.2g} %, the lowest MAC "
+        f"{criterion(alike.min())}, close modes taken together."
     )
 
 

@@ -113,7 +113,7 @@ def _page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["beside"] = lambda name: "./" + quote(str(name))
+    environment.filters["relative_link"] = lambda name: "./" + quote(str(name))
     environment.filters["meaning"] = meaning
     drawn = drawings is not None and drawings.by_name
     return environment.get_template("page.html").render(

@@ -30,9 +30,9 @@ from .words import direction, hertz, number, rounded
 
 PICTURES = {
     "sensors.png": "the layout",
-    "shaker.png": "where to shake and where to hang",
+    "shaker.png": "shaker and cords",
     "auto_mac.png": "AutoMAC at the sensors",
-    "modes.png": "the modes the sensors see least",
+    "modes.png": "the modes that the sensors see least",
 }
 
 
@@ -55,7 +55,7 @@ def lead(result: PlanSummary) -> str:
         f"{len(result.sensors)} sensors tell {len(f)} modes from {number(f[0])} to "
         f"{number(f[-1])} Hz apart; shake at {shake}."
     )
-    return text + (f" Hardly seen: mode {', '.join(unseen)}." if unseen else "")
+    return text + (f" Barely visible: mode {', '.join(unseen)}." if unseen else "")
 
 
 def notes(found: Plan) -> list[str]:
@@ -63,26 +63,24 @@ def notes(found: Plan) -> list[str]:
     centres = int((~found.places.is_grid).sum())
     out = _places_notes(found.places)
     if len(found.layout) == len(found.places):
-        out.append(
-            f"Every place bears a sensor: there is room for {len(found.places)} and no more."
-        )
+        out.append(f"Every place has a sensor: there is room for only {len(found.places)}.")
     if centres:
         out.append(
-            f"{centres} of the places are centres of shells, in strips too narrow for a grid that "
-            "keeps off the edges; sensors.csv gives their x, y, z."
+            f"{centres} of the places are centres of shells, in strips too narrow for a grid away "
+            "from the edges; sensors.csv gives their x, y, z."
         )
     shift = np.abs(found.loaded / found.modal.frequency - 1).max()
     if shift > 0.005:
         out.append(
-            f"The sensors' mass moves frequencies by up to {100 * shift:.1f} %: put their mass "
-            "into the model before comparing."
+            f"The sensors' mass changes frequencies by up to {100 * shift:.1f} %: add their mass "
+            "to the model before the comparison."
         )
     if not found.aimed.all():
         blind = ", ".join(str(found.first + 1 + k) for k in np.flatnonzero(~found.aimed))
         out.append(
-            f"No sensor glued flat sees mode {blind}, which moves along the sheets or where no "
-            "sensor fits, and no shaker at a normal drives it well; the layout was made for the "
-            "others, and a sensor on a block was moved to it where that helps."
+            f"No flat sensor sees mode {blind}, which moves along the sheets or where no sensor "
+            "fits, and no shaker at a normal drives it well. The layout serves the other modes; "
+            "a sensor on a block was moved to this mode where that helps."
         )
     out += _rattle_notes(found)
     if found.settings.draws:
@@ -97,20 +95,20 @@ def _places_notes(places: SensorCandidates) -> list[str]:
     """Describe the searched places, and those left out."""
     if not places.foot:
         return [
-            f"{len(places)} places and directions were looked at: grids of the beams, each with "
-            "the two axes of the basic frame that lie most across them. A sensor sits on the wall "
-            "or, where that is slanted, on a block."
+            f"{len(places)} places and directions were considered: grids of the beams, each with "
+            "the two axes of the basic frame most normal to them. A sensor is glued to the wall, "
+            "or to a block if the wall is inclined."
         ]
     refused = [f"{count} grids {why}" for why, count in places.refused.items() if count]
     out = [
-        f"{len(places)} places were looked at, spread over all flat surfaces that can be reached; "
-        f"left out: {', '.join(refused) or 'none'}."
+        f"{len(places)} places were considered, spread over all flat surfaces that can be "
+        f"reached; left out: {', '.join(refused) or 'none'}."
     ]
     if places.foot < 1:
         out.append(
-            "Nowhere is the surface flat over a sensor's whole foot, which has a radius of "
-            f"{1e3 * FOOT:g} mm: places were taken that are flat over {100 * places.foot:g} % of "
-            "it. Look at them before you glue."
+            f"No surface is flat over the whole base of a sensor, whose radius is {1e3 * FOOT:g} "
+            f"mm: the places are flat over {100 * places.foot:g} % of it. Inspect them before you "
+            "glue."
         )
     return out
 
@@ -119,24 +117,27 @@ def _rattle_notes(found: Plan) -> list[str]:
     """List vetoed shaker places, and pairs of parts that the mesh leaves undetermined."""
     out, force = [], found.settings.force
     if rattling := int((found.rattle.force < force).sum()):
-        out.append(f"{rattling} places would rattle below {force:g} N: no shaker goes there.")
+        out.append(
+            f"{rattling} places would rattle below {force:g} N: they are not used for a shaker."
+        )
     if not np.isfinite(found.actuators.condition).any():
         out.append(
-            "No place drives all modes by itself, since some share a frequency or stand still "
-            "wherever others move: take two shakers (--shakers 2), or measure from two places."
+            "No single place drives all modes: some share a frequency, or are at rest where "
+            "others move. Use two shakers (--shakers 2), or measure from two places."
         )
     if blocked := int((~found.places.straight).sum()):
-        out.append(f"To {blocked} places no straight rod leads: they are for sensors only.")
+        out.append(f"A straight rod cannot reach {blocked} places: they are for sensors only.")
     if not found.actuators.allowed[found.together].all():
         out.append(
-            "The shakers named are vetoed too: nothing better is left. Lower the force (--force)."
+            "The named shaker places are excluded too, but no better place remains. Lower the "
+            "force (--force)."
         )
     if found.openings.touching:
         pairs = ", ".join(f"{a} and {b}" for a, b in found.openings.touching)
         out.append(
-            f"Away from their joints the mesh lets touch: {pairs}. Their gap is less than the "
-            "facets leave in doubt; half of that doubt was taken for it, so the force at which "
-            "they rattle is a guess (marked ~): listen to them first."
+            f"Away from their joints these parts may touch: {pairs}. Their gap is below the "
+            "uncertainty of the facets; half of this uncertainty was used, so the force at which "
+            "they rattle is a guess (marked ~). Test these places first."
         )
     return out
 
@@ -170,11 +171,11 @@ def _sensors(found: Plan, result: PlanSummary, shown: Shown, page: Page, path: P
         ("rank", "label", "grid", "place [m]", "direction", "mounted"),
         rows,
         words=("label", "place [m]", "direction", "mounted"),
-        caption="The most informative first; the last is the one to give up for something else. "
-        "A place without a grid is the centre of a shell.",
+        caption="The most informative place is first; the last is the first to give up. A place "
+        "without a grid is the centre of a shell.",
     )
     moves = [
-        f"Mode {m.mode} was hardly seen ({number(m.before, 2)} of its largest motion): the "
+        f"Mode {m.mode} was barely visible ({number(m.before, 2)} of its largest motion): the "
         f"sensor at {m.given_up} moves to {m.taken} ({number(m.after, 2)})."
         for m in result.moves
     ]
@@ -182,7 +183,7 @@ def _sensors(found: Plan, result: PlanSummary, shown: Shown, page: Page, path: P
         *live.layout(page, "where", placed, [still]),
         table,
         Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
-        Items(moves or ["No sensor had to move for a mode to be seen."]),
+        Items(moves or ["All modes were visible, so no sensor was moved."]),
     ]
 
 
@@ -219,14 +220,14 @@ def _modes(
         ("mode", "Hz", "visibility", "seen", "seen by normals", "shift by sensors"),
         rows,
         words=("seen", "seen by normals"),
-        caption="Visibility: largest motion a sensor sees over the largest anywhere.",
+        caption="Visibility: largest motion at a sensor, relative to the largest anywhere.",
     )
     sweep = [(str(n), f"{100 * share:.0f} %") for n, share in found.sweep]
     steps = Table(
         ("target modes", "layout kept"),
         sweep,
-        caption="Share of the sensors that stays when so many modes are targeted instead of those "
-        "in the row above.",
+        caption="Share of the sensors that stay when the number of target modes changes from the "
+        "row above to this one.",
     )
     names = [str(m.mode) for m in result.modes]
     mac = plots.mac_matrix(folder / "auto_mac.png", found.auto_mac, names, names, "AutoMAC")
@@ -234,7 +235,7 @@ def _modes(
     modal, moved = found.modal.sel(faint), motion(built, found.modal.sel(faint))
     numbers = [found.first + 1 + int(k) for k in faint]
     drawn = scene.montage(folder / "modes.png", shown.seen, moved, modal.frequency, numbers)
-    least = [Picture(drawn, "Those the sensors see least.")]
+    least = [Picture(drawn, "The least visible modes at the sensors.")]
     f, stills = found.modal.frequency, [Picture(mac, "AutoMAC at the sensors.")]
     return [
         table,
@@ -269,9 +270,9 @@ def _shaker(
     ]
     caption = (
         "Condition: greatest over least Hankel singular value, the lower the better. Least "
-        "residue: driving-point residue of the mode driven worst, over the mean. Rattles from: "
-        "force at resonance at which two sheets first meet. Allowed: a straight rod leads there, "
-        f"and nothing rattles at {found.settings.force:g} N."
+        "residue: driving-point residue of the mode driven least, relative to the mean. Rattles "
+        "from: force at resonance at which two sheets first touch. Allowed: a straight rod "
+        f"reaches the place, and nothing rattles at {found.settings.force:g} N."
     )
     columns = ("rank", "label", "grid", "place [m]", "condition", "least residue")
     words = ("rattles from", "allowed", "also a sensor")
@@ -287,7 +288,7 @@ def _shaker(
 
 def _rattling(actuator: PlannedActuator) -> str:
     if actuator.rattles_between is None or actuator.rattles_from_n is None:
-        return "none foretold"
+        return "none predicted"
     a, b = actuator.rattles_between
     about = "" if actuator.rattle_gap_known else "~"
     return f"{about}{number(rounded(actuator.rattles_from_n))} N: {a} / {b}"
@@ -303,8 +304,8 @@ def _test(t: Durations) -> str:
     return (
         f"Stepped sine from {number(low)} to {number(high)} Hz needs {t.lines} lines "
         f"({number(t.lines_per_octave, 3)} per octave, {PER_BANDWIDTH} in every half-bandwidth) "
-        f"and {number(t.stepped_sine_s / 60, 3)} minutes a sweep, waiting up to "
-        f"{t.longest_wait_cycles:.0f} cycles until 1 % of a transient is left. Burst random "
-        f"with {AVERAGES} averages of {number(t.burst_random_resolution_hz, 3)} Hz needs "
+        f"and {number(t.stepped_sine_s / 60, 3)} minutes a sweep, with a wait of up to "
+        f"{t.longest_wait_cycles:.0f} cycles until a transient falls to 1 %. Burst random with "
+        f"{AVERAGES} averages of {number(t.burst_random_resolution_hz, 3)} Hz needs "
         f"{number(t.burst_random_s / 60, 3)} minutes."
     )

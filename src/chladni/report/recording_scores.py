@@ -6,7 +6,7 @@ from .words import number
 
 _WHAT = (
     "Q of the decks on the recordings that were not fitted, over all lines and channels. 'Apart' "
-    "is that of the fitted recording itself: no deck is asked to come nearer."
+    "is the Q between these and the fitted recording: no deck can be expected to come closer."
 )
 
 

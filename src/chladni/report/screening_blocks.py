@@ -10,7 +10,7 @@ from .blocks import Block, Items, Section, Table
 _FINDING = ("finding", "channels", "is a", "what", "repair")
 _CHECK = ("check", "result", "is")
 SEVERAL = 2  # recordings, beyond which equal findings are reported once
-_WORD = {True: "in order", False: "look at it", None: "not possible"}
+_WORD = {True: "in order", False: "check it", None: "not possible"}
 
 
 def screening_section(*screenings: Screening | None) -> Section:
@@ -33,12 +33,12 @@ def lead_of(screenings: Sequence[Screening]) -> str:
     """Return a sentence for each recording if they are few, else one for all."""
     if len(screenings) <= SEVERAL:
         return "; ".join(s.sentence for s in screenings)
-    return f"{len(screenings)} recordings; {of_all(screenings) or 'nothing found in any of them'}"
+    return f"{len(screenings)} recordings; {of_all(screenings) or 'no fault found'}"
 
 
 def _of_several(told: Sequence[Screening]) -> list[Block]:
     """Return one table of findings and one of checks, with equal rows merged."""
-    blocks: list[Block] = [Items([(of_all(told) or "nothing found in any of them") + "."])]
+    blocks: list[Block] = [Items([(of_all(told) or "no fault found") + "."])]
     found: dict[tuple[str, ...], list[str]] = {}
     looked: dict[tuple[str, str], dict[str, list[str]]] = {}
     for s in told:

@@ -22,39 +22,36 @@ def _sentence(result: DiagnosisResult) -> str:
     if verdict == "missing physics":
         return f"{'; and '.join(_lacks(result))}{'' if result.one_of else gain}."
     if verdict == "measurement fault" and result.one_of:
-        return f"Recording or model is at fault; the data cannot tell which: {_tied(result)}."
+        return f"The recording or the model is wrong; the data cannot distinguish: {_tied(result)}."
     if verdict == "measurement fault":
-        return f"The recording is at fault, not the model: {what}{gain}."
+        return f"The recording is wrong, not the model: {what}{gain}."
     if verdict == "nonlinear":
         signs = ", ".join(dict.fromkeys(t.signature for t in result.levels if t.sentence))
         why = what or signs or "no linear model fits"
         return f"The structure does not answer in proportion to the force: {why}."
     if not result.searched and not result.effects:
-        return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
+        return f"Calibration parameters were fitted; missing physics was not searched{gain}."
     if verdict in ("calibration only", "nothing missing") and result.one_of:
         better = " or ".join(result.one_of[0][1:])
         return (
-            f"Nothing is named; {better} would explain the recording better than calibration "
-            f"alone, but not by enough to be sure of either{gain}."
+            f"No effect is named; {better} explains the recording better than calibration alone, "
+            f"but the evidence does not decide{gain}."
         )
     if verdict in ("calibration only", "nothing missing") and result.distrust:
-        known = "Ordinary parameters explain the recording" * (verdict == "calibration only")
-        return (
-            f"{known or 'Nothing is named'}, but that no physics is missing is not to be "
-            f"trusted{gain}."
-        )
+        known = "Calibration explains the recording" * (verdict == "calibration only")
+        return f"{known or 'No effect is named'}, but physics may still be missing{gain}."
     if verdict == "calibration only":
-        return f"Ordinary parameters explain the recording; no physics is missing{gain}."
+        return f"Calibration explains the recording; no physics is missing{gain}."
     if verdict == "nothing missing":
         return (
-            f"Nothing is named: {_off(result)}, which the errors of mesh, joints and scatter that "
-            "are allowed for explain as well as any effect tried."
+            f"No effect is named: {_off(result)}. The allowed errors of mesh, joints and scatter "
+            "explain this as well as any effect tried."
         )
     if verdict == "not in catalogue" and result.one_of:
-        return f"Nothing is named; the data cannot tell apart {', '.join(result.one_of[0])}."
+        return f"No effect is named; the data cannot distinguish {', '.join(result.one_of[0])}."
     if verdict == "not in catalogue":
         near = f": {what}" if what else ""
-        return f"Something is missing that the catalogue does not hold{near}."
+        return f"The model lacks physics that is not in the catalogue{near}."
     return verdict
 
 
@@ -86,8 +83,8 @@ def _lacks(result: DiagnosisResult) -> list[str]:
     words = [f"The model lacks {_each(physics)}"] if physics or not (tied or faults) else []
     if tied:
         begun = "one of" if physics else "The model lacks one of"
-        words.append(f"{begun} these, which the data cannot tell apart: {_tied(result)}")
-    return [*words, f"the recording is at fault as well: {_each(faults)}"] if faults else words
+        words.append(f"{begun} these, which the data cannot distinguish: {_tied(result)}")
+    return [*words, f"the recording is wrong too: {_each(faults)}"] if faults else words
 
 
 def _tied(result: DiagnosisResult) -> str:
@@ -104,8 +101,8 @@ def _gain(agreement: Agreement | None) -> str:
         return ""
     mesh, said = held.with_mesh_error, ""
     if mesh is not None and mesh < held.nominal < held.after:
-        said = f", and to {number(mesh, 3)} with the error of its mesh, which no deck holds"
+        said = f", and to {number(mesh, 3)} with the mesh error, which a deck cannot contain"
     return (
-        f"; on data the fit never saw the deviation Q goes from {number(held.nominal, 3)} "
-        f"to {number(held.after, 3)}{said}"
+        f"; on held-out data the deviation Q goes from {number(held.nominal, 3)} to "
+        f"{number(held.after, 3)}{said}"
     )

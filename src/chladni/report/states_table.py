@@ -21,14 +21,14 @@ def states_table(result: DiagnosisResult) -> list[Block]:
     rows = [_row(s, state_folder(result, k)) for k, s in enumerate(result.states)]
     heads = ("state", "verdict", "effect", "where", "size", "Q before", "Q after", "folder")
     words = ("state", "verdict", "effect", "where", "size", "folder")
-    note = "Each state has decks and a page of its own; an effect is of its state."
+    note = "Each state has its own decks and page; an effect belongs to one state."
     out: list[Block] = [Table(heads, rows, words, note)]
     if result.shared:
         shared = [
             (p.where, number(p.deck_value), _size(p.estimate), p.estimate.unit)
             for p in result.shared
         ]
-        said = "Shared by all states, fitted to their recordings at once."
+        said = "Shared by all states and fitted to all their recordings together."
         out.append(Table(("parameter", "deck", "all states", "unit"), shared, ("parameter",), said))
     return out
 

@@ -63,10 +63,10 @@ def study_page(folder: Path, found: ParameterStudy) -> PageParts:
         span = number(np.nanmin(first)), number(np.nanmax(first))
         lead += f"; the first elastic mode lies between {span[0]} and {span[1]} Hz"
     files: list[tuple[str, str]] = []
-    sections = [Section("What was varied", [_ranges(found)])]
+    sections = [Section("Varied parameters", [_ranges(found)])]
     if done:
         sections += [
-            Section("What moves what", _sensitivities(folder, found, files)),
+            Section("Sensitivities", _sensitivities(folder, found, files)),
             Section("Results over parameters", _pictures(folder, found, files)),
         ]
     if found.failed:
@@ -79,14 +79,14 @@ def study_page(folder: Path, found: ParameterStudy) -> PageParts:
 def _notes(found: ParameterStudy) -> list[str]:
     out = []
     if found.kept:
-        out.append(f"{found.kept} samples were finished by an earlier run and are not run again.")
+        out.append(f"{found.kept} samples were finished by an earlier run and were not repeated.")
     lost = [c.replace("f", "mode ").replace("_hz", "") for c in found.columns
             if c.startswith("f") and c.endswith("_hz")
             and np.isnan(found.column(c)).sum() > len(found.failed)]  # fmt: skip
     if lost:
         out.append(
-            f"{', '.join(lost)}: in some samples no mode looks like the deck's own (MAC below 0.5 "
-            "or beyond the modes solved), and its frequency is left out there."
+            f"{', '.join(lost)}: in some samples no mode matches that of the deck (MAC below 0.5, "
+            "or beyond the solved modes); its frequency is left out there."
         )
     return out
 
@@ -100,7 +100,7 @@ def _ranges(found: ParameterStudy) -> Block:
     s = found.settings
     caption = (
         f"{len(found.rows)} samples, {s.sampler}, seed {s.seed}. Mode 1 is the first elastic one; "
-        "`chladni modes` counts rigid motions, too."
+        "`chladni modes` counts rigid motions too."
     )
     heads = ("parameter", "deck", "from", "to", "steps")
     return Table(heads, rows, words=("parameter", "steps"), caption=caption)
@@ -124,7 +124,9 @@ def _sensitivities(
             "d ln result / d ln parameter",
         )
         files.append((path.name, "logarithmic slopes"))
-        blocks.append(Picture(path, "1: one per cent more of the parameter is one per cent more."))
+        blocks.append(
+            Picture(path, "1: a parameter one per cent higher gives a result one per cent higher.")
+        )
     for measure, title in (("total", "Total Sobol' index"), ("mu_star", "mean |effect|")):
         rows = [_row(s, measure) for s in found.sensitivities]
         if kept := [r for r in rows if any(cell != "–" for cell in r[1:])]:
@@ -178,7 +180,7 @@ def _pictures(folder: Path, found: ParameterStudy, files: list[tuple[str, str]])
     if np.isfinite(np.stack(list(whole.values()))).all(axis=0).sum() > 1:
         path = study_plots.parallel_coordinates(folder / "parallel.png", whole, colour, decades)
         files.append((path.name, "parallel coordinates"))
-        blocks.append(Picture(path, f"Every line is a sample; colour: {colour}."))
+        blocks.append(Picture(path, f"Each line is a sample; colour: {colour}."))
     path = study_plots.response_plots(
         folder / "responses.png", results, parameters, nominal, decades
     )

@@ -33,38 +33,39 @@ TONE = {
 PLACES = {  # name of a figure: (section it belongs to, caption)
     "frf": (
         "frf",
-        "A typical channel: test, model before, model after; frequencies were compared, not this.",
+        "A typical channel: test, model before, model after; frequencies were compared, not "
+        "responses.",
     ),
     "frf_fitted": (
         "frf",
-        "A channel that was fitted. Each mode of a deck has the damping identified of its partner "
-        "in the test.",
+        "A fitted channel. Each mode of a deck has the damping identified for its partner in the "
+        "test.",
     ),
-    "frf_held_out": ("frf", "A channel the fit never saw."),
+    "frf_held_out": ("frf", "A held-out channel."),
     "frf_grid": ("frf", "Channels spread evenly over the list."),
     "nyquist": ("frf", "Nyquist."),
     "waterfall": ("scores", "Deviation Q on fitted data, step by step."),
     "held_out": ("scores", "Deviation Q on held-out data."),
     "fit_test": (
         "scores",
-        "What the explanation leaves (dot), beside what draws of the model itself leave (bar: 99 % "
-        "of them). A dot to the right of its bar is not explained; one to the left says that noise "
-        "is believed larger than it is.",
+        "Residual of the explanation (dot) and of recordings drawn from the model (bar: 99 % of "
+        "them). A dot to the right of its bar is not explained; a dot to the left means that the "
+        "assumed noise is too large.",
     ),
     "left": (
         "scores",
-        "Where a small local change of stiffness or mass would still gain, and how much, with what "
-        "is named in place; grey: so blind is the test there that half of either could be gone.",
+        "Gain of a small local change of stiffness or mass, with the named effects in place. "
+        "Grey: the test is blind there; half of the stiffness or mass could be missing.",
     ),
-    "deviation": ("scores", "Where the deviation is left: channel by band."),
+    "deviation": ("scores", "Remaining deviation by channel and band."),
     "frequencies": ("modes", "Deviation of each frequency from the test."),
     "mac": ("modes", "Modal assurance criterion, test against model."),
     "modes": ("modes", "Mode shapes of the model after."),
     "stabilisation": ("modes", "Stabilisation diagram of the test."),
     "evidence": ("why", "Log evidence of every explanation tried, relative to the best."),
-    "setup": ("test", "Where sensors and shaker sit."),
-    "where_2": ("found", "Where the second effect is."),
-    "where_3": ("found", "Where the third effect is."),
+    "setup": ("test", "Sensors and shaker."),
+    "where_2": ("found", "Place of the second effect."),
+    "where_3": ("found", "Place of the third effect."),
 }
 LEVELS = "levels_"  # figures of modes over levels: with the number of the mode
 _HALF = ("waterfall", "held_out")  # two of them stand side by side
@@ -117,8 +118,8 @@ def _joints(result: DiagnosisResult) -> list[Block]:
     rows = [tuple(number(x) for x in vars(j).values()) for j in result.joints]
     heads = ("mode [Hz]", "level", "K, times", "GE", "share of strain energy")
     what = (
-        "Springs and bushes of a linear deck that has the mode as it is at a level: K over that of "
-        "the updated deck, and GE (PBUSH). They are in the updated deck as comments."
+        "Springs and bushes of a linear deck that matches the mode at one level: K relative to "
+        "the updated deck, and GE (PBUSH). The updated deck contains them as comments."
     )
     return [Table(heads, rows, caption=what)] if rows else []
 
@@ -154,21 +155,21 @@ def sections(
         if n not in PLACES and n != "where" and p not in of_levels.values()
     ]
     return [
-        Section("Not to be trusted", [Items(result.distrust)] if result.distrust else []),
+        Section("Reasons for doubt", [Items(result.distrust)] if result.distrust else []),
         *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
         Section("At a glance", _glance(result)),
-        Section("What was found", [*_effects(result.effects), *shown("found")]),
+        Section("Findings", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),
         Section("Joints at each level", _joints(result)),
-        Section("What was calibrated", _calibrated(result)),
+        Section("Calibrated parameters", _calibrated(result)),
         Section("Test and model", shown("frf")),
         Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),
         Section("Frequencies", [*_frequencies(result), *shown("modes")]),
         Section("Why not something else", [*_alternatives(result), *shown("why")]),
         Section("The test", shown("test")),
         *([found] if result.screening and not result.screening.findings else []),
-        Section("What was done, and why", [Items(list(notes))] if notes else []),
+        Section("Steps and reasons", [Items(list(notes))] if notes else []),
         *more,
         Section("More pictures", rest),
         Section("Files", _files(result)),
@@ -189,31 +190,34 @@ def _glance(result: DiagnosisResult) -> list[Block]:
         off = [abs(f / r.test_hz - 1) for r in rows if (f := getattr(r, key))]
         if off:
             mean, worst = 100 * sum(off) / len(off), 100 * max(off)
-            text = f"mean {number(mean, 2)} %, worst {number(worst, 2)} % off"
+            text = f"mean error {number(mean, 2)} %, largest {number(worst, 2)} %"
             facts.append((f"Frequencies {name}", text))
     if result.adequate is not None:
-        facts.append(("Does it fit", _fits(result.adequate)))
+        facts.append(("Test of fit", _fits(result.adequate)))
     return [Facts(facts)] if facts else []
 
 
 def _fits(test: Adequacy) -> str:
     """The absolute test in one line."""
     if test.passes:
-        return f"yes: a right model leaves as much in {number(100 * test.p, 2)} % of recordings"
+        return (
+            f"passed: {number(100 * test.p, 2)} % of recordings of a right model have a residual "
+            "this large"
+        )
     place = "; ".join(_spot(place) for place in test.where)
-    return f"no: {test.what}{f' ({place})' if place else ''}"
+    return f"failed: {test.what}{f' ({place})' if place else ''}"
 
 
 def _spot(place: LeftPlace) -> str:
     parts = f"; on {', '.join(place.parts[:3])}" if place.parts else ""
-    return f"{place.text}{parts}{f', round grid {place.grid}' if place.grid else ''}"
+    return f"{place.text}{parts}{f', near grid {place.grid}' if place.grid else ''}"
 
 
 def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
     blocks: list[Block] = []
     gains = [(e.name, number(e.gain)) for e in effects if e.gain is not None]
     if len(effects) > 1 and gains:
-        heads = ("effect", "what -2 ln evidence loses without it, the others fitted again")
+        heads = ("effect", "loss in -2 ln evidence without it, the others fitted again")
         blocks.append(Table(heads, gains, ("effect",)))
     for effect in effects:
         blocks.append(Text([": ".join(t for t in (effect.name, effect.claim) if t)]))
@@ -266,9 +270,9 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
 
 
 _REACHED = (
-    "Found beside scatter, joints, mesh and folds, which err as well. The updated deck has none of "
-    "these and may need other values to respond alike; what that brings is under Scores and "
-    "Frequencies: before, and after."
+    "Estimated together with the errors of scatter, joints, mesh and folds. The updated deck "
+    "does not contain these errors and may need other values for the same response. Scores and "
+    "Frequencies show the result: before and after."
 )
 
 
@@ -278,10 +282,10 @@ def _scores(result: DiagnosisResult) -> list[Block]:
     fit, held = result.agreement.fitted, result.agreement.held_out
     steps = (
         ("nominal deck", "nominal", False),
-        ("calibrated deck, nothing added", "calibrated", True),
+        ("calibrated deck without an effect", "calibrated", True),
         *((("updated deck", "with_effect", True),) if result.effects else ()),
-        ("the last of these, with the mesh error the fit found", "with_mesh_error", False),
-        ("and what scatter could explain taken out", "with_scatter", False),
+        ("deck above, with the fitted mesh error", "with_mesh_error", False),
+        ("without the part that scatter can explain", "with_scatter", False),
         ("floor: the recording's noise alone", "floor", False),
     )
     rows = []
@@ -301,10 +305,10 @@ def _scores(result: DiagnosisResult) -> list[Block]:
 
 
 _MEANING = {
-    "responses": "Q: mean over channels and lines of |log10(H model / H test)|²; lower is better. "
-    "That of a deck is the deck's own: whoever runs it finds the same.",
+    "responses": "Q: mean over channels and lines of |log10(H model / H test)|²; lower is "
+    "better. Every run of the same deck gives the same Q.",
     "frequencies": "Q: mean over the paired frequencies of |log10(f model / f test)|²; lower is "
-    "better. That of a deck is the deck's own: whoever runs it finds the same.",
+    "better. Every run of the same deck gives the same Q.",
 }
 
 
@@ -335,7 +339,7 @@ def _alternatives(result: DiagnosisResult) -> list[Block]:
         value = other.log_evidence
         below = None if value is None or top is None else value - top
         rows.append((other.name, number(value), number(below), other.why_not))
-    heads = ("explanation", "log evidence", "against the best", "why not")
+    heads = ("explanation", "log evidence", "compared with the best", "why not")
     return [Table(heads, rows, ("explanation", "why not"))] if rows else []
 
 

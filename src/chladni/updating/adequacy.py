@@ -105,10 +105,10 @@ class _Linear:
 STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
 TWO_SIDED = (0, 1)  # within a span: a fit better than its errors allow has wrong errors
 NAMES = (
-    "the model's form must be off by {0:.1%}; formulations of one structure differ by 0.3 to 4 %",
-    "the residual is {2:.1f} times what the known errors leave",
-    "one line leaves {2:.1f} times what the known errors leave",
-    "one channel leaves {2:.1f} times what the known errors leave",
+    "the form error must be {0:.1%}; formulations of one structure differ by 0.3 to 4 %",
+    "the residual is {2:.1f} times that of the known errors",
+    "the residual of one spectral line is {2:.1f} times that of the known errors",
+    "the residual of one channel is {2:.1f} times that of the known errors",
 )
 
 
@@ -180,7 +180,7 @@ def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
     test = replace(test, statistics=(*test.statistics, row))
     if p >= min(test.p, LEAST_P):
         return test
-    what += ": something spins, or moves by a drive of its own, or channels lag one another"
+    what += ": a part rotates or is driven by itself, or channels are delayed"
     where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
     return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
 
@@ -202,7 +202,7 @@ def of_poles(data: Poles, state: State) -> FitTest:
         where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
         return FitTest(often >= LEAST_P, often, what, where)
     what = (
-        f"natural frequencies are met to {data.scale:.1%}; models of one structure differ by about "
+        f"natural frequencies agree to {data.scale:.1%}; models of one structure differ by about "
         f"{SCALE:.1%}"
     )
     return FitTest(closely >= LEAST_P, closely, what, "over all modes")
@@ -261,7 +261,7 @@ def _where(data: Responses, square: np.ndarray, labels: tuple[str, ...]) -> tupl
     channel = int(np.argmax(square.sum(axis=0) / np.maximum(data.use.sum(axis=0), 1)))
     name = labels[channel] if channel < len(labels) else f"channel {channel + 1}"
     worst = f[np.argsort(-by_line)[:WORST]]
-    return f"most near {worst[0]:.0f} Hz and on {name}", worst
+    return f"largest near {worst[0]:.0f} Hz and on {name}", worst
 
 
 def _modes_near(frequency: np.ndarray, state: State) -> tuple[float, ...]:

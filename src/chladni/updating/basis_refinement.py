@@ -41,9 +41,9 @@ class Refinement:
         if self.worst <= LIMIT:
             return ()
         return (
-            f"the frequencies of the reduced model stay {self.worst:.2%} off those of the full "
-            f"one, {LIMIT:.2%} would serve: the result is not to be trusted; narrow the band, or "
-            "bring the deck nearer to the structure first",
+            "the frequencies of the reduced model differ from the full model by "
+            f"{self.worst:.2%}, above the limit of {LIMIT:.2%}: do not trust the result; narrow "
+            "the band, or correct the deck first",
         )
 
 
@@ -74,11 +74,11 @@ def refined(
             else:
                 fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
         except ModelError as error:  # the coarse basis hid an impossible structure
-            note = f"{note}; with what it lacked added to its basis it could not be fitted: {error}"
+            note = f"{note}; the fit on the refined basis failed: {error}"
             break
         hypothesis = replace(hypothesis, fit=fit, model=model)
         found = _accuracy(problem, hypothesis)
-        note = f"{note}; with what it lacked added to its basis, {found.worst:.2%}"
+        note = f"{note}; on the refined basis {found.worst:.2%}"
     return Refinement(hypothesis, note, found.worst)
 
 
@@ -89,8 +89,8 @@ def _accuracy(problem: UpdatingProblem, hypothesis: HypothesisFit) -> Accuracy:
 
 def _said(found: Accuracy) -> str:
     return (
-        f"the frequencies of the reduced model are {found.worst:.2%} off those of the full one at "
-        f"most; {LIMIT:.2%} still serve"
+        "the frequencies of the reduced model differ from the full model by at most "
+        f"{found.worst:.2%} (limit {LIMIT:.2%})"
     )
 
 

@@ -97,9 +97,9 @@ def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
         return ()
     names = ", ".join(family.name for family in families() if family.on_sheets)
     return (
-        f"not looked for, since the deck has no shells for them to act on: {names}",
-        "a joint where beams share a grid is no element of the deck, so that a compliant one is "
-        "not looked for by name; a bush between beams is",
+        f"not searched, because they act on shells and the deck has none: {names}",
+        "compliance of a joint where beams share a grid is not searched, because no element "
+        "models it; bushes between beams are searched",
     )
 
 

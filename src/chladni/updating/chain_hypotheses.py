@@ -186,7 +186,10 @@ def chain_faults(
     tried = other_readings(frf, seen, declared, model, outputs, inputs, before)
     best = min(tried, key=lambda h: h.share)
     among = [h for h in tried if h.finding.kind in {f.kind for f in before if f.kind in SURE}]
-    said = f"Q {declared:.2g} as declared, {best.Q:.2g} at best of {len(tried)} other readings"
+    said = (
+        f"Q {declared:.2g} as declared, {best.Q:.2g} for the best of {len(tried)} other "
+        "interpretations"
+    )
     better = explains(best.Q, best.Q / best.share) and without_modes(frf, lines) > FLAT
     named = [best] if better else among
     findings = [h.finding for h in sorted(named, key=lambda h: h.share)[:1]]
@@ -244,19 +247,22 @@ def _read_otherwise(
     """Another quantity, sign, direction of time or unit of frequency."""
 
     def of(Q: float, kind: str, text: str, mend: str) -> Hypothesis:
-        said = f"{text}: so read, Q against the model is {Q:.2g}, as declared {declared:.2g}."
+        said = (
+            f"{text}: with this interpretation Q against the model is {Q:.2g}, as declared "
+            f"{declared:.2g}."
+        )
         return Hypothesis(Q, Q / declared, Finding(kind, said, "fault", (), mend))
 
     for other in (q for q in QUANTITIES if frf.quantity in QUANTITIES and q != frf.quantity):
         Q = min(map(seen.score, seen.answers(DERIVATIVES[other])))
         mend = f'in case.toml, [test]: quantity = "{other}"'
-        yield of(Q, "wrong quantity", f"what is said to be {frf.quantity} is {other}", mend)
+        yield of(Q, "wrong quantity", f"the declared {frf.quantity} is {other}", mend)
     Q = min(seen.score(-H) for H in seen.answers())
-    mend = f"in sensors.csv turn the direction of input {inputs.labels[0]} round"
+    mend = f"in sensors.csv reverse the direction of input {inputs.labels[0]}"
     text = "the force gauge (or every sensor) is reversed"
     yield of(Q, "reversed force", text, mend)
     Q = min(seen.score(H.conj()) for H in seen.answers())
-    text = "the FRFs are conjugated, their phases turn the wrong way (exp(-iωt) for exp(iωt))"
+    text = "the FRFs are conjugated: their phase has the wrong sign (exp(-iωt) for exp(iωt))"
     yield of(Q, "conjugated FRFs", text, "in case.toml, [test]: conjugated = true")
     for unit, scale in HERTZ.items():
         reached = (frf.frequency > 0) & (REACH * scale * frf.frequency <= model.band)
@@ -264,7 +270,7 @@ def _read_otherwise(
             continue
         Q = min(map(all_lines.score, all_lines.answers(scale=scale)))
         mend = f'in case.toml, [test]: frequency_unit = "{unit}"'
-        yield of(Q, "wrong unit of frequency", f"what is said to be Hz is {unit}", mend)
+        yield of(Q, "wrong unit of frequency", f"the declared Hz are {unit}", mend)
 
 
 def _relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list[Hypothesis]:
@@ -285,7 +291,7 @@ def _relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> lis
         return []
     rows = [f"{labels[k]} that of {labels[place[k]]}" for k in moved]
     text = (
-        f"{len(moved)} of {len(labels)} outputs stand under each other's labels: exchanged, Q "
+        f"{len(moved)} of {len(labels)} outputs have exchanged labels: after the exchange Q "
         f"against the model is {Q:.2g}, as declared {declared:.2g}."
     )
     mend = f"in sensors.csv give each the grid and direction of the other: {listed(rows, 6)}"
@@ -314,10 +320,10 @@ def _driven_elsewhere(seen: Smoothed, model: Modelled, inputs: MeasuredDofs) -> 
         k = int(Q.argmin())
         off = float(np.linalg.norm(at[k] - inputs.points[j]))
         text = (
-            f"the force {label} acts elsewhere, near grid {grids[k]}, {off:.3g} m away from where "
-            f"it is declared: there Q against the model is {Q[k]:.2g}, as declared {declared:.2g}."
+            f"the force {label} acts near grid {grids[k]}, {off:.3g} m from the declared place: "
+            f"there Q against the model is {Q[k]:.2g}, as declared {declared:.2g}."
         )
-        mend = f"in sensors.csv give input {label} the grid {grids[k]}, or where it was"
+        mend = f"in sensors.csv give input {label} the grid {grids[k]}, or its true place"
         found = Finding("misplaced force", text, "fault", (label,), mend, float(grids[k]))
         out.append(Hypothesis(float(Q[k]), float(Q[k] / declared), found))
     return out

@@ -88,7 +88,7 @@ def _by_modes(
     omega_r = 2 * np.pi * near.frequency
     before = _agreeing(before, labels, phi_o, phi_i, omega_r, 2 * np.pi * found.band[1])
     if inputs.base.any() or not strong.order or not len(near.frequency):
-        why = "the base is moved" if inputs.base.any() else "no mode stands out"
+        why = "the base moves" if inputs.base.any() else "no mode is above the noise"
         return before.with_more([], [Check("channels against the model", why, None)])
     gains, omega = modal_gains(strong, phi_o, phi_i, near.frequency)
     findings, check = level_checks(strong, gains, omega, gain_known, len(phi_o))
@@ -142,8 +142,8 @@ def _agreeing(
         apart = float(np.linalg.norm(a - b) / np.maximum(np.linalg.norm([a, b]), 1e-300))
         if apart > UNLIKE and f.value < UNLIKE * apart:
             text = (
-                f"outputs {' and '.join(f.channels)} are equal within their noise, in the model "
-                f"they differ by {100 * apart:.0f} %: one sensor under two labels."
+                f"outputs {' and '.join(f.channels)} are equal within their noise, but differ by "
+                f"{100 * apart:.0f} % in the model: one sensor has two labels."
             )
             mend = left_out(f.channels[1])
             out.append(Finding("duplicated channels", text, "fault", f.channels, mend, f.value))

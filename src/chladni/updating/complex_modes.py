@@ -64,14 +64,12 @@ class ModeCoupling:
         allowed = float(binom.ppf(0.995, n, EXCUSED))
         row = FitStatistic("complex modes", float(len(over)), n * EXCUSED, 0.0, allowed)
         if most <= skew:
-            what = (
-                f"{len(over)} of {n} modes are more complex than any damping of theirs makes them"
-            )
+            what = f"{len(over)} of {n} modes are more complex than their damping explains"
         else:
             over = np.argsort(-ratio)[:1]
             what = (
-                f"{self.alike} of {self.coupled} pairs of modes are coupled the way something that "
-                "spins couples them, not the way damping does"
+                f"{self.alike} of {self.coupled} pairs of modes are coupled as by a rotating "
+                "part, not as by damping"
             )
         return min(1.0, 2 * min(most, skew)), row, what, tuple(self.frequency[over].tolist())
 

@@ -69,7 +69,9 @@ class ModalDamping(IdentifiedDamping):
         drawn = np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(share)))
         own, seen = np.exp(drawn @ along), float(np.exp(np.log(self.ratio) @ along))
         median, low, high = np.quantile(own, (0.5, 0.005, 0.995))
-        row = FitStatistic("damping where it gives", seen, float(median), float(low), float(high))
+        row = FitStatistic(
+            "damping where it is compliant", seen, float(median), float(low), float(high)
+        )
         return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
 
     def said(self) -> tuple[str, str, tuple[float, ...]]:
@@ -81,8 +83,8 @@ class ModalDamping(IdentifiedDamping):
         least, most = self.ratio[out].min(), self.ratio[out].max()
         span = f"{most:.1%}" if len(out) == 1 else f"{least:.1%} to {most:.1%}"
         what = (
-            f"{len(out)} of {len(self.ratio)} modes are damped by {span}, the others by about "
-            f"{usual:.1%}: something dissipates that stiffness and mass cannot explain"
+            f"{len(out)} of {len(self.ratio)} modes have a damping of {span}, the others about "
+            f"{usual:.1%}: stiffness and mass cannot explain this dissipation"
         )
         modes = tuple(float(f) for f in self.frequency[out])
         return what, "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz", modes

@@ -14,14 +14,14 @@ from .question import Prepared
 
 UNEXPLAINED = "; nothing in the catalogue explains the recording"
 REFUSED = {
-    Reason.AGAINST: "the data that no fit saw speak against it",
-    Reason.TOO_LITTLE: "all data together bring too little",
-    Reason.WORSE: "the deck with it is worse on the data that no fit saw",
-    Reason.LEAVES_MORE: "more is left than is explained",
-    Reason.BARELY_FITS: "the fit is only just good enough, where one effect alone does not fit",
-    Reason.REFUTED: "the leader, which is refused itself, explains far more",
+    Reason.AGAINST: "the held-out data speak against it",
+    Reason.TOO_LITTLE: "all data together give too little evidence",
+    Reason.WORSE: "the deck with it fits the held-out data worse",
+    Reason.LEAVES_MORE: "it leaves more than it explains",
+    Reason.BARELY_FITS: "the fit is only just good enough, and one effect alone does not fit",
+    Reason.REFUTED: "the leader explains far more, although it is refused itself",
 }
-DATA = {Reason.ALL_DATA: "all data", Reason.WHAT_WAS_FITTED: "what was fitted"}
+DATA = {Reason.ALL_DATA: "all data", Reason.WHAT_WAS_FITTED: "the fitted data"}
 
 
 def concluded(
@@ -90,7 +90,7 @@ class DecisionWords:
             return next(t.what for k, t in tests.items() if k.startswith(after(refined(name), "")))
         if why is Reason.UNFIT:
             test = tests.get(refined(name)) or tests[name]
-            return f"what it leaves is not explained: {test.what}"
+            return f"its residual is not explained: {test.what}"
         return REFUSED[why]
 
     def settled(self) -> str:
@@ -104,7 +104,10 @@ class DecisionWords:
         test, name = self.known.tests.get(step.key), self.row(step.key).name or ALONE
         if test is None:
             return ""
-        note = f"of the model's own draws {test.p:.0%} fit no better than {name}: {test.what}"
+        note = (
+            f"{test.p:.0%} of recordings drawn from the model fit no better than {name}: "
+            f"{test.what}"
+        )
         if test.passes:
             return note
         last = step.key == self.decision.tested and not self.decision.named
@@ -116,7 +119,7 @@ class DecisionWords:
 
     def _too_few(self, step: Step) -> str:
         return (
-            f"{self.prepared.too_little}; these explain the data and cannot be told apart by them: "
+            f"{self.prepared.too_little}; these explain the data, which cannot distinguish them: "
             f"{', '.join(step.names)}; more modes, or more sensors of known gain, would separate "
             "them"
         )
@@ -125,14 +128,13 @@ class DecisionWords:
         row, data = self.row(step.key), "poles" if self.known.table.poles else "data"
         return (
             f"{row.name} gained {self.gain(step.key):.1f} in -2 ln evidence on the {data} that "
-            "were fitted, and those that no fit saw bring "
-            f"{row.held_out_votes().news:.1f}: together more "
-            f"than the {self.decision.due:.0f} that are needed"
+            f"were fitted, and {row.held_out_votes().news:.1f} on the held-out data: together "
+            f"more than the required {self.decision.due:.0f}"
         )
 
     def _held_out(self, step: Step) -> str:
         row = self.row(step.key)
-        return f"{row.name} on data that no fit saw: {votes_in_words(row.held_out_votes())}"
+        return f"{row.name} on held-out data: {votes_in_words(row.held_out_votes())}"
 
     def _refused(self, step: Step) -> str:
         row = self.row(step.key)
@@ -140,9 +142,9 @@ class DecisionWords:
         (seen, seen_with), (held, held_with) = left.fitted, left.held_out
         return (
             f"{row.name} gained {self.gain(step.key):.0f} in -2 ln evidence, but "
-            f"{REFUSED[step.reason]} ({votes_in_words(row.held_out_votes())}; "
-            f"held-out Q {held:.3g} calibrated, {held_with:.3g} with it; of what was fitted "
-            f"{seen:.3g} and {seen_with:.3g}), so it is not named"
+            f"{REFUSED[step.reason]} ({votes_in_words(row.held_out_votes())}; held-out Q "
+            f"{held:.3g} calibrated, {held_with:.3g} with it; fitted Q {seen:.3g} and "
+            f"{seen_with:.3g}), so it is not named"
         )
 
     def _refuting(self, step: Step) -> str:
@@ -151,7 +153,7 @@ class DecisionWords:
             gain += row.held_out_votes().news
         assert step.why is not None
         return (
-            f"{DATA[step.reason]}: {evidence_in_words(gain / 2)} for {row.name} against "
+            f"{DATA[step.reason]}: {evidence_in_words(gain / 2)} for {row.name} compared with "
             f"calibration alone; but {REFUSED[step.why]}"
         )
 
@@ -165,21 +167,21 @@ class DecisionWords:
         gains = ", ".join(f"{n} {g:.0f}" for n, g in zip(s.members, s.gains, strict=True))
         return (
             f"{' and '.join(s.members)} explain the recording together; with the others in place "
-            f"each gains in -2 ln evidence: {gains} ({s.due:.0f} are needed)"
+            f"each gains in -2 ln evidence: {gains} (required: {s.due:.0f})"
         )
 
     def _held_out_of_set(self, step: Step) -> str:
         s = self.whole(step)
         others = " and ".join(n for k, n in enumerate(s.members) if k != step.member)
         said = votes_in_words(self.row(s.member(step.member)).held_out_votes())
-        return f"{s.members[step.member]} added to {others}, on data that no fit saw: {said}"
+        return f"{s.members[step.member]} added to {others}, on held-out data: {said}"
 
     def _set_refused(self, step: Step) -> str:
         assert step.why is not None
         if step.why is Reason.NOT_BORNE:
             why = f"that is too little for {self._held_out_of_set(step)}"
         elif step.why is Reason.UNFIT:
-            why = f"what is left is not explained: {self.known.tests[refined(step.key)].what}"
+            why = f"the residual is not explained: {self.known.tests[refined(step.key)].what}"
         else:
             why = REFUSED[step.why]
         return f"{self._found_together(step)}; but {why}"
@@ -187,30 +189,30 @@ class DecisionWords:
     def _perhaps_of_set(self, step: Step) -> str:
         s, k = self.whole(step), step.member
         return (
-            f"with {' and '.join(step.names)} in place {s.members[k]} gains {s.gains[k]:.0f} in "
-            f"-2 ln evidence of the {s.due:.0f} that are needed: it may be there as well"
+            f"with {' and '.join(step.names)} in place {s.members[k]} gains {s.gains[k]:.0f} of "
+            f"the required {s.due:.0f} in -2 ln evidence: it may be present too"
         )
 
     def _rival_of_member(self, step: Step) -> str:
         alternatives = self.whole(step).alternatives[step.member]
         behind = ", ".join(f"{r.name} by {r.behind:.0f}" for r in alternatives)
         note = (
-            f"with the others in place these data do not tell {step.names[0]} apart from what is "
-            f"behind it in -2 ln evidence: {behind}"
+            f"with the others in place these data do not distinguish {step.names[0]} from the "
+            f"next ones, which are behind in -2 ln evidence: {behind}"
         )
         odd = [needs_impossible(r.name, r.implausible) for r in alternatives if r.implausible]
         return _with_check("; ".join([note, *odd]), step.names)
 
     def _usual_left(self, step: Step) -> str:
         return (
-            f"more is left than {self.row(step.key).name} explains, but no more than errors of the "
-            "model's form leave: something less may be missing as well"
+            f"{self.row(step.key).name} leaves more than it explains, but no more than form "
+            "errors of models usually leave: a smaller effect may be missing too"
         )
 
     def _next(self, step: Step) -> str:
         (before,), name = step.names, self.row(step.key).name
         assert step.why is not None
-        return f"{before} is not the answer: {self.refusal(before, step.why)}; {name} is next"
+        return f"{before} is refused: {self.refusal(before, step.why)}; {name} is next"
 
     def _tied(self, step: Step) -> str:
         best = self.row(step.key)
@@ -220,7 +222,7 @@ class DecisionWords:
         odds = "; ".join(f"{evidence_in_words(gap[n] / 2)} against {n}" for n in others)
         known = [(n, self.known.fits[k]) for n, k in each.items() if n in step.names]
         odd = [(n, t.effect.implausible(t.fit.of(t.effect))) for n, t in known]
-        note = f"{first} is not told apart by these data: {odds}"
+        note = f"these data do not distinguish {first} from the others: {odds}"
         impossible = [needs_impossible(n, why) for n, why in odd if why]
         return _with_check("; ".join([note, *impossible]), step.names)
 
@@ -228,20 +230,17 @@ class DecisionWords:
         name = self.row(step.key).name
         note = (
             f"{name} explains the recording better than calibration alone, by "
-            f"{self.gain(step.key):.1f} in -2 ln evidence, of which {self.decision.due:.0f} are "
-            "needed to name it: neither is certain"
+            f"{self.gain(step.key):.1f} in -2 ln evidence; {self.decision.due:.0f} are required "
+            "to name it: neither is certain"
         )
         return _with_check(note, (name,))
 
     def _deck_stays(self, step: Step) -> str:
-        note = (
-            "no calibrated numbers that a structure of this deck may have fit better than its own, "
-            "which stay"
-        )
+        note = "the deck keeps its numbers: no plausible calibrated values fit better"
         test = self.test()
         if self.decision.one_of or (test is not None and not test.passes):
             return note
-        return f"{note}: what is left is of mesh, joints and scatter"
+        return f"{note}; the residual comes from mesh, joints and scatter"
 
 
 _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
@@ -292,4 +291,4 @@ def settled_by(names: Sequence[str]) -> str:
 
 def _with_check(note: str, names: Sequence[str]) -> str:
     check = settled_by(names)
-    return f"{note}; what would settle it: {check}" if check else note
+    return f"{note}; to settle it: {check}" if check else note

@@ -35,8 +35,7 @@ def in_doubt(plain: Fit, null: Fit) -> tuple[str, ...]:
         return ()
     return (
         f"calibration alone explains the recording, but {'; '.join(far)}: measure it first, and "
-        "correct the deck; if it was only guessed, free it by a [[parameter]] with an sd that says "
-        "so",
+        "correct the deck; if it was only guessed, free it by a [[parameter]] with a matching sd",
     )
 
 
@@ -55,8 +54,7 @@ def _more(family: Effect, x: np.ndarray) -> str:
     times = family.parameters[0].value(x[0])
     return (
         f"the stiffness of {family.text} as a whole ended at {times:.2g} times the deck's, "
-        f"{_away(family, x):.2g} standard deviations of what it may be by itself: it may be what "
-        "is wrong"
+        f"{_away(family, x):.2g} standard deviations of its prior: it may be the cause"
     )
 
 
@@ -76,8 +74,8 @@ def _far_together(fit: Fit) -> list[str]:
         return []
     names = ", ".join(e.text for e in own)
     return [
-        f"{names} together ended {np.sqrt(z @ z):.2g} standard deviations of their priors from the "
-        f"deck's values, so they stand for something else"
+        f"{names} together ended {np.sqrt(z @ z):.2g} standard deviations of their priors from "
+        "the deck's values, so they compensate for another cause"
     ]
 
 
@@ -88,14 +86,14 @@ def _each(effect: Effect, name: str) -> np.ndarray:
 
 def _said(effect: Effect, x: np.ndarray) -> str:
     if isinstance(effect, UserParameter) and effect.on_bound(x):
-        return f"{effect.text} ended on a bound, so it may stand for something else"
+        return f"{effect.text} ended on a bound, so it may compensate for another cause"
     if is_strained(effect, x):
         return _more(effect, x)
     away = _away(effect, x)
     if len(x) == 1 and away > FAR:
         return (
             f"{effect.text} ended {away:.2g} standard deviations of its prior from the deck's "
-            "value, so it stands for something else"
+            "value, so it compensates for another cause"
         )
     return ""
 

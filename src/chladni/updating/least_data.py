@@ -22,6 +22,7 @@ def too_little(modes: int, channels: int) -> str:
     seen = f" on {channels} channel{'s' * (channels != 1)}" if channels else ""
     due = max(MODES, int(np.ceil(NUMBERS / (1 + channels))))
     return (
-        f"{modes} mode{'s' * (modes != 1)}{seen} cannot bear a name: {due} modes are the least, "
-        "for three calibration parameters, an effect of three and two that can contradict it"
+        f"{modes} mode{'s' * (modes != 1)}{seen} cannot support a name: at least {due} modes are "
+        "needed, three for the calibration parameters, three for an effect and two that can "
+        "contradict it"
     )

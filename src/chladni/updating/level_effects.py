@@ -14,12 +14,12 @@ from .result import NamedEffect
 
 CLAIM = {
     "joint-friction": "a joint slips as it moves: less stiffness and more damping at higher levels",
-    "rattle": "two parts meet once they move far enough: a clearance that closes",
+    "rattle": "two parts touch when they move far enough: a clearance closes",
 }
 NEAR_LN_F = 0.2  # of ln f: a mode of the deck farther away is not the one that was measured
 HOLDS = 0.05  # of the strain energy: parts with less are not named
 JOINTS = "springs and bushes"
-NOWHERE = "levels alone do not say where"
+NOWHERE = "levels alone do not show where"
 
 
 def level_effects(study: LevelStudy, model: Modelled) -> tuple[NamedEffect, ...]:
@@ -115,7 +115,7 @@ def linear_joints(
 
 def joint_comment(joints: Sequence[LinearJoint]) -> str:
     """The linear joints as comments of a deck."""
-    lines = ["Joints over levels of excitation: what a linear deck has in every spring and bush."]
+    lines = ["Joints over levels of excitation: values of every spring and bush in a linear deck."]
     for j in joints:
         lines.append(
             f"mode near {j.mode_hz:.5g} Hz, level {j.level:g}: K times {j.stiffness:.4f}, "

@@ -41,12 +41,12 @@ def heard_of_damping(
     test = replace(test, statistics=(*test.statistics, row))
     if p >= min(test.p, LEAST_P):
         return test
-    gives = "gives and dissipates, as a joint that slips or a viscous layer does"
-    holds = "holds and dissipates, as foam or rubber does"
+    gives = "is compliant and dissipates, as a slipping joint or a viscous layer"
+    holds = "is stiff and dissipates, as foam or rubber"
     what = (
-        f"the modes that {' and '.join(elastic)} changes most are damped most: what is there "
-        f"{gives if near.sum() > 0 else holds}; a recording at another level of excitation would "
-        "tell"
+        f"the modes that {' and '.join(elastic)} changes most have the highest damping: the "
+        f"material or joint there {gives if near.sum() > 0 else holds}; a recording at another "
+        "level of excitation would distinguish them"
     )
     return replace(test, passes=False, p=p, what=what, where=hypothesis.effect.text)
 

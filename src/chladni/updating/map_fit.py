@@ -23,7 +23,7 @@ class Status(Enum):
 
     CONVERGED = "converged"
     OUT_OF_STEPS = "ran out of steps; raise max_steps or start nearer"
-    STALLED = "no step improves; the start may be in a wrong valley"
+    STALLED = "no step improves the fit; the start may be near a local optimum"
 
 
 @dataclass(frozen=True)

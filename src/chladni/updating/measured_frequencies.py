@@ -43,9 +43,10 @@ def frequencies(
     if uncertain:
         why.append("the places of the sensors are uncertain")
     note = (
-        f"{' and '.join(why).capitalize() or 'by wish'}, so natural frequencies were compared, not "
-        f"FRFs: {int(keep.sum())} modes of {found.order} identified between {band[0]:g} and "
-        f"{band[1]:g} Hz; model modes that the sensors can hardly see may stay without a partner"
+        f"{' and '.join(why).capitalize() or 'as the case requests'}, so natural frequencies were "
+        f"compared, not FRFs: {int(keep.sum())} modes of {found.order} identified between "
+        f"{band[0]:g} and {band[1]:g} Hz; model modes that the sensors can hardly see may stay "
+        "without a partner"
     )
     peak = _peaks(found)[keep]
     sd = np.maximum(found.frequency_sd[keep], 1e-4 * f[keep])
@@ -71,7 +72,7 @@ def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
     keep &= found.relative_delta_chi2 > LEAST_DELTA_CHI2
     if not keep.any():
         raise FileError(
-            f"no mode stands out of the recording between {band[0]:g} and {band[1]:g} Hz"
+            f"no mode is above the noise of the recording between {band[0]:g} and {band[1]:g} Hz"
         )
     usual = float(np.median(found.damping[keep & (peak > 0.1 * peak[keep].max())]))
     keep &= found.damping < max(0.005, 4 * usual)

@@ -91,8 +91,8 @@ def spread_note(
         return []
     rms = float(np.sqrt((spread[use] ** 2).mean()))
     return [
-        f"{', '.join(names)} and the recording that is fitted differ by {rms:.2g} decades rms (one "
-        "standard deviation): no fit is asked to go below that"
+        f"{', '.join(names)} and the recording that is fitted differ by {rms:.2g} decades rms "
+        "(one standard deviation): the fit need not be closer than that"
     ]
 
 

@@ -78,8 +78,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     seen = _modes_seen(found, low, fit_max)
     if not seen:
         raise FileError(
-            f"no mode stands out of the recording between {low:g} and {fit_max:g} Hz, so there is "
-            "nothing to fit a model to"
+            f"no mode is above the noise of the recording between {low:g} and {fit_max:g} Hz, so "
+            "a model cannot be fitted"
         )
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     if not ((lines[0] >= low) & (lines[0] <= fit_max)).any():
@@ -92,7 +92,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
-    progress("what its mesh hides", 0.5)
+    progress("the error of its mesh", 0.5)
     mesh = mesh_hidden(nominal, f_max, measured_on(question))
     progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
@@ -132,15 +132,15 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
-        f"both sides were given {ZETA:.0%} damping to search and {ZETA_Q:.0%} to report Q "
-        "(damping equalisation): no modes need pairing and damping cannot pose as stiffness",
+        f"model and test were given {ZETA:.0%} damping for the search and {ZETA_Q:.0%} for Q "
+        "(damping equalisation): modes need no pairing, and damping cannot appear as stiffness",
         f"the noise of the recording: {noise_source(frf)}",
     ]
     if question.base is not None:
         notes.append(
-            f"the input is the motion of the base ({', '.join(question.inputs.labels)}): responses "
-            "are transmissibilities, of unit 1, and the supports of the deck move together; what "
-            "is held to ground is held to the base"
+            f"the input is the motion of the base ({', '.join(question.inputs.labels)}): "
+            "responses are transmissibilities, of unit 1, and the supports of the deck move "
+            "together; parts held to ground are held to the base"
         )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
@@ -286,7 +286,7 @@ def _unscored(question: Question) -> list[str]:
     if not question.others:
         return []
     names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
-    return [f"not used, for natural frequencies are compared: {names}"]
+    return [f"not used, because natural frequencies are compared: {names}"]
 
 
 def updating_problem(
@@ -345,8 +345,8 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
     found = [e for e in placed(where) if not names or set(e.parts) <= names]
     if not found:
         raise FileError(
-            f"{p.field} cannot be freed: deck and test do not say where it acts (all parts of a "
-            "material for orthotropic-material, [test] hangers for suspension, sensors on the "
+            f"{p.field} cannot be freed: deck and test do not define where it acts (all parts of "
+            "a material for orthotropic-material, [test] hangers for suspension, sensors on the "
             "structure for sensor-mass, drive points, three at most, for shaker-restraint)"
         )
     return freed_effect(found[0], p.name)
@@ -371,20 +371,23 @@ def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProbl
 def _sensor_note(question: Question) -> str:
     """Sentence on the errors of sensors and gauges that the model need not explain."""
     known, sd = question.accuracy, _place_sd(question)
-    stated = f", {1e3 * sd:.2g} mm at worst where the table of sensors says it" if sd else ""
+    stated = f", at most {1e3 * sd:.2g} mm where the table of sensors states it" if sd else ""
     place = f"{1e3 * known.position:.2g} mm in place{stated}"
     return (
         f"sensors and force gauges may be off by {known.gain:.2g} of their gain, "
         f"{np.degrees(known.direction):.2g}° in direction, {place} (standard deviations); above "
-        f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
+        f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies are compared instead"
     )
 
 
-NOT_WEIGHED = "no weighed mass was given: E and rho cannot be told apart, both stay near the deck"
+NOT_WEIGHED = (
+    "no weighed mass was given: E and rho cannot be distinguished, so both stay near the deck's "
+    "values"
+)
 
 
 def _mass_note(question: Question) -> list[str]:
     if question.mass_measurement is None:
         return [NOT_WEIGHED]
     w = question.mass_measurement
-    return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is a datum like any other"]
+    return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is fitted with the other data"]

@@ -92,8 +92,8 @@ def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
     if not said:
         return ()
     return (
-        f"with other poles taken for spurious, other values of {effect.name} explain the poles "
-        f"nearly as well: {'; or '.join(said)}; the intervals reach over all of them",
+        f"if other poles are spurious, other values of {effect.name} explain the poles nearly as "
+        f"well: {'; or '.join(said)}; the intervals include all of them",
     )
 
 
@@ -108,9 +108,9 @@ def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> 
         return ()
     off = weighed / deck - 1
     return (
-        f"the article weighs {abs(off):.1%} {'more' if off > 0 else 'less'} than the deck, which "
-        "calibration lays on density and thickness; trim, mastic or a liner all over a sheet would "
-        "look the same: the drawing tells them apart, or a part weighed alone",
+        f"the article weighs {abs(off):.1%} {'more' if off > 0 else 'less'} than the deck, and "
+        "calibration changes density and thickness to match; trim, mastic or a liner on a whole "
+        "sheet has the same effect: the drawing, or one part weighed alone, distinguishes them",
     )
 
 
@@ -131,7 +131,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
     ]
     if found is not None:
         gap = (diagnosis.null.neg2_log_evidence - best.neg2_log_evidence) / 2
-        reason = f"{evidence_in_words(gap)} against E, rho and t alone"
+        reason = f"{evidence_in_words(gap)} compared with E, rho and t alone"
         out.append(Alternative("calibration only", -diagnosis.null.neg2_log_evidence / 2, reason))
     return tuple(sorted(out, key=lambda a: -(a.log_evidence or 0.0)))
 
@@ -147,16 +147,15 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
         return f"gains {gain:.1f} in -2 ln evidence, but {but or 'is not named'}"
     if diagnosis.found is None:
         return (
-            f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are needed "
-            "before anything is named"
+            f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are required "
+            "to name an effect"
         )
     if same(row_of(hypothesis), best.name):
-        return f"as it was fitted it is {best.name} for all these data can tell"
+        return f"these data cannot distinguish its fitted form from {best.name}"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (
-        f"{evidence_in_words(gap)} for {best.name} against it; leaves "
-        f"{hypothesis.fit.misfit:.0f} of weighted squares, {best.name} "
-        f"{best.fit.misfit:.0f}"
+        f"{evidence_in_words(gap)} for {best.name} compared with it; its weighted sum of squares "
+        f"is {hypothesis.fit.misfit:.0f}, that of {best.name} {best.fit.misfit:.0f}"
     )
 
 
@@ -167,7 +166,7 @@ def agreement(
     found = diagnosis.found
     last, what = found or diagnosis.null, prepared.what
     if last.channels:
-        what = f"channel {', '.join(last.channels)} on the lines held out of {what}"
+        what = f"channel {', '.join(last.channels)} on the held-out lines of {what}"
     factors = [diagnosis.two_log_bayes_factor(hypothesis) for hypothesis in diagnosis.hypotheses]
     return Agreement(
         fitted,
@@ -190,9 +189,9 @@ def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
     if held.calibrated <= held.nominal + (held.floor or 0.0):
         return ()
     return (
-        "the calibrated deck predicts the held-out data worse than the deck as it was given "
+        "the calibrated deck predicts the held-out data worse than the given deck "
         f"(Q {held.calibrated:.3g}, {held.nominal:.3g} before); try chladni diagnose, "
-        '[test] gain = "unknown" if the level is uncertain, position_sd if the places are',
+        '[test] gain = "unknown" if the level is uncertain, or position_sd for uncertain places',
     )
 
 
@@ -243,29 +242,34 @@ def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:
             return Remainder(False, np.nan, np.nan, "no pole has a partner in the model")
         left = 100 * float(np.sqrt(prepared.score.Q(plain.fit.state, real, real))) * LN10
         known = 100 * float(np.median(prepared.score.sd[real]))
-        text = f"{left:.2g} % rms of the frequencies, which are known to {known:.1g} %"
+        text = f"{left:.2g} % rms of the frequencies, whose standard deviation is {known:.1g} %"
     else:
         data = prepared.score.rebased(plain.model)
         left = float(np.sqrt(data.Q(plain.fit.state, prepared.score.use)))
         chi = 1.0 if prepared.identified is None else prepared.identified.chi
         known = 0.01 * chi / LN10
-        text = f"{left:.2g} decades rms, the recording is known to about {known:.1g}"
+        text = (
+            f"{left:.2g} decades rms, and the standard deviation of the recording is about "
+            f"{known:.1g}"
+        )
     far = left > STRUCTURED * known
     structured = bool(far and diagnosis.found is not None)
-    sentence = f"calibration parameters alone leave {text}: {_meaning(diagnosis, far, structured)}"
+    sentence = (
+        f"after calibration alone the residual is {text}: {_meaning(diagnosis, far, structured)}"
+    )
     return Remainder(structured, left, known, sentence)
 
 
 def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
     if structured:
-        return "that is structured, not noise"
+        return "it is structured, not noise"
     if not far:
-        return "nothing more can be read from that"
+        return "it contains no further information"
     if not diagnosis.hypotheses:
-        return "more than noise; a diagnosis says whether physics is missing"
+        return "it exceeds the noise; a diagnosis shows whether physics is missing"
     if diagnosis.unexplained:
-        return "nothing that was tried accounts for it, nor do mesh error and scatter in the parts"
+        return "no effect tried accounts for it, nor do mesh error and scatter in the parts"
     lead = diagnosis.hypotheses[0]
     if diagnosis.two_log_bayes_factor(lead) > TIED:
-        return f"{lead.effect.name} accounts for more of it than mesh error and scatter do"
+        return f"{lead.effect.name} accounts for more of it than mesh error and scatter"
     return "mesh error and scatter within the parts account for it as well as any effect tried"

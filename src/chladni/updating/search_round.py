@@ -54,7 +54,7 @@ def search_round(
         give_back_freed_memory()
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(hypotheses, null.neg2_log_evidence)
-    progress("closing in on the place", 0.8)
+    progress("refining the place", 0.8)
     running = running if later else max(running, _in_the_running(hypotheses[:whole]))
     ahead, rest = hypotheses[:running], hypotheses[running:]
     finished = list(in_parallel(lambda t: _settled(problem, _finished(problem, t, True)), ahead))

@@ -142,7 +142,7 @@ def _begun_with(
     """
     current, out, note, seen = lead, list[Several](), "", list[set[int]]()
     for k in range(ATTEMPTS):
-        progress(f"what {current.name} leaves", k / ATTEMPTS)
+        progress(f"the residual of {current.name}", k / ATTEMPTS)
         size = len(current.effects) + 1
         if size > MOST_EFFECTS:
             break
@@ -154,7 +154,7 @@ def _begun_with(
                 break
             found, paid = _revised(problem, more, current.effects, price(due, size))
         except ModelError as error:  # the fit reached an impossible structure
-            note = f"what {current.name} leaves could not be searched: {error}"
+            note = f"the residual of {current.name} could not be searched: {error}"
             break
         again = any(_same(problem, found.own, other.own) for other in known)
         if again or {id(e) for e in found.own.effects} in seen:
@@ -225,8 +225,8 @@ def _grown(
         return None, ""
     gain = _gain(null, found[0])
     note = (
-        f"with {current.name} in place the best effect more, {found[0].effect.name}, gains "
-        f"{gain:.1f} in -2 ln evidence; {due:.0f} are needed"
+        f"with {current.name} in place the best further effect, {found[0].effect.name}, gains "
+        f"{gain:.1f} in -2 ln evidence; {due:.0f} are required"
     )
     if gain <= GOOD_PART * due:
         return None, note

@@ -68,7 +68,7 @@ def _panel(
     if np.isfinite(foretold).any():
         held = np.isfinite(foretold)
         look: dict[str, Any] = {"ms": 8, "mfc": "none", "mew": 1.4, "color": AFTER}
-        ax.plot(amplitude[held], foretold[held], "D", label="foretold from the others", **look)
+        ax.plot(amplitude[held], foretold[held], "D", label="predicted from the others", **look)
     if mean is not None:
         ax.axhline(mean, color=BEFORE, lw=1.2, ls="--", label="one linear model")
     ax.set_xscale("log")
