@@ -518,9 +518,9 @@ def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
         (["tailgate", "--size", "1"], "6 to 32"),
         (["panel", "--set", "t"], "KEY=VALUE"),
         (["panel", "--set", "lenght=1"], "there are length, width, depth, rise, h, t\n"),
-        (["plate", "--size", "0.1"], "--size counts in mm, 1 mm is the least"),
-        (["panel", "--size", "0.1"], "--size counts in mm"),
-        (["box", "--set", "h=1e-4"], "--size counts in mm"),
+        (["plate", "--size", "0.1"], "--size is in mm and must be at least 1 mm"),
+        (["panel", "--size", "0.1"], "--size is in mm"),
+        (["box", "--set", "h=1e-4"], "--size is in mm"),
     ],
 )
 def test_a_wrong_specimen_names_the_right_ones(tmp_path, arguments, named):

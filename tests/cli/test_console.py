@@ -57,7 +57,7 @@ def test_tables_are_said_with_all_their_numbers():
     assert max(map(len, lines)) <= 60 + 2 + 110
     lines = table_lines(Table(("mode", "Hz"), rows), most=10)
     assert len(lines) == 12
-    assert lines[-1] == "50 more rows are in report.html"
+    assert lines[-1] == "report.html has 50 more rows"
 
 
 def test_energy_that_is_in_no_part_has_a_column_of_its_own(tmp_path, deck):
@@ -97,7 +97,7 @@ def test_a_page_is_opened_only_where_that_is_asked_for(deck, tmp_path, monkeypat
     done = call("modes", deck, "--out", out, "--open")
     assert done.exit_code == 0
     assert opened == [(out / "report.html").as_uri()]
-    assert ("no browser could open" in done.stderr) != there
+    assert ("no browser opened" in done.stderr) != there
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_what_is_beside_the_missing_is_what_could_be_meant(tmp_path, monkeypatch
     (tmp_path / "pane").mkdir()
     (tmp_path / "panel").mkdir()
     (tmp_path / "panel" / "case.toml").write_text("")
-    assert call("modes", "pan").stderr.strip().endswith("beside it there is panel")
+    assert call("modes", "pan").stderr.strip().endswith("the same folder has panel")
 
 
 def test_a_log_that_cannot_be_written_is_a_sentence(deck, tmp_path):
@@ -186,7 +186,7 @@ def test_memory_that_a_library_lacks_is_no_fault_of_ours(capsys):
         raise ImportError("libx.so: failed to map segment from shared object")
 
     assert code_of(command) == 2
-    assert capsys.readouterr().err == "chladni: the memory is not enough for it\n"
+    assert capsys.readouterr().err == "chladni: there is not enough memory\n"
 
 
 @pytest.mark.parametrize("words", [["--out", ""], ["--out="]])
@@ -256,7 +256,7 @@ def test_a_fault_of_ours_is_said_as_one(capsys):
 
     assert code_of(command) == 1
     said = capsys.readouterr().err
-    assert said.startswith("chladni: a fault of chladni, not of its input: KeyError")
+    assert said.startswith("chladni: an error in chladni, not in its input: KeyError")
     assert said.count("\n") == 1
 
 
@@ -291,7 +291,7 @@ def test_a_library_that_makes_an_error_of_the_interruption_is_no_fault(number, o
 
     before = signal.getsignal(number)
     assert code_of(command) == 130
-    assert capsys.readouterr().err == "chladni: interrupted; nothing was written\n"
+    assert capsys.readouterr().err == "chladni: interrupted; no file was written\n"
     assert signal.getsignal(number) is before
 
 

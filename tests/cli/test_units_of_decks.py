@@ -49,9 +49,12 @@ def test_a_deck_of_known_materials_is_read_in_their_system_alone(tmp_path, meant
 @pytest.mark.parametrize(
     ("more", "noted"),
     [
-        ({"rho": 7850e12}, "known ones in no unit system; .* weighs .*, with E = 210 GPa"),
-        ({"E": 1.0, "rho": 1.0}, "known ones in no unit system"),
-        ({"side": 3e-4}, "the deck is 0.000424 m across, weighs .* look at --units"),
+        (
+            {"rho": 7850e12},
+            "no unit system makes its materials known ones; .* weighs .*, with E = 210 GPa",
+        ),
+        ({"E": 1.0, "rho": 1.0}, "no unit system makes its materials known ones"),
+        ({"side": 3e-4}, "the deck is 0.000424 m across, weighs .* check --units"),
         ({"side": 300.0}, "the deck is 424 m across"),
     ],
 )
@@ -80,5 +83,8 @@ def test_commands_say_what_looks_odd(tmp_path, command):
     words = [command, deck, *READERS[command], "--units", "SI", "--out", tmp_path / "out"]
     done = CliRunner().invoke(application(), [str(w) for w in words])
     assert done.exit_code == 0, done.output
-    assert "known ones in no unit system" in " ".join(done.output.split())
-    assert "known ones in no unit system" in (tmp_path / "out" / "report.html").read_text()
+    assert "no unit system makes its materials known ones" in " ".join(done.output.split())
+    assert (
+        "no unit system makes its materials known ones"
+        in (tmp_path / "out" / "report.html").read_text()
+    )

@@ -78,7 +78,7 @@ def test_a_case_without_a_recording_is_told_where_to_name_one(copied, tmp_path, 
     rewritten(copied, 'recordings = ["frf.npz"]\n', "")
     done = call(command, copied, "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)
-    assert "names no recording to compare the model with; give it as recordings = [" in done.stderr
+    assert "has no recording to compare with the model; give it as recordings = [" in done.stderr
 
 
 def test_words_nobody_reads_are_told_by_command(copied):
@@ -218,7 +218,7 @@ def test_a_case_without_a_recording_is_told_what_that_means(copied):
     text = (copied / "case.toml").read_text()
     (copied / "case.toml").write_text(text[: text.index("[test]")])
     facts = dict(chladni.check(chladni.load_case(copied)).facts)
-    assert "all other commands do" in facts["recording"]
+    assert "all commands need one except modes" in facts["recording"]
 
 
 def test_of_a_long_recording_few_lines_are_identified(case, monkeypatch):

@@ -77,7 +77,7 @@ def test_a_material_of_no_system_is_refused(deck, tmp_path):
 
 def test_units_that_no_material_bears_out_are_told(deck):
     assert draft(deck, units="SI").units_why == "as given"
-    assert "but look: in SI the deck" in draft(deck, units="mm-t-s").units_why
+    assert "but check: in SI the deck" in draft(deck, units="mm-t-s").units_why
 
 
 def ways(made):
@@ -182,7 +182,7 @@ def test_a_plan_is_read(deck, frf, tmp_path):
     case = chladni.load_case(tmp_path / "case")
     assert case.outputs.mass.tolist() == [0.005] * 6
     assert case.frfs[0].quantity == "accelerance"
-    assert "by the table given" in done.output
+    assert "from the given table" in done.output
 
 
 def test_a_plan_is_the_table_of_a_test_that_is_still_to_come(deck, tmp_path):
@@ -191,7 +191,7 @@ def test_a_plan_is_the_table_of_a_test_that_is_still_to_come(deck, tmp_path):
     table.write_text("label,grid,direction,role,mass\n9:+Z,9,+Z,output,0.004\n2:+Z,2,+Z,input,\n")
     done = call("init", deck, "--sensors", table, "--out", tmp_path / "case")
     assert done.exit_code == 0, done.output
-    assert "2 by the table given" in done.output
+    assert "2 from the given table" in done.output
     case = chladni.load_case(tmp_path / "case")
     assert (case.outputs.labels, case.inputs.labels) == (("9:+Z",), ("2:+Z",))
     assert case.outputs.mass.tolist() == [0.004]

@@ -19,7 +19,7 @@ def mass(x, m, radius=0.01):
 def test_what_stays_is_common():
     (said,) = by_state([state("a", mass(0.1, 0.02)), state("b", mass(0.105, 0.021))])
     assert said.startswith("point-mass is in 'a', 'b', in every state")
-    assert "it stays, of one size as far as that is known" in said
+    assert "it stays, with the same size within its uncertainty" in said
 
 
 def test_what_moves_and_grows_is_told_with_how_far():

@@ -126,7 +126,7 @@ def test_modes_of_nastran_itself():
     ("name", "text", "told"),
     [
         ("none.pch", None, "no file"),
-        ("modes.txt", "", "modes are read of .op2, .pch"),
+        ("modes.txt", "", "modes are read from .op2, .pch"),
         ("modes.pch", "$TITLE\n", "holds no eigenvectors"),
         ("modes.unv", "    -1\n    -1\n", "modes.unv"),
     ],

@@ -61,7 +61,7 @@ def test_they_are_calibrated_with(ambient):
 
 
 def test_identify_says_who_can_use_them(ambient):
-    with pytest.raises(FileError, match="no force among them: correlate, calibrate and diagnose"):
+    with pytest.raises(FileError, match="without a force: correlate, calibrate and diagnose"):
         chladni.identify(ambient)
 
 
@@ -93,7 +93,7 @@ def test_noise_has_no_natural_frequencies(ambient):
     rng = np.random.default_rng(1)
     (held_out_votes,) = case.recordings
     hiss = tuple(replace(g, values=rng.normal(size=len(g.x))) for g in held_out_votes.functions)
-    with pytest.raises(FileError, match=r"ambient.uff: no natural frequency stands out"):
+    with pytest.raises(FileError, match=r"ambient.uff: no natural frequency is above the noise"):
         chladni.calibrate(replace(case, recordings=(replace(held_out_votes, functions=hiss),)))
 
 

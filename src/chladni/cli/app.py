@@ -44,11 +44,11 @@ COMMANDS = (  # each a module here with a function ``run``, or ``STEPS`` of a co
 DONE, FAILED, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 1, 2, 3, 130
 _EVERY = {  # options that every command takes
     "verbose": (
-        bool, typer.Option("--verbose", help="Say every stage on standard error."), False
+        bool, typer.Option("--verbose", help="Print every stage to standard error."), False
     ),
     "log": (
         Path | None,
-        typer.Option("--log", help="Append all that is said and done to a file.", metavar="FILE"),
+        typer.Option("--log", help="Append all messages and steps to a file.", metavar="FILE"),
         None,
     ),
     "open_page": (bool, typer.Option("--open", help="Open the page in the browser."), False),
@@ -89,7 +89,7 @@ def _misused(error: Any) -> int:
     shown = " ".join(["chladni", *words, "--help"])
     text = _TOO_MANY.sub(r"too many words: \1", text)
     text = text[:1].lower() + text[1:].rstrip(".").replace(". Did you", "; did you")
-    return _said(f"{text}{there}; `{shown}` says more".replace("?;", "?"), AT_FAULT)
+    return _said(f"{text}{there}; see `{shown}`".replace("?;", "?"), AT_FAULT)
 
 
 def application() -> typer.Typer:
@@ -98,7 +98,7 @@ def application() -> typer.Typer:
     app = typer.Typer(
         name="chladni",
         cls=OneSentenceGroup,
-        help="Find, name and repair the physics a finite element model left out.",
+        help="Find, name and add the physics that a finite element model lacks.",
         no_args_is_help=True,
         add_completion=False,
         rich_markup_mode=None,
@@ -200,16 +200,16 @@ def _run(command: Callable[[], Any]) -> int:
         name = f"{error.filename}: " if error.filename else ""
         return _said(f"{name}{error.strerror or error}", AT_FAULT)
     except KeyboardInterrupt as error:
-        return _said(str(error) or "interrupted; nothing was written", INTERRUPTED)
+        return _said(str(error) or "interrupted; no file was written", INTERRUPTED)
     except Exception as error:  # noqa: BLE001  a fault of ours is said as one, too
         if _is_short_of_memory(error):
-            return _said("the memory is not enough for it", AT_FAULT)
+            return _said("there is not enough memory", AT_FAULT)
         for line in traceback.format_exception(error):
             console().aside(line.rstrip())
         at = traceback.extract_tb(error.__traceback__)[-1]
         return _said(
-            f"a fault of chladni, not of its input: {type(error).__name__}: {error} "
-            f"({Path(at.filename).name}, line {at.lineno}); --verbose shows the whole of it",
+            f"an error in chladni, not in its input: {type(error).__name__}: {error} "
+            f"({Path(at.filename).name}, line {at.lineno}); --verbose shows the full traceback",
             FAILED,
         )
 

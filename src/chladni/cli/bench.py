@@ -28,55 +28,61 @@ def run(
     excitation: Annotated[
         str, typer.Option(help="burst-random, stepped-sine, multisine or hammer.")
     ] = "burst-random",
-    band: Annotated[str, typer.Option(help="From and to, in Hz; default that of the case.")] = "",
+    band: Annotated[str, typer.Option(help="Band from:to [Hz]; default: that of the case.")] = "",
     level: Annotated[
         float | None,
         typer.Option(
-            help="[N]; default: the strongest channel takes a quarter of its range.", min=1e-9
+            help="Force level [N]; default: the largest channel uses a quarter of its range.",
+            min=1e-9,
         ),
     ] = None,
-    levels: Annotated[str, typer.Option(help="Factors on the level, as 0.5,1,2.")] = "1",
-    articles: Annotated[int, typer.Option(help="How many, each scattered.")] = 1,
-    exact: Annotated[bool, typer.Option("--exact", help="No scatter: the deck's own.")] = False,
+    levels: Annotated[str, typer.Option(help="Factors on the level, for example 0.5,1,2.")] = "1",
+    articles: Annotated[
+        int, typer.Option(help="Number of articles, each with its own scatter.")
+    ] = 1,
+    exact: Annotated[bool, typer.Option("--exact", help="Articles without scatter.")] = False,
     finer: Annotated[
-        bool, typer.Option("--finer", help="Articles on a mesh of half the element size.")
+        bool, typer.Option("--finer", help="Give the articles a mesh of half the element size.")
     ] = False,
     hide: Annotated[
         list[str] | None, typer.Option(help="Effect to conceal, by its name (repeatable).")
     ] = None,
     local: Annotated[
         list[str] | None,
-        typer.Option(help="clearance, cubic-spring, friction where nobody knows (repeatable)."),
+        typer.Option(
+            help="Conceal a local nonlinearity: clearance, cubic-spring or friction (repeatable)."
+        ),
     ] = None,
     resolution: Annotated[
-        float, typer.Option(help="Distance of lines of bursts and multisines [Hz].", min=1e-3)
+        float, typer.Option(help="Line spacing of bursts and multisines [Hz].", min=1e-3)
     ] = 0.05,
     averages: Annotated[
-        int, typer.Option(help="Bursts, periods of a multisine, blows.", min=2)
+        int, typer.Option(help="Number of bursts, multisine periods or blows.", min=2)
     ] = 20,
-    sweeps: Annotated[int, typer.Option(help="Of a stepped sine.", min=1)] = 5,
+    sweeps: Annotated[int, typer.Option(help="Number of sweeps of a stepped sine.", min=1)] = 5,
     delay: Annotated[
-        float, typer.Option(help="Cycles a stepped sine waits at least at every line.", min=0)
+        float, typer.Option(help="Minimum wait of a stepped sine at every line [cycles].", min=0)
     ] = 0.0,
     rubber: Annotated[
-        bool, typer.Option("--rubber", help="Rubber at the cords' ends: they hardly ring.")
+        bool, typer.Option("--rubber", help="Add rubber at the cords' ends to damp them.")
     ] = False,
     room: Annotated[
         float,
         typer.Option(
-            help="By how much sound and floor move the median sensor [m/s² rms in the band].", min=0
+            help="Motion of the median sensor from sound and floor [m/s² rms in the band].", min=0
         ),
     ] = 0.0,
-    time: Annotated[bool, typer.Option("--time", help="Write the time data as well.")] = False,
-    seed: Annotated[int, typer.Option(help="Of all that is drawn.", min=0)] = 0,
+    time: Annotated[bool, typer.Option("--time", help="Write the time data too.")] = False,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
     sensors: Annotated[
-        Path | None, typer.Option(help="Table of sensors of a bare deck; else one is planned.")
+        Path | None,
+        typer.Option(help="Table of sensors for a bare deck; default: a planned layout."),
     ] = None,
     input: Annotated[
         str,
         typer.Option(
-            help="What drives a bare deck: 12:+Z, 12:n, or base:+Z, a shaker table that moves its "
-            "supports; default: what the table of sensors or the plan says."
+            help="Drive point of a bare deck: 12:+Z, 12:n, or base:+Z for a shaker table that "
+            "moves its supports; default: from the table of sensors or the plan."
         ),
     ] = "",
     units: Units = None,
@@ -147,13 +153,15 @@ def _case(
         case = load_case(source)
         if sensors is not None or units is not None or allow or driven:
             raise FileError(
-                f"{source} is a case, which names its sensors, what drives it, its units and the "
-                "cards it allows itself"
+                f"{source} is a case, which already defines sensors, drive point, units and "
+                "allowed cards"
             )
         return case
     bare = load_deck(source, units, allow)
     if units is None:
-        raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")
+        raise FileError(
+            f"{source} is a bare deck, so give its unit system, for example --units mm-t-s"
+        )
     model = bare.model()
     if driven:
         placed(model.assembly, [exciter(driven, "--input")], "--input")

@@ -12,28 +12,36 @@ from ..errors import LabelError, did_you_mean
 from .console import say
 from .run import folder_named
 
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="What `blind make` wrote.")]
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by `blind make`.")]
 Word = TypeVar("Word", bound=str)
 Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
 
 
 def make(
     set_name: Annotated[
-        str, typer.Option("--set", help="As panels, forms, tailgate, outside (of the catalogue).")
+        str,
+        typer.Option(
+            "--set", help="Kinds of cases: panels, forms, tailgate, outside (of the catalogue)."
+        ),
     ],
-    seeds: Annotated[str, typer.Option(help="First and last, as 500-504.")],
+    seeds: Annotated[str, typer.Option(help="First and last seed, for example 500-504.")],
     out: Annotated[
-        Path, typer.Option("--out", help="A folder of its own.", metavar="DIR", parser=folder_named)
+        Path,
+        typer.Option(
+            "--out", help="New folder for the results.", metavar="DIR", parser=folder_named
+        ),
     ],
     purpose: Annotated[
-        str, typer.Option(help="tune (seeds below 600) or report (from 600 on).")
+        str, typer.Option(help="Purpose: tune (seeds below 600) or report (from 600).")
     ] = "tune",
-    kinds: Annotated[str, typer.Option(help="What is hidden, with commas; all if empty.")] = "",
-    structures: Annotated[str, typer.Option(help="With commas; all if empty.")] = "",
+    kinds: Annotated[
+        str, typer.Option(help="Hidden effects, separated by commas; default: all.")
+    ] = "",
+    structures: Annotated[str, typer.Option(help="Names separated by commas; default: all.")] = "",
     recorder: Annotated[
         str,
         typer.Option(
-            help="independent noise on every line, or a test on the virtual bench: stepped-sine, "
+            help="Noise: independent on every line, or from the virtual bench: stepped-sine, "
             "burst-random."
         ),
     ] = "independent noise",
@@ -57,10 +65,10 @@ def make(
 def run(
     out: Folder,
     workers: Workers = 1,
-    limit: Annotated[float, typer.Option(help="Seconds a diagnosis may take.", min=1)] = 3600.0,
+    limit: Annotated[float, typer.Option(help="Time limit of one diagnosis [s].", min=1)] = 3600.0,
     calibrate: Annotated[
         bool,
-        typer.Option(help="Calibrate every case as well, to be held beside the diagnosis."),
+        typer.Option(help="Calibrate every case too, for comparison with the diagnosis."),
     ] = True,
 ) -> None:
     """Answer cases from their folders alone.
@@ -74,7 +82,7 @@ def run(
 
 
 def score(
-    outs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="One folder or several.")],
+    outs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="One or more folders.")],
 ) -> None:
     """Open the truths and score the answers.
 
@@ -97,7 +105,7 @@ def _kept() -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            "interrupted; what is finished is kept, and the same command goes on from there"
+            "interrupted; finished cases are kept, and the same command continues from there"
         ) from None
 
 

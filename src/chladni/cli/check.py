@@ -23,7 +23,7 @@ def run(
         for what, text in found.facts:
             job.say(f"{what}: {text}")
         for finding in found.findings:
-            job.say(f"{'FAULT' if finding.fault else 'look'}: {finding.text}; {finding.remedy}")
+            job.say(f"{'FAULT' if finding.fault else 'check'}: {finding.text}; {finding.remedy}")
         for note in dict.fromkeys(n for said in found.unused.values() for n in said):
             job.say(f"note: {note}")
     if found.faults:

@@ -131,7 +131,7 @@ def say_results(place: Path) -> None:
 
     say(f"results in {place}")
     if console().shows and not (place.is_file() and webbrowser.open(place.resolve().as_uri())):
-        say(f"note: no browser could open {place}", error=True)
+        say(f"note: no browser opened {place}", error=True)
 
 
 def _echo(text: str, error: bool) -> None:
@@ -179,7 +179,7 @@ def table_lines(table: Table, most: int = ROWS) -> list[str]:
         for line in zip_longest(*row, fillvalue="")
     ]
     if (more := len(table.rows) - most) > 0:
-        lines.append(f"{more} more rows are in report.html")
+        lines.append(f"report.html has {more} more rows")
     return lines
 
 

@@ -19,7 +19,8 @@ def run(
     modes: Annotated[
         Path | None,
         typer.Option(
-            help="Modes another program found: OP2, punch, universal file (55); in place of a test."
+            help="Modes from another program instead of a test: OP2, punch or universal file "
+            "(dataset 55)."
         ),
     ] = None,
     units: Units = None,
@@ -36,7 +37,7 @@ def run(
             _beside(job, source, modes, units, allow or [])
             return
         if units is not None or allow:
-            raise FileError("--units and --allow are of a bare deck, which needs --modes")
+            raise FileError("--units and --allow apply to a bare deck, which needs --modes")
         _with_test(job, source)
 
 
@@ -45,8 +46,8 @@ def _with_test(job: Run, source: Path) -> None:
 
     if source.is_file() and not is_case(source):
         raise FileError(
-            f"{source} is a deck; give a case that names a recording, or with --modes the modes "
-            "another program found"
+            f"{source} is a deck; give a case with a recording, or --modes with the modes from "
+            "another program"
         )
     case = opened(source)
     found = correlate(case, within(job.progress, 0.0, 0.8))

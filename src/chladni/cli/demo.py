@@ -17,7 +17,7 @@ def run(out: Out = None) -> None:
     source = mesh_path("demo/case.toml").parent
     found = diagnosed("diagnose", source, out or Path("runs") / "demo", diagnose)
     truth = json.loads(mesh_path("demo.truth.json").read_text(encoding="utf-8"))
-    say("The answer is on disk; now the seal is opened.")
+    say("The answer is on disk; the concealed effect is now shown.")
     for line in compared(found, truth):
         say(line)
 

@@ -43,18 +43,15 @@ def run(
     source: DeckOrCase,
     input: Driven = None,
     output: Answering = None,
-    band: Annotated[str, typer.Option(help="From and to, in Hz.")] = "1:200",
-    lines: Annotated[int, typer.Option(help="How many frequencies.", min=2, max=MOST_LINES)] = 800,
+    band: Annotated[str, typer.Option(help="Band from:to [Hz].")] = "1:200",
+    lines: Annotated[int, typer.Option(help="Number of frequencies.", min=2, max=MOST_LINES)] = 800,
     damping: Damping = 0.01,
     quantity: Kind = "accelerance",
     units: Units = None,
     allow: Allow = None,
     sensors: Annotated[
         Path | None,
-        typer.Option(
-            help="Where it answers and, without --input, is driven: plan.json, or a table of "
-            "sensors."
-        ),
+        typer.Option(help="Outputs and, without --input, inputs: plan.json or a table of sensors."),
     ] = None,
     out: Out = None,
 ) -> None:
@@ -70,7 +67,7 @@ def run(
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
         if sensors is not None and output:
-            raise FileError("--sensors says where it answers; leave out --output")
+            raise FileError("--sensors defines the outputs; leave out --output")
         driven = bool(input) or sensors is not None
         given = _source(source, driven, units, allow or [])
         f = np.linspace(low, high, lines) if driven else None
@@ -94,7 +91,7 @@ def _written(
 ) -> None:
     """The responses in every format that can hold them."""
     write_npz(job.keep(f"{stem}.npz", "the responses as arrays"), one)
-    write_csv(job.keep(f"{stem}.csv", "the same as a table"), one)
+    write_csv(job.keep(f"{stem}.csv", "the responses as a table"), one)
     model = as_model(given)
     what = "channels, peaks and levels"
     job.json(f"{stem}.json", response_json(one, bool(model.unit)), what)
@@ -113,7 +110,7 @@ def _written(
     except FileError as error:
         job.notes.append(f"No universal file was written: {error}.")
         return
-    job.files.append((path.name, "the same as a universal file (dataset 58)"))
+    job.files.append((path.name, "the responses as a universal file (dataset 58)"))
 
 
 def _source(

@@ -20,22 +20,25 @@ def run(
             metavar="CASE_or_RECORDING", help="A folder with a case.toml, or a recording's file."
         ),
     ],
-    band: Annotated[str, typer.Option(help="From and to, in Hz; default the whole.")] = "",
+    band: Annotated[
+        str, typer.Option(help="Band from:to [Hz]; default: the whole recording.")
+    ] = "",
     quantity: Annotated[
-        str, typer.Option(help="receptance, mobility, ... where the file does not say.")
+        str,
+        typer.Option(help="receptance, mobility or accelerance, if the file does not state it."),
     ] = "",
     averages: Annotated[
-        int, typer.Option(help="Averages of the estimate, for the noise.", min=1)
+        int, typer.Option(help="Number of averages of the FRFs, which defines their noise.", min=1)
     ] = 1,
     drop: Annotated[
-        list[float] | None, typer.Option(help="A pole to leave out, by its frequency in Hz.")
+        list[float] | None, typer.Option(help="Frequency of a pole to leave out [Hz] (repeatable).")
     ] = None,
     pick: Annotated[
-        list[float] | None, typer.Option(help="A pole to put in, by its frequency in Hz.")
+        list[float] | None, typer.Option(help="Frequency of a pole to add [Hz] (repeatable).")
     ] = None,
     states: Annotated[
         int | None,
-        typer.Option(help="All poles of a state space of that order, by the subspace road."),
+        typer.Option(help="Use all poles of a state space of this order (subspace method)."),
     ] = None,
     out: Out = None,
 ) -> None:

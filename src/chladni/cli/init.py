@@ -17,10 +17,11 @@ def run(
     source: Annotated[Path, typer.Argument(metavar="DECK")],
     recordings: Annotated[list[Path] | None, typer.Argument(metavar="RECORDING")] = None,
     sensors: Annotated[
-        Path | None, typer.Option(help="A table of sensors, as chladni plan writes it.")
+        Path | None, typer.Option(help="Table of sensors, in the form of chladni plan.")
     ] = None,
     quantity: Annotated[
-        str | None, typer.Option(help="receptance, mobility, ... where the file does not say.")
+        str | None,
+        typer.Option(help="receptance, mobility or accelerance, if the file does not state it."),
     ] = None,
     mass: Annotated[float | None, typer.Option(help="Weighed mass of the article [kg].")] = None,
     units: Units = None,
@@ -29,11 +30,11 @@ def run(
 ) -> None:
     """Write a case: units guessed, labels matched to the deck, what is missing named."""
     if mass is not None and not 0 < mass < 1e9:
-        raise FileError(f"--mass {mass:g}: a weighed mass is above zero, in kg")
+        raise FileError(f"--mass {mass:g}: a weighed mass must be above zero, in kg")
     place = place_of("init", source, out)
     taken = [n for n in ("case.toml", "sensors.csv") if (place / n).exists()]
     if taken:
-        raise FileError(f"{place / taken[0]} is there already and is not replaced; another --out")
+        raise FileError(f"{place / taken[0]} exists and is not replaced; give another --out")
     made = draft(source, recordings or (), units, quantity, sensors, mass, allow or ())
     with started("init", source, place, listed=False) as job:
         write_text(job.folder / "case.toml", case_text(made, place))
@@ -57,4 +58,4 @@ def _next(place: Path) -> str:
         load_case(place)
     except ChladniError as error:
         return f"not complete yet: {error}"
-    return f"it can be read; next: chladni check {place}"
+    return f"the case is complete; next: chladni check {place}"

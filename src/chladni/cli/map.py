@@ -20,21 +20,24 @@ def run(
     formed: Annotated[Path, typer.Argument(metavar="FORMED")],
     units: Units = None,
     formed_units: Annotated[
-        str | None, typer.Option(help="Unit system of the formed file; default the deck's.")
+        str | None, typer.Option(help="Unit system of the formed file; default: that of the deck.")
     ] = None,
     align: Annotated[
-        bool, typer.Option("--align", help="Bring the formed mesh onto the deck first.")
+        bool, typer.Option("--align", help="Move the formed mesh onto the deck first.")
     ] = False,
     mirror: Annotated[
-        bool, typer.Option("--mirror", help="Align, as a mirror image if only that fits.")
+        bool, typer.Option("--mirror", help="Align, with a mirror image if only that fits.")
     ] = False,
     pair: Annotated[
         list[str] | None,
-        typer.Option(help="PART=ID, part of the deck and of the formed mesh (repeatable)."),
+        typer.Option(help="Pair PART=ID of the deck and the formed mesh (repeatable)."),
     ] = None,
     guess: Annotated[
         bool,
-        typer.Option("--guess", help="Parts the file lacks: thinning expected of their curvature."),
+        typer.Option(
+            "--guess",
+            help="Estimate the thinning of parts missing from the file by their curvature.",
+        ),
     ] = False,
     allow: Allow = None,
     out: Out = None,
@@ -46,7 +49,7 @@ def run(
     """
     from ..report.map_page import map_page
 
-    place = "mirrored" if mirror else "aligned" if align else "as it lies"
+    place = "mirrored" if mirror else "aligned" if align else "unchanged"
     pairs = dict(_pair(text) for text in pair or []) or None
     other = None if formed_units is None else unit_system(formed_units)
     with started("map", deck, out) as job:
@@ -67,5 +70,5 @@ def _pair(text: str) -> tuple[str, int]:
     """PART=ID."""
     name, _, number = text.rpartition("=")
     if not name.strip() or not number.strip().isdecimal():
-        raise FileError(f"--pair {text!r} is not of the form PART=ID, as inner=3")
+        raise FileError(f"--pair {text!r} is not of the form PART=ID, for example inner=3")
     return name.strip(), int(number)

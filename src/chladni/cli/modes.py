@@ -13,11 +13,12 @@ from .run import Allow, DeckOrCase, Out, Units, started
 
 def run(
     source: DeckOrCase,
-    count: Annotated[int, typer.Option(help="How many modes.", min=1)] = 20,
+    count: Annotated[int, typer.Option(help="Number of modes.", min=1)] = 20,
     units: Units = None,
     allow: Allow = None,
     subcase: Annotated[
-        int | None, typer.Option(help="Whose supports hold; the first that seeks modes.", min=0)
+        int | None,
+        typer.Option(help="Subcase whose supports apply; default: the first with modes.", min=0),
     ] = None,
     out: Out = None,
 ) -> None:

@@ -21,22 +21,25 @@ from .run import Allow, DeckOrCase, Out, Units, started
 
 def run(
     source: DeckOrCase,
-    sensors: Annotated[int, typer.Option(help="How many sensors.", min=1)] = 30,
+    sensors: Annotated[int, typer.Option(help="Number of sensors.", min=1)] = 30,
     modes: Annotated[
-        int | None, typer.Option(help="Elastic modes to tell apart; else by --top.", min=1)
+        int | None,
+        typer.Option(help="Number of elastic modes to distinguish; default: by --top.", min=1),
     ] = None,
     top: Annotated[
         float | None, typer.Option(help="Highest frequency of interest [Hz].", min=0.0)
     ] = None,
-    shakers: Annotated[int, typer.Option(help="How many shakers work together.", min=1)] = 1,
-    candidates: Annotated[int, typer.Option(help="Places to choose from.", min=2)] = 300,
-    spacing: Annotated[float, typer.Option(help="Least distance of sensors [m].", min=0.0)] = 0.0,
+    shakers: Annotated[int, typer.Option(help="Number of simultaneous shakers.", min=1)] = 1,
+    candidates: Annotated[int, typer.Option(help="Number of candidate places.", min=2)] = 300,
+    spacing: Annotated[
+        float, typer.Option(help="Minimum distance between sensors [m].", min=0.0)
+    ] = 0.0,
     damping: Annotated[float, typer.Option(help="Expected damping ratio.", min=1e-6)] = 0.01,
     force: Annotated[
-        float, typer.Option(help="Shaker force at which nothing may rattle [N].", min=1e-9)
+        float, typer.Option(help="Shaker force without rattling [N].", min=1e-9)
     ] = 5.0,
     alike: Annotated[
-        float, typer.Option(help="Modes may look this much alike (AutoMAC).", min=0.0, max=1.0)
+        float, typer.Option(help="Largest similarity of two modes (AutoMAC).", min=0.0, max=1.0)
     ] = 0.15,
     mass: Annotated[float, typer.Option(help="Mass of one sensor [kg].", min=0.0)] = 0.005,
     drawn: Annotated[
@@ -44,17 +47,20 @@ def run(
         typer.Option(
             "--drawn",
             "--ensemble",
-            help="Models of the ensemble, their thickness drawn, that the layout must serve.",
+            help="Number of models with random thickness that the layout must serve.",
             min=0,
             max=1000,
         ),
     ] = 20,
     detect: Annotated[
         bool,
-        typer.Option("--detect", help="Also the smallest mass, softening and thinning it finds."),
+        typer.Option(
+            "--detect",
+            help="Predict the smallest mass, softening and thinning that the layout finds.",
+        ),
     ] = False,
     noise: Annotated[
-        float, typer.Option(help="Noise expected, of |H|, for --detect.", min=1e-5, max=0.5)
+        float, typer.Option(help="Expected noise relative to |H|, for --detect.", min=1e-5, max=0.5)
     ] = 0.01,
     units: Units = None,
     allow: Allow = None,
@@ -92,7 +98,7 @@ def run(
             smallest = smallest_findings(model, job.folder / "plan.json", band, noise, stage)
             job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
             section = detectable_section(job.folder, model, smallest, noise)
-            picture = ("smallest_mass.png", "smallest mass that would be found")
+            picture = ("smallest_mass.png", "smallest mass that a diagnosis finds")
             parts = replace(
                 parts, sections=[*parts.sections, section], files=[*parts.files, picture]
             )
@@ -106,5 +112,5 @@ def _model(source: Path, units: str | None, allow: Sequence[str]) -> tuple[Model
     bare = load_deck(source, None, allow)
     guess = guessed_units(bare.model().assembly, source.name)
     if not guess.sure:
-        raise FileError(f"{source}: {guess.why}; say which by --units")
+        raise FileError(f"{source}: {guess.why}; state it by --units")
     return replace(bare, units=guess.units).model(), f"units = {guess.units.name}: {guess.why}"

@@ -20,10 +20,10 @@ from .shape_pictures import against_scan, cuts
 
 def run(
     source: DeckOrCase,
-    modes: Annotated[str, typer.Option(help="Modes in one picture, as 1-12 or 7,9.")] = "",
-    gif: Annotated[list[int] | None, typer.Option(help="A mode to animate (repeatable).")] = None,
+    modes: Annotated[str, typer.Option(help="Modes in one picture, for example 1-12 or 7,9.")] = "",
+    gif: Annotated[list[int] | None, typer.Option(help="Mode to animate (repeatable).")] = None,
     energy: Annotated[
-        list[int] | None, typer.Option(help="A mode whose strain energy is shown (repeatable).")
+        list[int] | None, typer.Option(help="Mode whose strain energy is shown (repeatable).")
     ] = None,
     thickness: Annotated[bool, typer.Option("--thickness", help="Map of shell thickness.")] = False,
     clearance: Annotated[
@@ -31,14 +31,14 @@ def run(
     ] = False,
     section: Annotated[
         list[str] | None,
-        typer.Option(help="A plane to cut at, as x=0.3 [m, or the deck's unit] (repeatable)."),
+        typer.Option(help="Section plane, for example x=0.3 [m, or the deck's unit] (repeatable)."),
     ] = None,
     scan: Annotated[
         Path | None,
         typer.Option(help="STL, PLY or OBJ of the real part, in the deck's unit of length."),
     ] = None,
     align: Annotated[
-        bool, typer.Option("--align", help="Bring the scan onto the model first.")
+        bool, typer.Option("--align", help="Move the scan onto the model first.")
     ] = False,
     units: Units = None,
     allow: Allow = None,
@@ -97,12 +97,12 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.2)
     modal = model.modes(max(count, LEAST_MODES))
     if len(modal) < count:
-        raise FileError(f"{job.source} has {len(modal)} modes, number {count} was asked for")
+        raise FileError(f"{job.source} has {len(modal)} modes, not {count}")
     rigid = int(rigid_modes(modal).sum())
     if still := [k for k in deforming if k <= rigid]:
         raise FileError(
-            f"{job.source}: mode {still[0]} is a rigid motion, which strains nothing; the first "
-            f"elastic mode is {rigid + 1}"
+            f"{job.source}: mode {still[0]} is a rigid motion without strain; the first elastic "
+            f"mode is {rigid + 1}"
         )
     if rigid:
         job.notes.append(f"Modes 1 to {rigid} are rigid motions; the first elastic is {rigid + 1}.")
@@ -169,8 +169,8 @@ def _clearance(job: Run, model: Model, modal: ModalModel | None, chosen: list[in
     found = all_gaps(model.assembly, both_ways=True)
     if not any(g.free.any() for g in found):
         raise FileError(
-            f"{job.source} has no two parts of shells within {1e3 * _NEAR:g} mm of each other but "
-            "where they are joined; leave out --clearance"
+            f"{job.source} has no two parts of shells within {1e3 * _NEAR:g} mm of each other "
+            "away from joints; leave out --clearance"
         )
     pairs = sorted(
         (summary(model.assembly, g) for g in found if g.parts[0] < g.parts[1]),
@@ -188,12 +188,14 @@ def _clearance(job: Run, model: Model, modal: ModalModel | None, chosen: list[in
         if elastic := [k for k in chosen if k > rigid]:
             blocks.append(_rattle(model, modal, elastic, found))
         if len(elastic) < len(chosen):
-            job.notes.append("A rigid motion closes no gap, so it is not in the table of contacts.")
+            job.notes.append(
+                "A rigid motion closes no gap, so the table of contacts leaves it out."
+            )
     job.section("Clearance", blocks)
 
 
 _NEAR, _DAMPING = 0.010, 0.01
-_GREY = "Grey: no other sheet within 10 mm, or nearer than 18 mm to a joint."
+_GREY = "Grey: no other sheet within 10 mm, or a joint within 18 mm."
 
 
 def _pairs(pairs: Sequence[PairClearance]) -> Table:
@@ -206,13 +208,21 @@ def _pairs(pairs: Sequence[PairClearance]) -> Table:
         )
         for p in pairs
     ]
-    head = ("part", "other", "least", "away from joints", "known to ±", "below 0.5 mm", "touching")
+    head = (
+        "part",
+        "other",
+        "least",
+        "away from joints",
+        "uncertainty ±",
+        "below 0.5 mm",
+        "touching",
+    )
     return Table(head, rows, words=("part", "other", "touching"), caption=_PAIRS)
 
 
 _PAIRS = (
-    "Clearance [mm] between the sheets' faces at the nodes of the first part, how well flat shells "
-    "know it (h² κ/8 of both), and the nodes with less than 0.5 mm away from joints."
+    "Clearance [mm] between the sheets' faces at the nodes of the first part, its uncertainty "
+    "from flat shells (h² κ/8 of both), and the number of nodes below 0.5 mm away from joints."
 )
 
 
@@ -243,5 +253,5 @@ def _rattle(model: Model, modal: ModalModel, chosen: list[int], found: Sequence[
 
 _RATTLE = (
     "Force amplitude at resonance, at the point that moves most and with 1 % damping, until two "
-    "sheets that do not touch at rest meet; places within 18 mm of a joint are left out."
+    "separate sheets touch; places within 18 mm of a joint are left out."
 )

@@ -18,7 +18,7 @@ def run(
     folder: Annotated[Path, typer.Argument(metavar="RUN_FOLDER")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Where the page goes.", metavar="DIR", parser=folder_named),
+        typer.Option("--out", help="Path of the page.", metavar="DIR", parser=folder_named),
     ] = None,
     title: Annotated[str, typer.Option(help="Title of the page.")] = "",
 ) -> None:

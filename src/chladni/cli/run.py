@@ -39,19 +39,19 @@ def folder_named(text: str) -> Path:
 Out = Annotated[
     Path | None,
     typer.Option(
-        "--out", help="Folder for the results (made if needed); else runs/COMMAND-NAME.",
+        "--out", help="Folder for the results; default: runs/COMMAND-NAME.",
         metavar="DIR", parser=folder_named,
     ),
 ]  # fmt: skip
 CaseFolder = Annotated[
     Path,
     typer.Argument(
-        metavar="CASE", help="Folder with a case.toml, or that file; chladni init drafts one."
+        metavar="CASE", help="Folder with a case.toml, or that file (chladni init drafts one)."
     ),
 ]
 DeckOrCase = Annotated[
     Path,
-    typer.Argument(metavar="DECK_or_CASE", help="A Nastran deck, or a folder with a case.toml."),
+    typer.Argument(metavar="DECK_or_CASE", help="Nastran deck, or a folder with a case.toml."),
 ]
 Units = Annotated[
     str | None,
@@ -59,13 +59,14 @@ Units = Annotated[
 ]
 Allow = Annotated[
     list[str] | None,
-    typer.Option("--allow", help="Card of a deck to leave out although it carries stiffness."),
+    typer.Option("--allow", help="Nastran card with stiffness that may be left out (repeatable)."),
 ]
 Driven = Annotated[
-    list[str] | None, typer.Option("--input", help="Where it is driven: 12:+Z, 12:n, base:+Z.")
+    list[str] | None,
+    typer.Option("--input", help="Drive point: 12:+Z, 12:n, base:+Z (repeatable)."),
 ]
 Answering = Annotated[
-    list[str] | None, typer.Option("--output", help="Where it answers: 55:+Z, 55:n.")
+    list[str] | None, typer.Option("--output", help="Output: 55:+Z, 55:n (repeatable).")
 ]
 MOST_LINES = 1_000_000  # of responses that are evaluated: beyond, memory and patience end
 Damping = Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)]
@@ -125,7 +126,7 @@ class Run:
 
         notes = [*self.notes, *advice()]
         foot = [
-            Section("What was done, and why", [Items(notes)] if notes else []),
+            Section("Steps and reasons", [Items(notes)] if notes else []),
             Section("Files", [Links(self.files)] if self.files else []),
             Section("Run it again", [Code([command_line()])]),
         ]
@@ -176,7 +177,7 @@ def opened(source: Path) -> Case:
     """
     if source.exists() and not is_case(source):
         raise FileError(
-            f"{source} is no case; give a folder with case.toml, as chladni init drafts one"
+            f"{source} is not a case; give a folder with a case.toml (chladni init drafts one)"
         )
     return load_case(source)
 

@@ -43,8 +43,8 @@ def _cut(job: Run, model: Model, text: str) -> Path:
     if not len(section.face):
         along = seen.points[seen.used][:, axis]
         raise FileError(
-            f"--section {text} meets nothing: the structure runs from {along.min():.4g} to "
-            f"{along.max():.4g} {model.unit} along {'xyz'[axis]}"
+            f"--section {text} does not cut the structure, which extends from {along.min():.4g} "
+            f"to {along.max():.4g} {model.unit} along {'xyz'[axis]}"
         )
     thickness = np.zeros(len(seen.faces))
     thickness[:shells] = model.assembly.thickness()
@@ -72,7 +72,7 @@ def against_scan(job: Run, model: Model, path: Path, aligned: bool) -> None:
     scale, unit = (1e3, "mm") if model.unit == "m" else (1.0, model.unit)
     limits = (0.0, scale * found.parts[0].most)
     picture = scene.scalar_map(
-        job.keep("scan.png", "distance of the sheets from the scan"),
+        job.keep("scan.png", "distance between sheets and scan"),
         model.seen,
         on_faces(model.seen, scale * found.off),
         "distance from the scan",
@@ -85,11 +85,13 @@ def against_scan(job: Run, model: Model, path: Path, aligned: bool) -> None:
     if found.alignment is not None:
         rest = number(scale * found.alignment.residual)
         job.notes.append(
-            f"The scan was brought onto the model from {found.alignment.start}; the nearer 80 % "
-            f"of it stay {rest} {unit} rms away."
+            f"The scan was moved onto the model from {found.alignment.start}; its closest 80 % "
+            f"have a distance of {rest} {unit} rms."
         )
     if np.isfinite(scan.volume):
-        job.notes.append(f"The scan is closed: {number(scan.volume * scale**3)} {unit}³ inside.")
+        job.notes.append(
+            f"The scan is closed and encloses {number(scan.volume * scale**3)} {unit}³."
+        )
     job.section("Scan", [Picture(picture, "Grey: not scanned."), _parts(found, scale, unit)])
 
 
@@ -104,7 +106,9 @@ def _parts(found: ScanComparison, scale: float, unit: str) -> Table:
         for p in found.parts
     ]
     head = ("part", "scanned [%]", "half within", "95 % within", "farthest", "at x, y, z")
-    caption = f"Distance of the sheets' faces from the scan [{unit}], where the part was scanned."
+    caption = (
+        f"Distance between the sheets' faces and the scan [{unit}], where the part was scanned."
+    )
     return Table(head, rows, words=("part", "at x, y, z"), caption=caption)
 
 

@@ -49,12 +49,16 @@ MOST_SHELLS = 200_000  # that a specimen may have: beyond, hours pass before a m
 
 
 def run(
-    name: Annotated[str, typer.Argument(help="tailgate, panel, box or plate.", metavar="NAME")],
+    name: Annotated[
+        str, typer.Argument(help="Specimen: tailgate, panel, box or plate.", metavar="NAME")
+    ],
     size: Annotated[float | None, typer.Option(help="Element size [mm].", min=0.1)] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", help=f"KEY=VALUE in SI (repeatable): {SETTINGS}", metavar="KEY=VALUE"
+            "--set",
+            help=f"Setting KEY=VALUE in SI units (repeatable): {SETTINGS}",
+            metavar="KEY=VALUE",
         ),
     ] = None,
     units: Annotated[str, typer.Option(help="Unit system of the deck.")] = "mm-t-s",
@@ -97,7 +101,7 @@ def _page(job: Run, specimen: FormedSpecimen, mapped: Mapped | None) -> None:
     made = specimen.assembly
     places, check = find_sensor_candidates(made), check_mesh(made)
     joints = Counter(j.kind for j in specimen.joints)
-    write_text(job.keep("candidates.csv", "where sensors could sit"), _candidates(places))
+    write_text(job.keep("candidates.csv", "candidates for sensors"), _candidates(places))
     after = mapped.assembly if mapped else made
     mass, pressed = mass_properties(made)[0], mass_properties(after)[0]
     facts: dict[str, Any] = {
@@ -193,8 +197,8 @@ def _affordable(area: float, h: float) -> None:
     if not h > 0 or area / h**2 > MOST_SHELLS:
         least = 1e3 * (abs(area) / MOST_SHELLS) ** 0.5
         raise ModelError(
-            f"elements of {1e3 * h:g} mm make {area / max(h, 1e-12) ** 2:.3g} shells, "
-            f"{MOST_SHELLS} are the most; --size counts in mm, {least:.2g} mm is the least here"
+            f"elements of {1e3 * h:g} mm need {area / max(h, 1e-12) ** 2:.3g} shells, more than "
+            f"{MOST_SHELLS}; --size is in mm and must be at least {least:.2g} mm here"
         )
 
 

@@ -37,33 +37,37 @@ def run(
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help='A number and its range, as "t of inner=0.6:0.8" in the deck\'s own units, '
-            '"E=90%:110%" of the deck\'s value, "K of PBUSH 7=10:1e4:log", or an effect, as '
-            '"point-mass at 412=0.01:0.2" (repeatable); without any the [[parameter]] of the case.'
+            help='Parameter and range (repeatable): "t of inner=0.6:0.8" in the deck\'s units, '
+            '"E=90%:110%" of the deck\'s value, "K of PBUSH 7=10:1e4:log", or an effect '
+            'such as "point-mass at 412=0.01:0.2"; default: the [[parameter]] of the case.'
         ),
     ] = None,
-    samples: Annotated[int, typer.Option(help="How many samples, at most.")] = 100,
+    samples: Annotated[int, typer.Option(help="Maximum number of samples.")] = 100,
     sampler: Annotated[
         str,
         typer.Option(
-            help="sobol, lhs, grid, oat (one at a time), saltelli (Sobol' indices), morris."
+            help="Sampler: sobol, lhs, grid, oat (one at a time), saltelli (Sobol' indices), "
+            "morris."
         ),
     ] = "sobol",
-    seed: Annotated[int, typer.Option(help="Seed of the samplers that draw.")] = 0,
-    modes: Annotated[int, typer.Option(help="Elastic modes that are followed.")] = 10,
+    seed: Annotated[int, typer.Option(help="Random seed of the samplers.")] = 0,
+    modes: Annotated[int, typer.Option(help="Number of elastic modes in the results.")] = 10,
     input: Driven = None,
     output: Answering = None,
-    band: Annotated[str, typer.Option(help="Of these responses, in Hz.")] = "1:200",
-    lines: Annotated[int, typer.Option(help="How many frequencies.", min=2, max=MOST_LINES)] = 400,
+    band: Annotated[str, typer.Option(help="Band of the responses [Hz].")] = "1:200",
+    lines: Annotated[int, typer.Option(help="Number of frequencies.", min=2, max=MOST_LINES)] = 400,
     damping: Damping = 0.01,
     quantity: Kind = "accelerance",
     frf: Annotated[bool, typer.Option("--frf", help="Keep every sample's responses.")] = False,
     workers: Annotated[
         int | None,
-        typer.Option(help="Local processes; else one per core, or this one for a short study."),
+        typer.Option(
+            help="Number of local processes; default: one per core, or the current process for a "
+            "short study."
+        ),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler, as tcp://host:8786.")
+        str | None, typer.Option(help="Address of a Dask scheduler, for example tcp://host:8786.")
     ] = None,
     units: Units = None,
     allow: Allow = None,
@@ -105,8 +109,8 @@ def _written(source: Path, place: Path, found: ParameterStudy) -> None:
     with started("study", source, place) as job:
         job.json("study.json", to_json(found))
         write_csv(job.keep("samples.csv", "one line per sample"), found)
-        job.notes += write_netcdf(job.keep("study.nc", "all of it, for xarray"), found)
-        job.files.append(("samples.jsonl", "the samples as they were finished"))
+        job.notes += write_netcdf(job.keep("study.nc", "all results, for xarray"), found)
+        job.files.append(("samples.jsonl", "the samples in the order they finished"))
         job.progress("pictures", 0.5)
         job.show(study_page(job.folder, found))
     if 2 * len(found.failed) > len(found.rows):

@@ -22,18 +22,24 @@ def run(
         ),
     ],
     excitation: Annotated[
-        str, typer.Option(help="hammer, burst, random, sine, multisine; else what it looks like.")
+        str,
+        typer.Option(
+            help="Excitation: hammer, burst, random, sine or multisine; default: detected."
+        ),
     ] = "",
-    method: Annotated[str, typer.Option(help="H1, H2, Hv or LPM.")] = "H1",
+    method: Annotated[str, typer.Option(help="Estimator: H1, H2, Hv or LPM.")] = "H1",
     resolution: Annotated[
-        float | None, typer.Option(help="Distance of lines, of continuous random [Hz].", min=1e-9)
+        float | None, typer.Option(help="Line spacing of continuous random [Hz].", min=1e-9)
     ] = None,
     exponential: Annotated[
-        float | None, typer.Option(help="What the exponential window of a hammer test falls to.")
+        float | None, typer.Option(help="End value of the exponential window of a hammer test.")
     ] = None,
-    band: Annotated[str, typer.Option(help="From and to, in Hz; default the whole.")] = "",
+    band: Annotated[
+        str, typer.Option(help="Band from:to [Hz]; default: the whole recording.")
+    ] = "",
     quantity: Annotated[
-        str, typer.Option(help="receptance, mobility, ... where the file does not say.")
+        str,
+        typer.Option(help="receptance, mobility or accelerance, if the file does not state it."),
     ] = "",
     out: Out = None,
 ) -> None:

@@ -51,8 +51,8 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     declared_along = " and ".join(sorted(set(_axes(ways))))
     raise FileError(
         f"{case.path}: the sensors are declared along {declared_along}, but {pairs} of "
-        f"{found.order} modes have the model's shapes {said} (mean MAC {mean:.2f}): mend the "
-        "directions of sensors.csv, or of the labels"
+        f"{found.order} modes have the model's shapes {said} (mean MAC {mean:.2f}): correct the "
+        "directions in sensors.csv, or in the labels"
     )
 
 

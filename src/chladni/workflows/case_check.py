@@ -24,7 +24,7 @@ COMMANDS = ("correlate", "calibrate", "diagnose", "study")  # the use of words b
 MODES = 12  # of the model that are looked at
 OFF_MASS = 0.1  # of the weighed mass: more is no scatter of sheets
 OFF_MESH = 0.005  # of the structure's size: a sensor farther from the mesh is worth a look
-HANGS = "look at the rigid elements, releases and springs there"
+HANGS = "check the rigid elements, releases and springs there"
 TOGETHER = 1e-4  # [m]; two channels nearer than this in one direction are one place
 
 
@@ -90,7 +90,7 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
         *_dead(case), *(CaseFinding(said, HANGS) for said in loose_parts(model, modal)),
     ]  # fmt: skip
     if not any(f.fault for f in findings):
-        progress("the recording beside the model", 0.8)
+        progress("the recording and the model", 0.8)
         more = _correlated(case, within(progress, 0.8, 1.0))
         sure = {f.remedy for f in more if f.fault}  # is not a guess any more
         findings = [f for f in findings if f.remedy.partition(", if ")[0] not in sure] + more
@@ -98,9 +98,7 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
 
 
-_NO_RECORDING = (
-    "none yet: modes, frf, plan, bench, render and study need none, all other commands do"
-)
+_NO_RECORDING = "none yet: all commands need one except modes, frf, plan, bench, render and study"
 
 
 def _facts(case: Case) -> list[tuple[str, str]]:
@@ -121,10 +119,10 @@ def _facts(case: Case) -> list[tuple[str, str]]:
         *([] if case.recordings else [("recording", _NO_RECORDING)]),
         ("sensors", f"{_several(case.outputs, 'output')}, {_several(case.inputs, 'input')}"),
     ]
-    band = "all the recording holds" if case.band is None else "{:g} to {:g} Hz".format(*case.band)
+    band = "the whole recording" if case.band is None else "{:g} to {:g} Hz".format(*case.band)
     without = "".join(f", without {a:g} to {b:g} Hz" for a, b in case.exclude)
     out.append(("band", band + without))
-    free = ", ".join(p.name for p in case.parameters) or "the usual ones: E, t, rho"
+    free = ", ".join(p.name for p in case.parameters) or "the default ones: E, t, rho"
     return [*out, ("free", free)]
 
 
@@ -155,18 +153,22 @@ def _units(case: Case) -> list[CaseFinding]:
     try:
         refuse_other_units(case)
     except FileError as error:
-        return [CaseFinding(str(error).partition(": ")[2], "nothing can be fitted before", True)]
+        return [
+            CaseFinding(
+                str(error).partition(": ")[2], "nothing can be fitted until this is corrected", True
+            )
+        ]
     try:
         guessed_units(case.assembly, case.deck.path.name, case.units)
     except FileError as error:
-        return [CaseFinding(str(error).partition(": ")[2], "look at E and rho of the materials")]
+        return [CaseFinding(str(error).partition(": ")[2], "check E and rho of the materials")]
     return []
 
 
 def _dead(case: Case) -> list[CaseFinding]:
     """Report channels without a signal, which were left out."""
     said = [n for r in case.recordings for n in r.notes if n.endswith(DEAD)]
-    return [CaseFinding(n, "look at its cable; use = no in sensors.csv says so") for n in said]
+    return [CaseFinding(n, "check its cable; use = no in sensors.csv excludes it") for n in said]
 
 
 def _mass(case: Case) -> list[CaseFinding]:
@@ -177,16 +179,18 @@ def _mass(case: Case) -> list[CaseFinding]:
         return []
     said = f"the deck weighs {mass:.4g} kg, the article {weighed:.4g} kg"
     if in_pounds(mass, weighed):
-        mend = f"in case.toml, [test]: mass = {weighed * POUND:.5g}, if pounds were weighed"
+        mend = f"in case.toml, [test]: mass = {weighed * POUND:.5g}, if the weight was in pounds"
         return [CaseFinding(said, mend)]
-    return [CaseFinding(said, "is the article the one of the deck, trim and sensors off?")]
+    return [
+        CaseFinding(said, "check that the article is the one of the deck, without trim and sensors")
+    ]
 
 
 def _size(case: Case) -> list[CaseFinding]:
     size = float(np.linalg.norm(np.ptp(case.assembly.points, axis=0)))
     if SIZE[0] <= size <= SIZE[1]:
         return []
-    return [CaseFinding(f"the deck is {size:.3g} m across", "is its unit of length right?", True)]
+    return [CaseFinding(f"the deck is {size:.3g} m across", "check its unit of length", True)]
 
 
 def _places(case: Case, dofs: tuple[CheckedDof, ...]) -> list[CaseFinding]:
@@ -196,9 +200,14 @@ def _places(case: Case, dofs: tuple[CheckedDof, ...]) -> list[CaseFinding]:
     if far:
         worst = max(far, key=lambda d: d.off_mesh_m)
         said = (
-            f"{len(far)} places are off the mesh, {worst.label} by {1e3 * worst.off_mesh_m:.3g} mm"
+            f"{len(far)} places are away from the mesh, {worst.label} by "
+            f"{1e3 * worst.off_mesh_m:.3g} mm"
         )
-        out.append(CaseFinding(said, "look at the picture: metres, and the deck's axes?"))
+        out.append(
+            CaseFinding(
+                said, "check in the picture that places are in metres and in the deck's axes"
+            )
+        )
     twice = [
         (a.label, b.label)
         for k, a in enumerate(dofs)
@@ -208,7 +217,7 @@ def _places(case: Case, dofs: tuple[CheckedDof, ...]) -> list[CaseFinding]:
     if twice:
         said = f"{twice[0][1]} and {twice[0][0]} are one place and one direction"
         more = f" ({len(twice)} such pairs)" if len(twice) > 1 else ""
-        out.append(CaseFinding(said + more, "two labels for one sensor? look at sensors.csv"))
+        out.append(CaseFinding(said + more, "check sensors.csv: one sensor may have two labels"))
     return out
 
 
@@ -227,7 +236,7 @@ def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
         screening = screened_unprepared(case)
         if screening is None or not screening.faults:
             said = str(error).removeprefix(f"{case.path}: ")
-            return [CaseFinding(said, "nothing can be fitted before", True)]
+            return [CaseFinding(said, "nothing can be fitted until this is corrected", True)]
     if screening is None:
         return []
     return [
@@ -244,4 +253,4 @@ def _band(case: Case, elastic: np.ndarray) -> list[CaseFinding]:
     if elastic[0] <= high:
         return []
     said = f"the model's first elastic mode is at {elastic[0]:.4g} Hz, the band ends at {high:g} Hz"
-    return [CaseFinding(said, "are the deck's units right, and is the band in Hz?", True)]
+    return [CaseFinding(said, "check the deck's units, and that the band is in Hz", True)]

@@ -29,12 +29,12 @@ COLUMNS = (
     *("role", "mass", "position_sd"),
 )
 WAYS = {
-    "grid": "by the number of their grid",
-    "place": "by a grid at their place",
+    "grid": "by grid number",
+    "place": "by the grid at their place",
     "nearest": "on the nearest point of the mesh",
-    "table": "by the table given",
+    "table": "from the given table",
     "base": "as the motion of the supports",
-    "missing": "nowhere: their place is missing",
+    "missing": "nowhere: their places are missing",
 }
 _NAMED = 8  # labels a sentence names
 _FAR = 0.01  # [m] from the mesh: worth saying
@@ -98,13 +98,13 @@ def draft(
     for path in (deck, *recordings):
         if not str(path).isprintable():
             raise FileError(
-                f"{path}: a case.toml holds printable UTF-8 alone; rename this file or its folder"
+                f"{path}: a case.toml holds only printable UTF-8; rename this file or its folder"
             )
     bare = load_deck(deck, None, allow)
     if units is None:
         guess = guessed_units(assembly(bare.deck), deck.name)
         system, why = guess.units, guess.why
-        sure = "no other system fits" if guess.sure else "another system fits, too: look at this"
+        sure = "no other system fits" if guess.sure else "another system fits too: check this"
         why = f"{why}; {sure}"
     else:
         system = unit_system(units)
@@ -129,7 +129,7 @@ def _as_given(made: Assembly, name: str, system: Units) -> str:
     except FileError:  # no known material in any system
         return "as given"
     if guess.sure and guess.units.name != system.name:
-        return f"as given, but look: {guess.why}; no other system fits"
+        return f"as given, but check: {guess.why}; no other system fits"
     return "as given"
 
 
@@ -150,8 +150,8 @@ def _far(dofs: Sequence[MatchedDof]) -> list[str]:
         return []
     worst = max(far, key=lambda d: d.distance)
     return [
-        f"{len(far)} places are more than {1e3 * _FAR:g} mm off the mesh, {worst.label} "
-        f"{1e3 * worst.distance:.3g} mm: is the recording in the deck's frame?"
+        f"{len(far)} places are more than {1e3 * _FAR:g} mm from the mesh, {worst.label} "
+        f"{1e3 * worst.distance:.3g} mm: check that the recording is in the deck's frame"
     ]
 
 
@@ -165,17 +165,17 @@ def _missing(
         more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
         out.append(
             f"places of {', '.join(lost[:_NAMED])}{more}: no grid of the deck and no node of the "
-            "recording is known to be there; a row each in sensors.csv, with a grid or x, y, z in "
+            "recording is there; add a row for each to sensors.csv, with a grid or x, y, z in "
             "metres"
         )
     if not read:
         out.append("a recording: [test] recordings, a universal file, .npz or .csv")
     elif all(r.frf is None and r.poles is None and not responses(r.functions) for r in read):
-        out.append("FRFs or a table of poles: the recordings hold neither")
+        out.append("FRFs or a table of poles: the recordings have neither")
     if weighed is None:
         out.append(
-            f"the weighed mass: [test] mass in kg, sensors taken off; the deck weighs {mass:.4g} "
-            "kg, and a wrong unit system shows by it"
+            f"the weighed mass: [test] mass in kg, without sensors; the deck weighs {mass:.4g} "
+            "kg, and the comparison shows a wrong unit system"
         )
     return out
 
@@ -203,8 +203,8 @@ def case_text(made: CaseDraft, folder: Path) -> str:
     """Return the text of ``case.toml``, paths relative to ``folder``, a comment on every word."""
     name = lambda path: json.dumps(_seen_from(path, folder), ensure_ascii=False)  # noqa: E731
     lines = [
-        "# A case of chladni, drafted by chladni init. Lines that begin with # are off: take the",
-        "# mark away to use them. chladni check says what will be used.",
+        "# A chladni case, drafted by chladni init. Lines that begin with # are off: remove the",
+        "# mark to use them. chladni check shows what is used.",
         "",
         "[model]",
         f"deck = {name(made.deck)}",
@@ -212,19 +212,19 @@ def case_text(made: CaseDraft, folder: Path) -> str:
         *([f"allow = {json.dumps(list(made.allow))}"] if made.allow else []),
         *_comment(made.units_why),
         f'units = "{made.units.name}"',
-        "# damping = 0.01  # of critical, where responses are drawn or scored",
+        "# damping = 0.01  # damping ratio for drawn or scored responses",
         "",
         "[test]",
         *_of_recordings(made, name),
         _of_mass(made),
         "# mass_sd = 0.005  # standard deviation of the weighing [kg]",
-        "# hangers = [101, 102]  # grids at which cords hold it",
-        '# gain = "unknown"  # one real factor common to all channels is then free',
+        "# hangers = [101, 102]  # grids of the cords",
+        '# gain = "unknown"  # frees one real factor common to all channels',
         "",
         *_of_band(made),
         "",
         "[held_out]",
-        "# sensors = 6  # outputs no fit may see; else a fifth of them is chosen",
+        "# sensors = 6  # held-out outputs; default: a fifth of them",
         "",
         *_of_parts(made),
     ]  # fmt: skip
@@ -238,7 +238,7 @@ def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
     ways = (Path(_seen_from(path, folder)) for path in (made.deck, *made.recordings))
     if not any(way.is_absolute() or ".." in way.parts for way in ways):
         return []
-    return ["outside = true  # files lie outside of this folder: they are not part of the case"]
+    return ["outside = true  # files outside this folder: not part of the case"]
 
 
 def _of_mass(made: CaseDraft) -> str:
@@ -246,7 +246,8 @@ def _of_mass(made: CaseDraft) -> str:
     if made.weighed is not None:
         return f"mass = {made.weighed:g}  # weighed [kg]"
     return (
-        f"# mass = 0.0  # weigh the article [kg], sensors off; the deck weighs {made.mass:.4g} kg"
+        f"# mass = 0.0  # weigh the article [kg] without sensors; the deck weighs {made.mass:.4g} "
+        "kg"
     )
 
 
@@ -282,7 +283,7 @@ def _of_recordings(made: CaseDraft, name: object) -> list[str]:
     if made.quantity:
         out.append(f'quantity = "{made.quantity}"')
     elif frf is not None:
-        out.append(f'# quantity = "{frf.quantity}"  # the file says so; only to overrule it')
+        out.append(f'# quantity = "{frf.quantity}"  # from the file; only to overrule it')
     return [*out, *where]
 
 
@@ -311,13 +312,13 @@ def _of_band(made: CaseDraft) -> list[str]:
     ends = (frf.frequency[frf.frequency > 0][[0, -1]]) if frf is not None else (20.0, 200.0)
     return [
         "[band]",
-        f"# fit = [{ends[0]:g}, {ends[1]:g}]  # Hz; without it all the recording holds",
-        "# exclude = [[23.0, 27.5]]  # bands left out: cords, mains",
+        f"# fit = [{ends[0]:g}, {ends[1]:g}]  # Hz; default: the whole recording",
+        "# exclude = [[23.0, 27.5]]  # excluded bands: cords, mains",
     ]
 
 
 def _of_parts(made: CaseDraft) -> list[str]:
-    out = ["# What may be calibrated; without any, E and t of every sheet, rho of every material."]
+    out = ["# Calibration parameters; default: E and t of every sheet, rho of every material."]
     for part in made.assembly.parts[:20]:
         if fields := fields_of(part):
             out += _comment(f"{part.name} ({part.id}) has {', '.join(fields)}")

@@ -204,9 +204,9 @@ def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None,
     try:
         delta = deviation(responses, seen)
     except ChladniError as error:
-        return responses, None, (f"No Q could be formed: {error}.",)
+        return responses, None, (f"Q could not be calculated: {error}.",)
     notes: tuple[str, ...] = ()
     if not case.gain_known:
         delta = delta - np.median(delta.real)
-        notes = ("The gain is unknown, so Q was taken after one common factor was removed.",)
+        notes = ("The gain is unknown, so Q was calculated after one common factor was removed.",)
     return responses, quality(delta, seen.frequency, bands, weight), notes

@@ -111,8 +111,8 @@ def searched(
     progress("identifying the recording", 0.0)
     if diagnosing and not len(case.assembly.shells) + len(case.assembly.beams):
         raise FileError(
-            f"{case.path}: the deck has neither shells nor beams, and what diagnose looks for sits "
-            "on these; calibrate and correlate take any deck"
+            f"{case.path}: the deck has neither shells nor beams, but the effects of diagnose act "
+            "on these; calibrate and correlate accept any deck"
         )
     question = question_of(case)
     try:
@@ -143,7 +143,7 @@ def explained(
     question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _judged(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
-        distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
+        distrust = (*distrust, f"{screening.sentence}; a fit to it distorts the model")
     return Explained(case, question, prepared, found, distrust, screening)
 
 
@@ -163,7 +163,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     if not diagnosing:
         distrust = (*distrust, *foretells_worse(result.agreement))
     if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
-        distrust = (f"nothing is named: {prepared.too_little}", *distrust)
+        distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen = known.screening
     if diagnosing:
         distrust = (*distrust, *instead_of_effects(result.verdict, seen))
@@ -348,8 +348,8 @@ def _blind(spot: ResidualLocalisation | None) -> tuple[str, ...]:
     if spot is None or spot.blind < BLIND_SHARE:
         return ()
     return (
-        f"on {spot.blind:.0%} of the structure the test would not notice a local loss of half the "
-        "stiffness or mass (grey in the map of what is left)",
+        f"on {spot.blind:.0%} of the structure the test cannot detect a local loss of half the "
+        "stiffness or mass (grey in the map of the remaining gain)",
     )
 
 

@@ -24,7 +24,7 @@ def _sentence(name: str, those: Sequence[tuple[str, NamedEffect]], count: int) -
     named = ", ".join(map(repr, having))
     said = f"{name} is in {named}{' only' if len(having) < count else ', in every state'}"
     if len(having) < len(those):
-        return f"{said}; where it is there twice, its places are not followed from state to state"
+        return f"{said}; with two of them in one state, places are not compared between states"
     changes = [
         f"from {a!r} to {b!r} {_moved(one, other)}, {_grown(one, other)}"
         for (a, one), (b, other) in pairwise(those)
@@ -36,7 +36,7 @@ def _moved(one: NamedEffect, other: NamedEffect) -> str:
     """State if two effects are at one place, within the uncertainty of both."""
     a, b = one.where, other.where
     if a.point_m is None or b.point_m is None:
-        return "it stays" if a.text == b.text else f"it goes to {b.text}"
+        return "it stays" if a.text == b.text else f"it moves to {b.text}"
     away = float(np.linalg.norm(np.subtract(a.point_m, b.point_m)))
     known = max(a.radius_m or 0.0, b.radius_m or 0.0)
     return "it stays" if away <= known else f"it moves by {1e3 * away:.3g} mm"
@@ -47,7 +47,7 @@ def _grown(one: NamedEffect, other: NamedEffect) -> str:
     pairs = list(zip(one.parameters, other.parameters, strict=False))
     apart = [(p, q) for p, q in pairs if p.name == q.name and not _overlap(p, q)]
     if not apart:
-        return "of one size as far as that is known"
+        return "with the same size within its uncertainty"
     return ", ".join(f"{p.name} from {p.value:.3g} to {q.value:.3g} {q.unit}" for p, q in apart)
 
 

@@ -79,8 +79,8 @@ def evaluate_recordings(
     held = [(r, e) for r, e in made if r.frf is not None]
     if not held:
         raise FileError(
-            "the recordings hold neither a force and what answers it nor frequency responses; of "
-            "free decays identify gives poles and damping"
+            "the recordings have neither a force with its responses nor FRFs; identify finds "
+            "poles and damping of free decays"
         )
     found = []
     with one_blas_thread():
@@ -105,7 +105,9 @@ def evaluate_recordings(
 def _decay_notes(found: RecordingEvaluation) -> list[str]:
     """Return a sentence on each mode whose frequency or damping depends on its amplitude."""
     name = found.recording.name
-    beats = "to settle it, measure at two levels: a second mode within a bandwidth beats alike"
+    beats = (
+        "to settle it, measure at two levels: a second mode within a bandwidth causes similar beats"
+    )
     return [f"{name}: free decay: {mode_sentence(m)}; {beats}" for m in found.levels.moving]
 
 
@@ -149,7 +151,7 @@ def _with_time(
         f, output = estimate.frf.frequency[k], estimate.frf.outputs[i]
         if worst > DISTORTED:
             text = (
-                f"the response {output} holds {100 * worst:.2g} % of harmonics at {f:.4g} Hz: the "
+                f"the response {output} has {100 * worst:.2g} % harmonics at {f:.4g} Hz: the "
                 "structure, the shaker or the front end is not linear there."
             )
             mend = "measure at a lower level and compare"

@@ -79,11 +79,11 @@ def frf(
 def _of_recording(case: Case, damping: float, progress: Progress) -> FrequencyResponses:
     """Compute the model's responses on lines, labels and quantity of a case's first recording."""
     if not case.frfs:
-        raise FileError(f"{case.path} holds no FRF; give --input and --output, as --input 12:+Z")
+        raise FileError(f"{case.path} has no FRF; give --input and --output, as --input 12:+Z")
     test = case.frfs[0]
     test = test.sel(band=(max(float(test.frequency[0]), 1e-6), float(test.frequency[-1])))
     ratio = case.damping or damping
-    note = f"Lines and places are those of the recording; every mode has {ratio:.2g}."
+    note = f"Lines and places come from the recording; every mode has {ratio:.2g}."
     progress("modes", 0.2)
     model = modelled(case.tested(case.assembly), REACH * float(test.frequency[-1]))
     return FrequencyResponses((model_frf(case, model, ratio, test),), (note, *case.said("frf")))
@@ -136,7 +136,7 @@ def layout_places(
         for role in ROLES
     )
     if outputs.base.any():
-        raise FileError(f"{path}: the base is what drives a shaker table, no sensor of it")
+        raise FileError(f"{path}: the base is the input of a shaker table, not a sensor")
     return outputs, inputs
 
 
@@ -152,7 +152,7 @@ def _between(
     found = superposed(model, made, outputs, inputs, frequency, damping)
     note = (
         f"{len(made.modes)} modes up to {made.band:.4g} Hz were superposed with damping ratio "
-        f"{damping:.4g}; what higher modes contribute was added as a static residual."
+        f"{damping:.4g}; the contribution of higher modes was added as a static residual."
     )
     return FrequencyResponses((found,), (note,))
 
@@ -161,7 +161,7 @@ def refuse_unknown(model: Model, outputs: Side, inputs: Side) -> None:
     """Refuse ends the model does not have, and a moving base together with other inputs."""
     bases = [text for text in _labels(inputs) if text.startswith("base:")]
     if bases and len(_labels(inputs)) > 1:
-        raise FileError(f"--input {bases[0]} moves all supports and stands alone, not with others")
+        raise FileError(f"--input {bases[0]} moves all supports, so it must be the only input")
     for side in (outputs,) if bases else (outputs, inputs):
         if not isinstance(side, MeasuredDofs):
             model.directions(side)
@@ -234,7 +234,7 @@ def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> 
     cases = [c for c in asked.subcases if c.dload and c.frequency]
     if not cases:
         raise FileError(
-            f"{models.source} asks for no frequency response; give --input and --output"
+            f"{models.source} requests no frequency response; give --input and --output"
         )
     first = models.model(cases[0].id)
     labels, notes = list(outputs), list(dict.fromkeys((*first.notes, *asked.notes)))
@@ -242,8 +242,8 @@ def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> 
         labels, said = _wanted(first, asked, cases)
         notes = [*said, *notes]
     notes.append(
-        "Each input is a subcase with all its loads, as the deck gives them: values are motion, "
-        "not motion per unit force."
+        "Each input is a subcase with all loads of the deck: values are motion, not motion per "
+        "unit force."
     )
     if asked.solution == 111 and not any(c.residual for c in cases):
         notes.append(
@@ -307,8 +307,8 @@ def _wanted(model: Model, asked: Analysis, cases: Sequence[Subcase]) -> tuple[li
         return _loaded(model, asked), []
     if 6 * named.sum() > MOST_DOFS:
         note = (
-            f"The deck asks for the motion of {named.sum()} points; of so many only the "
-            "loaded ones were taken, others with --output."
+            f"The deck requests the motion of {named.sum()} points; only the loaded ones were "
+            "calculated. Use --output for others."
         )
         return _loaded(model, asked), [note]
     scalar = model.assembly.scalar_points

@@ -86,7 +86,7 @@ class PoleChoice:
         """The choice, in sentences."""
         said = []
         if self.states is not None:
-            said.append(f"All poles of a state space of {self.states} states (subspace road).")
+            said.append(f"All poles of a state space of {self.states} states (subspace method).")
         for frequencies, what in ((self.drop, "Taken out"), (self.pick, "Put in")):
             if frequencies:
                 said.append(f"{what} by hand: {', '.join(f'{f:g}' for f in frequencies)} Hz.")
@@ -151,8 +151,8 @@ def identify(
             recordings = recordings[:1]
     held = [r for r in (ringing(r, band or (0.0, np.inf)) for r in recordings) if r.frf is not None]
     if not held:
-        where = f"{source.path} " if isinstance(source, Case) else "what was recorded "
-        raise FileError(f"{where}holds no frequency responses to identify from{_has(recordings)}")
+        where = f"{source.path} " if isinstance(source, Case) else "the recording "
+        raise FileError(f"{where}has no frequency responses to identify{_has(recordings)}")
     found = []
     with one_blas_thread():
         for k, recording in enumerate(held):
@@ -180,10 +180,8 @@ def _has(read: Sequence[Recording]) -> str:
     said += ["a table of poles"] * any(r.poles is not None for r in read)
     said += ["mode shapes"] * any(r.shapes is not None for r in read)
     if any(responses(r.functions) for r in read):
-        said[0] += (
-            ", no force among them: correlate, calibrate and diagnose take frequencies of them"
-        )
-    return f"; it holds {' and '.join(said)}" if said else ""
+        said[0] += ", without a force: correlate, calibrate and diagnose use their frequencies"
+    return f"; it has {' and '.join(said)}" if said else ""
 
 
 def _modes(
@@ -242,12 +240,17 @@ def _notes(
     notes += [f"Noise of {which(names, held)}: {source}." for source, names in sources.items()]
     for r in held:
         if r.level == 0 and len(held) > 1:
-            notes.append(f"{r.name}: its modes are not held against other levels, for 0 is none.")
+            notes.append(
+                f"{r.name}: its modes are not compared with other levels, because its level is 0."
+            )
         if r.added_damping:
-            notes.append(f"{r.name}: {r.added_damping:.3g} 1/s of an exponential window taken off.")
+            notes.append(
+                f"{r.name}: the damping of an exponential window, {r.added_damping:.3g} 1/s, was "
+                "subtracted."
+            )
     if gaps:
         said = ", ".join(f"{low:g} to {high:g} Hz" for low, high in gaps)
-        notes.append(f"Left out, as the case says: {said}.")
+        notes.append(f"Excluded by the case: {said}.")
     return tuple(notes)
 
 
@@ -271,6 +274,6 @@ def _doubts(found: Sequence[RecordingModes]) -> tuple[str, ...]:
         return ()
     names = ", ".join(r.recording.name for r in weak)
     return (
-        f"{names}: the poles leave {max(r.modes.chi for r in found):.3g} times the "
-        "noise, so they are not to be trusted; narrow the band (--band) or give --averages",
+        f"{names}: the residual of the poles is {max(r.modes.chi for r in found):.3g} times the "
+        "noise, so do not trust them; narrow the band (--band) or give --averages",
     )

@@ -194,4 +194,4 @@ def similar_names(source: Path) -> str:
     names = sorted(p.name for p in there if not p.name.startswith("."))
     alike = [n for n in names if Path(n).suffix == source.suffix]
     near = get_close_matches(source.name, names, 4) or alike[:4]
-    return f"; beside it there is {', '.join(near)}" if near else ""
+    return f"; the same folder has {', '.join(near)}" if near else ""

@@ -50,7 +50,7 @@ def map_formed(
     model: Model,
     formed: Path,
     units: Units | None = None,
-    place: str = "as it lies",
+    place: str = "unchanged",
     pairs: Mapping[str, int] | None = None,
     guess: bool = False,
     progress: Progress = silent,
@@ -111,7 +111,7 @@ def _not_mapped(
     present = [made.parts[k].name for k in np.unique(made.shells.part).tolist()]
     out = []
     if left := [name for name in present if name not in known]:
-        out.append(f"Nothing was mapped onto {', '.join(left)}: they keep the deck's thickness.")
+        out.append(f"{', '.join(left)} received no thickness and keep that of the deck.")
     if guessed is not None and not guessed:
-        out.append("The file holds every part, so that nothing was left to guess.")
+        out.append("The file has every part, so no thickness was estimated.")
     return out

@@ -61,15 +61,15 @@ def matched(
     notes = []
     if unit != "m":
         notes.append(
-            f"the places of {recording.name} fit the deck if they are read in {unit}: so they "
-            "were, though the file says otherwise or nothing"
+            f"the places of {recording.name} were read in {unit}, because they fit the deck in "
+            "this unit; the file states another unit or none"
         )
     own = {(s.label, s.role): s for s in table}
     by_number = numbers_agree(made, nodes)
     if nodes and not by_number and set(nodes) & set(made.ids.tolist()):
         notes.append(
-            f"nodes of {recording.name} have numbers of grids that lie elsewhere: places count, "
-            "numbers do not"
+            f"nodes of {recording.name} have the numbers of grids at other places: places are "
+            "used, numbers are not"
         )
     sides: tuple[tuple[Role, Sequence[str]], ...] = (
         ("output", recording.frf.outputs), ("input", recording.frf.inputs),
@@ -78,8 +78,8 @@ def matched(
     channels = not on_structure(made, nodes) and count_channels(rest)
     if channels:
         notes.append(
-            f"labels {named(rest, 3)} of {recording.name} number channels: no coordinates say that "
-            "they are the grids of these numbers"
+            f"labels {named(rest, 3)} of {recording.name} are taken as channel numbers: no "
+            "coordinates show that they are grids"
         )
     found = [
         _of_table(own[label, role])
@@ -93,7 +93,7 @@ def matched(
     asked = {(d.label, d.role) for d in found}
     idle = [s.label for s in table if (s.label, s.role) not in asked]
     if idle:
-        notes.append(f"rows of the table given that are not in {recording.name}: {named(idle)}")
+        notes.append(f"rows of the given table that are not in {recording.name}: {named(idle)}")
     return found, notes
 
 

@@ -74,20 +74,20 @@ def loose_parts(model: Model, modal: ModalModel) -> list[str]:
     motions = "1 motion" if len(grids) == 1 else f"{len(grids)} motions"
     where = ", ".join(map(str, dict.fromkeys(grids)))
     return [
-        f"{motions} without any stiffness beside those of the whole structure: something hangs "
-        f"loose; what moves most is grid {where}"
+        f"{motions} without stiffness, in addition to those of the whole structure: a part is "
+        f"loose; grid {where} moves most"
     ]
 
 
 def _notes(model: Model, modal: ModalModel, count: int, rigid: int) -> list[str]:
     notes, size = [], len(model.structure.system.dofs)
     if len(modal) < count:
-        notes.append(f"The model has {len(modal)} modes, {count} were asked for.")
+        notes.append(f"The model has {len(modal)} modes, {count} were requested.")
     motions = "1 mode is a rigid motion" if rigid == 1 else f"{rigid} modes are rigid motions"
     notes.append(f"{size} degrees of freedom are free; {motions}.")
     if not model.unit:
         notes.append(
-            "No unit system was given (--units), so mass and lengths are in the deck's own "
-            "units; frequencies are Hz in any consistent system."
+            "No unit system was given (--units), so mass and lengths are in the deck's units; "
+            "frequencies are in Hz in any consistent system."
         )
     return notes

@@ -70,7 +70,7 @@ def read_modes(path: Path) -> PunchModes:
         raise FileError(f"no file {path}{similar_names(path)}")
     suffix = path.suffix.lower()
     if suffix not in READERS:
-        raise FileError(f"{path}: modes are read of {', '.join(READERS)}, not {suffix or '?'}")
+        raise FileError(f"{path}: modes are read from {', '.join(READERS)}, not {suffix or '?'}")
     if suffix == ".op2":
         return read_op2_modes(path)
     return read_punch_modes(path) if suffix in (".pch", ".punch") else _universal(path)
@@ -80,7 +80,7 @@ def _universal(path: Path) -> PunchModes:
     """Read dataset 55 of a universal file."""
     shapes = read_uff(path).shapes
     if shapes is None:
-        raise FileError(f"{path} holds no mode shapes (dataset 55)")
+        raise FileError(f"{path} has no mode shapes (dataset 55)")
     try:
         dofs = [parse(label) for label in shapes.dofs]
     except LabelError as error:
@@ -116,7 +116,7 @@ def other_modes(model: Model, path: Path, progress: Progress = silent) -> OtherM
     own = model.motion(modal.shapes[:, near])[rows]
     held = np.isfinite(values[:, :, elastic]).all(axis=2)
     if held.sum() < LEAST_GRIDS:
-        raise FileError(f"{path} moves {held.sum()} translations of the model; shapes need more")
+        raise FileError(f"{path} has {held.sum()} translations of the model; shapes need more")
     phi, psi = own[held], values[:, :, elastic][held]
     f_model, f_other = modal.frequency[near], read.frequency[elastic]
     M = mac(phi, psi)
@@ -136,9 +136,9 @@ def _on_model(made: Assembly, read: PunchModes, path: Path) -> tuple[np.ndarray,
     known = np.isin(read.ids, made.ids)
     if known.sum() < LEAST_GRIDS:
         raise FileError(
-            f"{path} holds {known.sum()} grids of the model (its {len(read.ids)} run from "
+            f"{path} has {known.sum()} grids of the model (its {len(read.ids)} run from "
             f"{read.ids.min()} to {read.ids.max()}, the deck's from {made.ids[0]} to "
-            f"{made.ids[-1]}): is it of this deck?"
+            f"{made.ids[-1]}): check that it belongs to this deck"
         )
     rows, values = made.rows(read.ids[known]), read.shapes[known, :3]
     if made.axes is None:
@@ -166,9 +166,9 @@ def _whole(made: Assembly, rows: np.ndarray) -> bool:
 def _notes(model: Model, read: PunchModes, rows: np.ndarray, elastic: np.ndarray) -> list[str]:
     out = [f"Shapes are compared at the translations of {len(rows)} grids."]
     if left := len(read.ids) - len(rows):
-        out.append(f"{left} points of the file are none of the deck's and were left out.")
+        out.append(f"{left} points of the file are not in the deck and were left out.")
     if rigid := int((~elastic).sum()):
         out.append(f"{rigid} modes of the file are rigid motions and are not compared.")
     if not model.unit:
-        out.append("Frequencies are Hz in any system of units that counts seconds.")
+        out.append("Frequencies are in Hz in any unit system with seconds.")
     return out

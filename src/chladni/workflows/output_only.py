@@ -49,14 +49,14 @@ def _identified(case: Case, recording: Recording) -> tuple[Identified, str]:
     known = found.sel(found.inside & firm(found) & (free.real < 0) & clear(found))
     if not known.order:
         raise FileError(
-            f"{recording.name}: no natural frequency stands out of its {len(used)} records of "
-            f"responses ({used[0].kind}) between {low:.4g} and {high:.4g} Hz, and no force was "
-            "measured"
+            f"{recording.name}: no natural frequency is above the noise of its {len(used)} "
+            f"records of responses ({used[0].kind}) between {low:.4g} and {high:.4g} Hz, and no "
+            "force was measured"
         )
-    how = "from where they ring freely on," if free_decays(used) else "as if the force were white"
+    how = "from their free decay," if free_decays(used) else "assuming a white force"
     note = (
-        f"{recording.name}: the force was not measured, so {known.order} natural frequencies were "
-        f"taken from {len(used)} records of responses ({used[0].kind}), {how} between "
-        f"{low:.4g} and {high:.4g} Hz; damping and levels are not used"
+        f"{recording.name}: the force was not measured, so {known.order} natural frequencies come "
+        f"from {len(used)} records of responses ({used[0].kind}), {how} between {low:.4g} and "
+        f"{high:.4g} Hz; damping and levels are not used"
     )
     return known, note

@@ -24,14 +24,14 @@ def over_levels(
         return result
     if result.effects:
         note = (
-            f"modes move with level, which {' and '.join(e.name for e in result.effects)} does not "
-            "explain: it is that of the level that was fitted"
+            f"modes change with level, and {' and '.join(e.name for e in result.effects)} does "
+            "not explain this: it belongs to the fitted level"
         )
         return replace(result, notes=(*result.notes, note))
     kept = () if result.verdict == "nothing missing" else result.calibrated
     note = (
-        f"of the level that was fitted alone the verdict would be {result.verdict!r}; no linear "
-        "effect makes modes move with level, so it is 'nonlinear'"
+        f"for the fitted level alone the verdict is {result.verdict!r}; no linear effect changes "
+        "modes with level, so the verdict is 'nonlinear'"
     )
     model = stages.final.model
     joints = linear_joints(study, model, asked.level)

@@ -17,10 +17,10 @@ def nothing_measured(case: Case) -> FileError:
     """Return the error for a case without data to compare a model with."""
     if not case.recordings:
         return FileError(
-            f"{case.path} names no recording to compare the model with; give it as recordings = "
+            f"{case.path} has no recording to compare with the model; give it as recordings = "
             '["recording.uff"] under [test]'
         )
-    return FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+    return FileError(f"{case.path}: the recordings have neither FRFs nor a table of poles")
 
 
 def question_of(case: Case) -> Question:

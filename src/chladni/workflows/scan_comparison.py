@@ -69,8 +69,9 @@ def compare_with_scan(
     size = float(np.linalg.norm(np.ptp(middle, axis=0)))
     if off.min() > REACH * size:
         raise FileError(
-            f"the scan is {off.min():.3g} m or more away from the sheets, which are {size:.3g} m "
-            "across: is it in the deck's unit of length? --align brings it onto the model"
+            f"the scan is {off.min():.3g} m or more from the sheets, which are {size:.3g} m "
+            "across; check that it is in the deck's unit of length, or use --align to move it "
+            "onto the model"
         )
     off = np.where(off <= REACH * size, off, np.nan)
     return ScanComparison(off, _by_part(assembly, middle, off), fit)

@@ -47,7 +47,7 @@ def screened_by_model(
     lines = case.lines(frf.frequency) if use is None else use
     alone = screened(case.recordings[0], found, case.recordings[1:], _places(case), use)
     if masses := _masses(case, frf, lines, model):
-        return alone.with_more(masses, [Check("masses that are given", "look at them", False)])
+        return alone.with_more(masses, [Check("given masses", "check them", False)])
     return against_model(
         alone, frf, lines, found, model, case.outputs, case.inputs, case.gain_known
     )
@@ -68,7 +68,7 @@ def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Fi
         said = f"the sensors weigh {sensor_masses:.3g} kg in all, the structure {deck:.3g} kg"
         if grams:
             said += (
-                f"; of a thousandth of that, Q against the model is {less:.2g}, as it is {Q:.2g}"
+                f"; with a thousandth of that, Q against the model is {less:.2g}, as given {Q:.2g}"
             )
         if grams or sensor_masses > deck:
             heaviest = max(m for _, m in case.sensor_masses)
@@ -125,14 +125,14 @@ def instead_of_effects(verdict: str, screening: Screening | None) -> tuple[str, 
     """Return doubts about a verdict without a cause, if the recording itself looks wrong."""
     if verdict != "not in catalogue" or screening is None or not screening.findings:
         return ()
-    return (f"{screening.sentence}: that may be what no effect explains",)
+    return (f"{screening.sentence}: this may be the unexplained part",)
 
 
 def at_fault(case: Case, screening: Screening, diagnosing: bool) -> DiagnosisResult:
     """Return the result for a recording that must be corrected first, without any fit."""
     note = (
-        "Nothing was fitted: physics that is found in a recording at fault may be the fault. Write "
-        "the repair, or measure again, and ask once more."
+        "Nothing was fitted: an effect found in a faulty recording may be the fault itself. "
+        "Correct the recording or measure again, and repeat the diagnosis."
     )
     command = "diagnose" if diagnosing else "calibrate"
     return DiagnosisResult(

@@ -36,13 +36,17 @@ def smallest_findings(
         If the model has no unit system or no shells, or the file is not a layout.
     """
     if not model.unit:
-        raise FileError(f"{model.source}: what a test finds needs the unit system (--units)")
+        raise FileError(f"{model.source}: smallest findings need the unit system (--units)")
     if not len(model.assembly.shells):
-        raise FileError(f"{model.source} has no shells, and what a layout finds is told of shells")
+        raise FileError(
+            f"{model.source} has no shells, and smallest findings are predicted for shells"
+        )
     progress("predicted evidence", 0.1)
     outputs, inputs = layout_places(model, layout)
     if inputs.base.any():
-        raise FileError(f"{layout}: what a force finds is foretold, not what a moving base does")
+        raise FileError(
+            f"{layout}: smallest findings are predicted for a force, not for a moving base"
+        )
     asked = Question(
         model.assembly, outputs, inputs, band=band,
         sensor_masses=sensor_masses(model.assembly, outputs, inputs),

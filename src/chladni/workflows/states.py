@@ -108,5 +108,8 @@ def _said(
     """Add a note on the shared parameters to the result."""
     rest = ", ".join(repr(n) for n in names if n != name)
     what = ", ".join(p.where for p in shared) or "nothing"
-    note = f"state {name!r} was fitted together with {rest}: {what} shared, an effect is its own"
+    note = (
+        f"state {name!r} was fitted together with {rest}: {what} shared, effects belong to one "
+        "state"
+    )
     return replace(result, notes=(note, *result.notes))

@@ -52,7 +52,7 @@ def _refuse_by_mass(case: Case) -> None:
     elif 1 / FAR <= 1e3 * mass / weighed <= FAR:
         advice = f"[test] mass is in kg: write {weighed / 1e3:.4g} if {weighed:.4g} g were weighed"
     else:
-        advice = "in no unit system it weighs right; look at its densities and at [test] mass"
+        advice = "its weight is right in no unit system; check its densities and [test] mass"
     raise FileError(
         f"{case.path}: {case.deck.path.name} read in {case.units.name} weighs {mass:.4g} kg, the "
         f"article {weighed:.4g} kg: {advice}"

@@ -51,7 +51,7 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
     pairs = _materials(made, read_in)
     if not pairs:
         raise FileError(
-            f"{source}: no material has a modulus and a density to tell the unit system by; give "
+            f"{source}: no material has a modulus and a density that show the unit system; give "
             f"--units, one of {', '.join(UNITS)}"
         )
     size, mass = _size_and_mass(made, read_in)
@@ -61,7 +61,7 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
     if best > NEAR_DECADES:
         raise FileError(
             f"{source}: E = {E:g} and rho = {rho:g} are usual in no unit system "
-            f"({', '.join(UNITS)}); look at the materials, or give --units"
+            f"({', '.join(UNITS)}); check the materials, or give --units"
         )
     return UnitGuess(units, second > best + CLEAR, _why(pairs[0], size, mass, units))
 
@@ -81,13 +81,14 @@ def doubt_of_units(made: Assembly, source: str, units: Units) -> str:
         if _off_materials(pairs, better) <= NEAR_DECADES:
             raise FileError(
                 f"{source}: give --units {better.name}, not {units.name}: "
-                f"{_why(pairs[0], size, mass, better)}; {seen}, and its materials are no known ones"
+                f"{_why(pairs[0], size, mass, better)}; {seen}, and its materials are not known "
+                "ones"
             )
         E, rho = pairs[0]
         first = _moduli(E * units.stress, rho * units.density)
-        return f"{source}: its materials are known ones in no unit system; {seen}, with {first}"
+        return f"{source}: no unit system makes its materials known ones; {seen}, with {first}"
     if _odd(size, mass, units):
-        return f"{source}: {seen}: look at --units and at the cards"
+        return f"{source}: {seen}: check --units and the cards"
     return ""
 
 

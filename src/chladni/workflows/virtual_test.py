@@ -151,7 +151,7 @@ def _known(settings: BenchSettings) -> None:
         raise LabelError(f"{settings.articles} articles; there may be 1 to {len(NAMES)}")
     if not settings.levels or min(settings.levels) <= 0:
         given = ", ".join(f"{x:g}" for x in settings.levels)
-        raise LabelError(f"levels {given} are to be factors above zero")
+        raise LabelError(f"levels {given} must be factors above zero")
 
 
 def _places_known(case: Case, settings: BenchSettings) -> None:
@@ -162,7 +162,7 @@ def _places_known(case: Case, settings: BenchSettings) -> None:
                 "chladni plan writes it"
             )
     if case.outputs.base.any():
-        raise FileError(f"{case.path}: the base is what drives a shaker table, no sensor of it")
+        raise FileError(f"{case.path}: the base is the input of a shaker table, not a sensor")
     if not case.inputs.base[0]:
         return
     amiss = {
@@ -170,7 +170,7 @@ def _places_known(case: Case, settings: BenchSettings) -> None:
         "--local": bool(settings.local), "--time": settings.keep_time,
     }  # fmt: skip
     if words := [word for word, asked in amiss.items() if asked]:
-        raise FileError(f"{case.path} moves its supports by a shaker table, on which there is no "
+        raise FileError(f"{case.path} moves its supports by a shaker table, which has no "
                         f"{', '.join(words)}")  # fmt: skip
 
 
@@ -230,7 +230,7 @@ def _refuse_long(settings: BenchSettings, band: tuple[float, float], channels: i
         raise FileError(
             f"{settings.averages} blocks of {1 / settings.resolution:g} s at {rate:g} samples a "
             f"second on {channels} channels are {gigabytes:.3g} GB of time data, more than the "
-            f"{limit:g} GB that are kept: take lines of --resolution "
+            f"limit of {limit:g} GB: use lines of --resolution "
             f"{settings.resolution * gigabytes / limit:.2g} Hz or a band below {band[1]:g} Hz; "
             f"{OVERRIDE}={int(gigabytes) + 1} in the environment allows it"
         )
@@ -240,9 +240,9 @@ def _refuse_few(lines: int, band: tuple[float, float]) -> None:
     """Refuse a recording with too few lines for identification."""
     if lines < LEAST_LINES:
         raise FileError(
-            f"{lines} lines between {band[0]:g} and {band[1]:g} Hz are too few to identify from, "
-            f"which takes {LEAST_LINES}: widen the band, or take lines closer together "
-            "(--resolution, of bursts, multisines and blows)"
+            f"{lines} lines between {band[0]:g} and {band[1]:g} Hz are too few for "
+            f"identification, which needs {LEAST_LINES}: widen the band, or use closer lines "
+            "(--resolution, for bursts, multisines and blows)"
         )
 
 
@@ -285,9 +285,9 @@ def _article(
     held = Article(made, case.assembly, _grids(case, case.outputs), hangers, gains, drive=drive)
     for name in settings.hide:
         if name == "shaker-restraint" and drive is None:
-            raise FileError(f"{case.path} moves its supports, so that no stinger can hold")
+            raise FileError(f"{case.path} moves its supports, so it has no stinger")
         if name == "suspension" and not len(hangers):
-            raise FileError(f"{case.path} names no hangers, so that no cord can be too stiff")
+            raise FileError(f"{case.path} names no hangers, so it has no cords")
         held = family(name).conceal(held, rng)
         truth["effects"][name] = held.truth  # type: ignore[index]
     places = true_places(held.assembly, case.outputs, case.inputs, setup.accelerometer, rng)
@@ -341,13 +341,15 @@ def _notes(
     out = [*case.said("bench")]
     table, unit = bool(case.inputs.base[0]), level_unit(case.inputs)
     if table and case.setup.hangers:
-        out.append("A table moves the supports: the article stands on it, cords are not used.")
+        out.append("A shaker table moves the supports; cords are not used.")
     if not table and not case.setup.hangers and not article.elastic.all():
-        out.append("The case names no hangers: the articles hang on nothing but swing at 0.7 Hz.")
+        out.append(
+            "The case names no hangers: the articles have no cords but rigid motions at 0.7 Hz."
+        )
     if not settings.finer and len(case.assembly.shells):
         out.append(
-            "The articles have the deck's own mesh and with it its error, which a real one has not "
-            "and a diagnosis allows for: --finer is the truer test."
+            "The articles have the mesh of the deck and so its mesh error. A real article has no "
+            "mesh error, and a diagnosis allows for one: use --finer for a more realistic test."
         )
     for r in recordings:
         out += [f"{r.article}, level {r.test.level:.3g} {unit}: {said}" for said in r.notes]

@@ -125,7 +125,7 @@ def _wanted(made: Assembly, field: str, value: float | Mapping[str, float]) -> d
         out = {made.part(name): float(v) for name, v in value.items()}
         for k in out:
             if field not in fields_of(made.parts[k]):
-                have = ", ".join(fields_of(made.parts[k])) or "nothing that can be changed"
+                have = ", ".join(fields_of(made.parts[k])) or "no field that can be changed"
                 raise LabelError(f"part {made.parts[k].name} has no {field}; it has {have}")
     else:
         having = [k for k, part in enumerate(made.parts) if field in fields_of(part)]
