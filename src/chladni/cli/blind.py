@@ -57,9 +57,9 @@ def make(
     from chladni_evidence.evidence_sets import PURPOSES, chosen, seed_range
 
     by, why = _one_of("--recorder", recorder, RECORDERS), _one_of("--purpose", purpose, PURPOSES)
-    asked = chosen(set_name, seed_range(seeds), _names(kinds), _names(structures))
+    orders = chosen(set_name, seed_range(seeds), _names(kinds), _names(structures))
     with _kept():
-        make([replace(o, recorder=by) for o in asked], out, why, set_name, workers, say)
+        make([replace(o, recorder=by) for o in orders], out, why, set_name, workers, say)
 
 
 def run(

@@ -141,7 +141,7 @@ def explained(
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
     made = searched(case, diagnosing, progress, known)
     question, prepared, screening = made.question, made.prepared, made.screening
-    found, distrust = _judged(made, diagnosing)
+    found, distrust = _apply_held_out(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; a fit to it distorts the model")
     return Explained(case, question, prepared, found, distrust, screening)
@@ -172,7 +172,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     return replace(result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen)
 
 
-def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
+def _apply_held_out(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
     if not diagnosing:  # nothing is to be named
