@@ -250,7 +250,7 @@ def test_a_set_that_pays_in_part_is_asked_where_the_leader_leaves_too_much():
 def test_what_may_stand_in_the_place_of_one_is_one_of_several():
     alternatives = (
         (),
-        (AlternativeRow("adhesive-stiffness", 4.0, "E of 300 MPa is that of no sealant"),),
+        (AlternativeRow("adhesive-stiffness", 4.0, "E of 300 MPa is too high for a sealant"),),
     )
     made = table(*SINGLES, sets=[together("set 0", PAID, TWO, alternatives=alternatives)])
     assert decision(made).one_of == ("point-mass", "adhesive-stiffness")
@@ -260,7 +260,7 @@ def test_an_effect_that_pays_a_part_is_perhaps_there_as_well():
     other = replace(together("set 0", PART, TWO)[0], members=("crack", "suspension"))
     sets = [(other, (FOR, FOR), together("set 0", PART, TWO)[2]), together("set 1", PAID, TWO)]
     steps = decision(table(*SINGLES, sets=sets)).steps
-    assert [(s.key, s.member) for s in steps if s.reason is R.PERHAPS_BESIDE] == [("set 0", 1)]
+    assert [(s.key, s.member) for s in steps if s.reason is R.PERHAPS_PRESENT] == [("set 0", 1)]
 
 
 @pytest.mark.parametrize(

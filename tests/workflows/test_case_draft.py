@@ -81,7 +81,7 @@ def test_units_that_no_material_bears_out_are_told(deck):
 
 
 def ways(made):
-    return {d.label: d.way for d in made.dofs}
+    return {d.label: d.matched_by for d in made.dofs}
 
 
 def test_by_number_where_the_file_has_no_places(deck, frf, tmp_path):
@@ -107,7 +107,7 @@ def test_by_place_where_the_lab_has_numbers_of_its_own(deck, frf, places, tmp_pa
     made = draft(deck, [tmp_path / "a.uff"])
     assert set(ways(made).values()) == {"place"}
     assert [d.grid for d in made.dofs] == [3, 8, 17, 30, 1]
-    assert any("numbers do not" in n for n in made.notes) == (shift == 2)
+    assert any("numbers are not" in n for n in made.notes) == (shift == 2)
 
 
 def test_places_in_millimetres_are_seen_to_be(deck, frf, places, tmp_path):
@@ -126,7 +126,7 @@ def test_by_the_nearest_with_its_distance(deck, frf, places, tmp_path):
     assert set(ways(made).values()) == {"nearest"}
     inside = made.dofs[0]  # the others may lie beyond the plate's edge
     assert inside.distance == pytest.approx(0.02, rel=1e-3)
-    assert any("places are more than 10 mm off the mesh" in n for n in made.notes)
+    assert any("places are more than 10 mm from the mesh" in n for n in made.notes)
 
 
 def test_what_is_missing_is_named_with_its_remedy(deck, frf, places, tmp_path):
@@ -156,7 +156,7 @@ def test_what_it_writes_is_the_case_that_was_meant(structure, frf, tmp_path, uni
     out = tmp_path / "deep" / "case"
     done = call("init", tmp_path / "plate.bdf", tmp_path / "a.uff", "--mass", 0.518, "--out", out)
     assert done.exit_code == 0, done.output
-    assert "it can be read" in done.output
+    assert "the case is complete" in done.output
     case = chladni.load_case(out)
     assert case.units.name == units
     assert case.setup.mass == 0.518

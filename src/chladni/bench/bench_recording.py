@@ -52,7 +52,7 @@ class BenchTest:
 
 @dataclass(frozen=True, eq=False)
 class BenchRecording:
-    """What comes out of a test.
+    """Result of a test.
 
     Attributes
     ----------
@@ -111,8 +111,8 @@ def channels_of(rig: BenchRig, rng: np.random.Generator) -> Channels:
 def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> float:
     """The level [N] at which the strongest channel takes about a quarter of its range.
 
-    Of pink noise by the rms of the response while it lasts, of a sine by its largest amplitude, of
-    a blow by the sum of the modes' amplitudes.
+    Pink noise counts by the rms of the response during the burst, a sine by its largest amplitude,
+    a blow by the sum of the modal amplitudes.
     """
     kind, front = rig.setup.accelerometer, rig.setup.front_end
     f = np.geomspace(band[0], band[1], 4000)
@@ -150,7 +150,7 @@ def record(
     """
     driven = rig.article.on_table or rig.setup.shaker is not None
     if (test.excitation == "hammer") == driven:
-        raise ModelError("a hammer hits an article without a shaker, anything else needs one")
+        raise ModelError("a hammer test has no shaker; all other tests need one")
     rate = sampling_rate(test.band[1])
     channels = channels or channels_of(rig, rng)
     run = PhysicalRun(rig, rate, test)

@@ -1,4 +1,4 @@
-"""What labels say of directions, held against what the table of sensors says."""
+"""Directions in labels, compared with the table of sensors."""
 
 import re
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
 
-_WAY = re.compile(r"[+-]?[XYZ]|N", re.IGNORECASE)  # of a label, behind its last colon
+_DIRECTION = re.compile(r"[+-]?[XYZ]|N", re.IGNORECASE)  # of a label, behind its last colon
 _SAME = 0.7  # cosine: directions farther apart are two
 
 
@@ -27,24 +27,26 @@ def ways_said(made: Assembly, found: MeasuredDofs, tabled: Iterable[str]) -> lis
     own = {
         k: direction(label, label)
         for k, label in enumerate(found.labels)
-        if label in known and ":" in label and _WAY.fullmatch(label.rpartition(":")[2].strip())
+        if label in known
+        and ":" in label
+        and _DIRECTION.fullmatch(label.rpartition(":")[2].strip())
     }
-    across = any(way is None for way in own.values())
+    across = any(axis is None for axis in own.values())
     normal = surface_normals(made, found) if across else np.zeros_like(found.directions)
     other = [
-        found.labels[k] for k, way in own.items() if _apart(way, found.directions[k], normal[k])
+        found.labels[k] for k, axis in own.items() if _apart(axis, found.directions[k], normal[k])
     ]
     if not other:
         return []
     is_ = "says" if len(other) == 1 else "say"
     return [
-        f"{named(other)} {is_} another direction than the table of sensors: the table counts; "
-        "mend it, or the label"
+        f"{named(other)} {is_} another direction than the table of sensors: the table is used; "
+        "correct the table or the label"
     ]
 
 
 def _apart(own: np.ndarray | None, given: np.ndarray, normal: np.ndarray) -> bool:
-    """Whether a label says another direction; None is the normal, either side of it."""
+    """True if a label has another direction; None is the normal, on either side."""
     if own is None:
         return bool(normal.any() and np.abs(normal @ given) < _SAME)
     return bool(own @ given < _SAME)

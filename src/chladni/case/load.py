@@ -1,7 +1,7 @@
 """A case: one ``case.toml`` that names the deck, the recordings and what to do with them.
 
 Everything is resolved here once: files are read, labels become grids or places on the nearest
-shell, bands are compared with the data. What does not fit is refused in one sentence.
+shell, bands are compared with the data. Contradictions are refused in one sentence.
 """
 
 import os
@@ -41,7 +41,7 @@ _MASS_SD = 0.002  # of the mass, where the user gives none
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What the user asked for, resolved.
+    """The resolved request of the user.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Case:
         out = [*self.notes, *unread(self.given, command)]
         if self.sensor_masses and command in key("sensors.csv", "mass").used:
             said = weight(self.assembly, self.outputs, self.inputs, "sensors.csv")
-            out.append(f"{said}, at {len(self.sensor_masses)} grids; the weighed mass is without.")
+            out.append(f"{said}, at {len(self.sensor_masses)} grids; weighed mass excludes them.")
         return out
 
     def lines(self, frequency: np.ndarray) -> np.ndarray:
@@ -186,7 +186,7 @@ def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
     notes += notes_of(recordings, "use" in test)
     notes += remarks(deck, STRUCTURAL)
     if allow:
-        notes.append(f"passed over as [model] allow says: {named(allow, 20)}")
+        notes.append(f"ignored by [model] allow: {named(allow, 20)}")
     if "outside" in model and outside:
         notes.append(OUTSIDE)
     band, exclude = bands(keys, recordings, notes)
@@ -226,10 +226,10 @@ def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
 def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
     """A file the case names, in its folder unless others are allowed."""
     if "\0" in name:
-        raise FileError(f"{section.at(key)} = {name[:60]!r} is no name of a file")
+        raise FileError(f"{section.at(key)} = {name[:60]!r} is not a file name")
     path = section.file.parent / name
-    way = Path(os.path.normpath(name))
-    if not outside and (way.is_absolute() or ".." in way.parts):
+    normal_path = Path(os.path.normpath(name))
+    if not outside and (normal_path.is_absolute() or ".." in normal_path.parts):
         raise FileError(
             f"{section.at(key)} = {name!r} leads out of the folder of the case; copy the file "
             "into it, or write outside = true under [model]"
@@ -252,7 +252,7 @@ def _thickness(
     if name is None:
         for word, value in (("thickness_units", own), ("thickness_place", place)):
             if value is not None:
-                raise FileError(f"{model.at(word)} is of a file of thickness, but none is named")
+                raise FileError(f"{model.at(word)} needs a file of thickness, but none is named")
         return made, []
     path = _file(model, "thickness", name, outside)
     try:
@@ -269,7 +269,7 @@ def _recordings(
     """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
     if (factor := test.number("factor")) == 0:
-        raise FileError(f"{test.at('factor')} = 0 leaves nothing of the recording")
+        raise FileError(f"{test.at('factor')} = 0 removes the recording")
     how = test.text("frequency_unit", among=tuple(HERTZ)) or "Hz", test.flag("conjugated")
     listed = [(test, "recordings", name) for name in test.list("recordings", str) or []]
     named = {name for _, _, name in listed}
@@ -310,8 +310,8 @@ def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
         if set(ours) != set(theirs):
             only = sorted(set(ours) ^ set(theirs))
             raise FileError(
-                f"{test.at('recordings')}: {first.name} and {other.name} disagree on {word}: "
-                f"{named(only)} in one of them only"
+                f"{test.at('recordings')}: {first.name} and {other.name} disagree on {word}: only "
+                f"one of them has {named(only)}"
             )
     if a.quantity != b.quantity:
         raise FileError(
@@ -331,7 +331,7 @@ def _setup(
     mass = test.number("mass", low=1e-9)
     mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0), high=mass or 1e300)
     if mass is None and mass_sd is not None:
-        raise FileError(f"{test.at('mass_sd')} says how far a mass is known, but there is no mass")
+        raise FileError(f"{test.at('mass_sd')} needs a mass, but [test] has none")
     hangers = test.list("hangers", int) or []
     for grid in hangers:
         grid_row(made, grid, test.at("hangers"))
@@ -371,7 +371,7 @@ def _base_and_quantity(
         due = (
             "its input must be base:+X, +Y or +Z"
             if not base.any()
-            else ('what a moving base causes is quantity = "transmissibility"')
+            else ('the quantity of a moving base is quantity = "transmissibility"')
         )
         raise FileError(
             f"{test.at('quantity')}: {recordings[0].name} is {quantity} from "

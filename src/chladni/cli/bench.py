@@ -91,7 +91,7 @@ def run(
 ) -> None:
     """Test a structure on the virtual bench: articles, shaker, sensors, front end, recordings.
 
-    It leaves a case (--out/case) that every other command takes, and the sealed truth beside it.
+    It writes a case (--out/case) that every other command accepts, and next to it the sealed truth.
     """
     settings = BenchSettings(
         excitation=cast(Kind, excitation),
@@ -176,7 +176,7 @@ def _case(
         raise FileError(f"no file {sensors}{similar_names(sensors)}")
     elif driven:
         write_text(table, with_input(sensors, driven))
-    else:  # as it is: what is wrong in it is told where it is read
+    else:  # unchanged: its reader reports errors
         table = sensors.resolve()
     write_text(
         scratch / "case.toml",

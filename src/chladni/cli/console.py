@@ -1,4 +1,4 @@
-"""What a command says, to the terminal and if asked to a log; a reader may leave at any time."""
+"""Output of a command to the terminal and, on request, to a log; its reader may close early."""
 
 import os
 import shlex
@@ -27,7 +27,7 @@ AGAIN = 60.0  # and how often from then on
 
 @dataclass
 class Console:
-    """Where lines go beside standard output.
+    """Further targets of lines in addition to standard output.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ def watched() -> Iterator[Progress]:
     stage = [("at work", 0.0)]
     one, done = console(), threading.Event()
 
-    def told(what: str, fraction: float) -> None:
+    def report_progress(what: str, fraction: float) -> None:
         if what != stage[0][0]:
             one.aside(what)
         stage[0] = (what, fraction)
@@ -181,6 +181,6 @@ def watched() -> Iterator[Progress]:
         if not sys.stderr.isatty() and not one.verbose:
             threading.Thread(target=speak, daemon=True).start()
         try:
-            yield told
+            yield report_progress
         finally:
             done.set()

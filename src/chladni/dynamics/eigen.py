@@ -27,7 +27,7 @@ _ORTHONORMAL = 1e-8
 _RESIDUAL = 1e-5
 _LOOSE = 1e-6  # largest Ritz error of a returned mode (the error of frequencies is its square)
 _SHARP_SHARE = 1e-6  # of -1/σ: θ that one shift gives to ten digits
-_TOLD = 1e-13  # of it: θ below this are rounding
+_ROUNDING_OF_THETA = 1e-13  # of it: θ below this are rounding
 _FIRM = 1e-6  # of the median K_ii/M_ii: first shift of small systems
 _ROUNDING = 1e-12  # of the largest K_ii/M_ii: λ of a rigid motion due to rounding of K
 _EXTREME = 1e-2  # of the median K_ii/M_ii: upper limit of λ that counts as rounding
@@ -116,8 +116,8 @@ class _Problem:
         except NotDefinite as error:
             at = label(*self.dofs[self.fronts.order[error.row]])
             raise ModelError(
-                f"K - σM is not positive definite at σ = {sigma:.2e} (seen at {at}): "
-                "a part hangs on nothing, or a stiffness is negative"
+                f"K - σM is not positive definite at σ = {sigma:.2e} (seen at {at}): a part is "
+                "not connected, or a stiffness is negative"
             ) from error
 
     def below(self, s: float) -> int:
@@ -191,7 +191,7 @@ def _small(
         except LinAlgError as error:
             fault = error
     else:
-        raise ModelError("K - σM is not positive definite: a part hangs on nothing") from fault
+        raise ModelError("K - σM is not positive definite: a part is not connected") from fault
     if len(lam) and lam[0] < -max(_GUESS * scale.typical, scale.rounding):
         raise ModelError(f"a stiffness is negative: the lowest λ is {lam[0]:.2e} rad²/s²")
     return lam, phi
@@ -236,7 +236,7 @@ def _by_shifts(K: np.ndarray, M: np.ndarray, sigma: float, count: int, limit: fl
         sharp = int(np.sum(theta > _SHARP_SHARE))
         phi = _orthonormal(np.hstack([phi, X[:, :sharp] / np.sqrt(theta[:sharp])]), M)
         lam = np.r_[lam, sigma - sigma / theta[:sharp]]
-        sigma *= 1e-3 / max([_TOLD, *theta[sharp : sharp + 1]])
+        sigma *= 1e-3 / max([_ROUNDING_OF_THETA, *theta[sharp : sharp + 1]])
     return lam, phi
 
 
@@ -317,8 +317,8 @@ def _heaviest(problem: _Problem) -> str:
     d = np.where(problem.dofs[:, 1] <= 3, problem.M.diagonal(), 0.0)
     k, usual = int(np.argmax(d)), np.median(d[d > 0]) if np.any(d > 0) else np.inf
     return (
-        f"is a mass or a stiffness out of all proportion? {label(*problem.dofs[k])} has "
-        f"{d[k] / usual:.2g} times the usual mass"
+        f"a mass or a stiffness may be wrong: {label(*problem.dofs[k])} has {d[k] / usual:.2g} "
+        "times the usual mass"
     )
 
 

@@ -43,8 +43,8 @@ def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     gap, scale = np.abs(K @ q - f).max(initial=0), np.abs(f).max(initial=0)
     if not gap <= 1e-6 * scale:
         raise ModelError(
-            f"the structure can move freely, hold it by supports: of {scale:.1e} N {gap:.1e} N "
-            f"find no resistance"
+            f"the structure can move freely, hold it by supports: {gap:.1e} N of {scale:.1e} N "
+            "meet no resistance"
         )
     return q
 
@@ -188,8 +188,8 @@ def _at(built: Structure, dofs: np.ndarray) -> np.ndarray:
     if np.any(missing := at < 0):
         point, component = built.assembly.ids[dofs[missing][0, 0]], dofs[missing][0, 1]
         raise LabelError(
-            f"{point}:+{COMPONENTS[component - 1]} cannot be moved: it depends on other dofs, "
-            f"or nothing stiff is there"
+            f"{point}:+{COMPONENTS[component - 1]} cannot be moved: it depends on other dofs, or "
+            "has no stiffness"
         )
     return at
 
@@ -242,9 +242,9 @@ def base_response(
     s = 2j * np.pi * np.asarray(frequency, dtype=float)
     phi_in = (built.T.T @ load).T @ modal.shapes
     H = transfer(modal, pick @ modal.shapes, phi_in, s, residual=residual)
-    carried = motion_at(built.assembly, dofs, rigid)
+    rigid_motion = motion_at(built.assembly, dofs, rigid)
     outputs = tuple(f"{p}:+{COMPONENTS[c - 1]}" for p, c in np.asarray(dofs).tolist())
-    values = carried[None] + (s**2)[:, None, None] * H
+    values = rigid_motion[None] + (s**2)[:, None, None] * H
     return FRF(
         values,
         np.asarray(frequency),

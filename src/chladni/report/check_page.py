@@ -40,20 +40,18 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
 
 def in_words(found: CaseCheck) -> PageParts:
     """The page without its picture."""
-    looks = [
-        f"{'Fault: ' if f.fault else ''}{f.text}. What to do: {f.remedy}" for f in found.findings
-    ]
+    looks = [f"{'Fault: ' if f.fault else ''}{f.text}. Remedy: {f.remedy}" for f in found.findings]
     modes = ", ".join(number(f) for f in found.frequency)
     facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
     sections = [
         Section("Possible errors", [Items(looks)] if looks else []),
         Section("Data and settings in use", [Facts(facts)]),
-        *(Section(f"For {who}", [Items(said)]) for who, said in _told(found.unused)),
+        *(Section(f"For {who}", [Items(said)]) for who, said in _unused_words(found.unused)),
     ]
     return PageParts(_lead(found), sections)
 
 
-def _told(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
+def _unused_words(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
     """(commands, sentences): what is said to the same commands together, and once.
 
     >>> _told({"calibrate": ("a", "b"), "diagnose": ("a",), "study": ("b",)})

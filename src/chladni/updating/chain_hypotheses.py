@@ -148,7 +148,7 @@ def smoothed(
         some, _weights(f, some), log_test - level, level,
         outputs.rows(built) @ modes.shapes, inputs.loads(built) @ modes.shapes,
         np.where(modes.frequency < RIGID * f[-1], 0.0, omega),
-        outputs.carried_by(inputs), DERIVATIVES[frf.quantity],
+        outputs.moved_with_base(inputs), DERIVATIVES[frf.quantity],
     )  # fmt: skip
 
 
@@ -199,7 +199,7 @@ def chain_faults(
 def without_modes(frf: FRF, lines: np.ndarray) -> float:
     """Q of the recording against a power of frequency, another one for each channel.
 
-    Below all modes a structure is rigid, and no reading can be told from another.
+    Below all modes a structure is rigid, and interpretations cannot be distinguished.
     """
     k = lines & (frf.frequency > 0)
     H, f = frf.values[k].reshape(k.sum(), -1), frf.frequency[k]

@@ -1,11 +1,11 @@
-"""From a recording to the name of what the model left out.
+"""From a recording to the name of the missing physics.
 
-1. null: calibration parameters and scatter alone, from several starts;
-2. scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0;
-3. fits: the best places of every family, jointly with the calibration parameters and the scatter;
-4. evidence: Laplace, with 2 ln of the number of places tried; leaders restart the null;
-5. verdict;
-6. where an effect is named, or nothing fits: sets of several effects (``several``).
+1. Null: calibration parameters and scatter alone, from several starts.
+2. Scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0.
+3. Fits: the best places of every family, jointly with the calibration parameters and the scatter.
+4. Evidence: Laplace, with 2 ln of the number of places tried. Leaders restart the null.
+5. Verdict.
+6. Sets of several effects (``several``), if an effect is named or nothing fits.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +28,7 @@ from .discrepancy import MEDIAN
 from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted, wide_start
 from .implausible_values import implausible_values
 from .likelihood import Responses
-from .local_damping_test import heard_of_damping
+from .local_damping_test import damping_test_along_effect
 from .pole_data import Poles
 from .reduced_model import evaluate
 from .rows_of_fits import row_of, row_of_null
@@ -102,7 +102,7 @@ class Diagnosis:
 
     @property
     def unexplained(self) -> bool:
-        """Whether neither what is answered nor calibration alone explains the recording."""
+        """True if neither the answer nor calibration alone explains the recording."""
         return self.adequacy is not None and not self.adequacy.passes
 
     @property
@@ -112,13 +112,13 @@ class Diagnosis:
         return self.due_of(first)
 
     def due_of(self, hypothesis: HypothesisFit) -> float:
-        """The same of any of them."""
+        """Required gain of a hypothesis."""
         due = threshold(self.null.data, len(self.hypotheses))
         return min(due, RULES.expected_due) if hypothesis.effect.expected else due
 
     @property
     def as_the_null(self) -> bool:
-        """Whether the calibration has its numbers as the null found them."""
+        """True if the calibration keeps the numbers of the null."""
         plain, null = self.plain.fit, self.null.fit
         shared = [e for e in plain.effects if e in null.effects]
         return all(np.array_equal(plain.of(e), null.of(e)) for e in shared)
@@ -146,7 +146,7 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     found = _names_alone(problem, found, whole)
     del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
     give_back_freed_memory()
-    found = _searched_beside(problem, found, within(progress, 0.8, 1.0))
+    found = _with_sets_of_effects(problem, found, within(progress, 0.8, 1.0))
     return _names_alone(problem, found, 1)
 
 
@@ -163,8 +163,8 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
     )
     tests = dict(found.tests)
     while isinstance(said := called(table), Wanted):
-        asked = found.null if said.key == NULL else found.hypotheses[0]
-        chances = fit_test(problem, asked)
+        tested = found.null if said.key == NULL else found.hypotheses[0]
+        chances = fit_test(problem, tested)
         table = table.having(chances.of(table.rows[said.key]))
         tests |= {said.key: chances.test} if chances.test else {}
     return replace(found, verdict=said.verdict, table=table, tests=tests)
@@ -176,7 +176,9 @@ def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diag
     return replace(found, hypotheses=(*found.hypotheses[:whole], *behind))
 
 
-def _searched_beside(problem: UpdatingProblem, alone: Diagnosis, progress: Progress) -> Diagnosis:
+def _with_sets_of_effects(
+    problem: UpdatingProblem, alone: Diagnosis, progress: Progress
+) -> Diagnosis:
     """The tested diagnosis with the sets of several effects that explain more than its leader.
 
     Natural frequencies alone are too few numbers to bear two names.
@@ -219,7 +221,7 @@ def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
     )  # fmt: skip
     if fits is None:
         return FitChances(None, np.nan, np.nan)
-    both = heard_of_damping(fits, winner, damping)
+    both = damping_test_along_effect(fits, winner, damping)
     return FitChances(both, fits.p, both.p if both.p != fits.p else np.nan)
 
 
@@ -256,7 +258,7 @@ def threshold(data: object, tried: int | None = None) -> float:
 def best_base_fit(
     problem: UpdatingProblem, effects: Sequence[Effect], starts: list[np.ndarray]
 ) -> HypothesisFit:
-    """Best fit of these effects alone over several starts; one that is no structure is none."""
+    """Best fit of these effects alone over several starts; invalid structures do not count."""
     model, fits = problem.reduced.model, []
     for k, x in enumerate(starts):
         try:

@@ -4,10 +4,10 @@ Two tests compare an effect with calibration alone.  Both sides include the lear
 
 - the data held out: p(held | fitted) = p(held, fitted) / p(fitted), a ratio of evidences about the
   existing fit;
-- folds of the fitted data, one sensor or one block of lines at a time, predicted from the rest. For
-  residuals r of covariance C, r_b given all others has the precision P = (C⁻¹)_bb and the mean
-  r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12).  The parameters
-  are linear about their fit.
+- folds of the fitted data, one sensor or one block of lines at a time, predicted from the rest. Let
+  residuals r have the covariance C.  Given all others, r_b has the precision P = (C⁻¹)_bb and the
+  mean r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12).  The
+  parameters are linear about their fit.
 
 Data that are insensitive to the effect have equal predictions with and without it, so they do not
 count.
@@ -65,7 +65,7 @@ def held_out_evidence(
     null : without the effects that are tested
     about : the model whose state errors of form spread from; that of ``null`` unless it is given
     """
-    asked = [e for e in hypothesis.effects if e not in null.effects]
+    added = [e for e in hypothesis.effects if e not in null.effects]
     held = None
     if unseen.any():
         data = null.data.rebased(about or null.model)
@@ -80,8 +80,8 @@ def held_out_evidence(
         predictive(problem, hypothesis, folds) - predictive(problem, null, folds)
         for folds in (by_sensor, by_line)
     ]
-    faults = all(e.channels for e in asked)  # they change no other channel
-    sensors = None if asked and faults else gains[0]
+    faults = all(e.channels for e in added)  # they change no other channel
+    sensors = None if added and faults else gains[0]
     return HeldOutEvidence(held, sensors, gains[1])
 
 

@@ -114,7 +114,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
             identified=error,
-            direct=question.outputs.carried_by(question.inputs), sensors=wrong,
+            direct=question.outputs.moved_with_base(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.rebased(reduced.model))
     nuisance = nuisances(reduced, nominal, mesh)
@@ -158,8 +158,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     if spreads[1] is not None:
         floor = np.maximum(floor, spreads[1] ** 2)
-    borne = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
-    few = too_little(borne, int(data[0].use.any(axis=0).sum()))
+    supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
+    few = too_little(supporting, int(data[0].use.any(axis=0).sum()))
     return Prepared(
         problem, data[1], held, what, tuple(notes), nominal, floor, found, few, unseen=unseen,
         others=tuple(others), levels=studied,
@@ -355,9 +355,9 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
     found = [e for e in placed(where) if not names or set(e.parts) <= names]
     if not found:
         raise FileError(
-            f"{p.field} cannot be freed: deck and test do not define where it acts (all parts of "
-            "a material for orthotropic-material, [test] hangers for suspension, sensors on the "
-            "structure for sensor-mass, drive points, three at most, for shaker-restraint)"
+            f"{p.field} cannot be freed: deck and test do not define its place; "
+            "orthotropic-material needs all parts of a material, suspension [test] hangers, "
+            "sensor-mass sensors on the structure, shaker-restraint one to three drive points"
         )
     return freed_effect(found[0], p.name)
 

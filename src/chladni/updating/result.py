@@ -48,7 +48,7 @@ class Alternative:
 class Scores:
     """Q, mean |log10(H_model/H_test)|² over channels and lines, of one set of samples.
 
-    The first three are of decks as they are written, with nothing hidden beside them.
+    The first three belong to decks as they are written, without hidden terms.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Scores:
 
     @property
     def after(self) -> float | None:
-        """Of the updated deck; where nothing was sought, of the calibrated one."""
+        """Q of the updated deck; without a search, of the calibrated deck."""
         return self.calibrated if self.with_effect is None else self.with_effect
 
 
@@ -119,7 +119,7 @@ class Agreement:
 
 @dataclass(frozen=True)
 class CalibratedParameter:
-    """A calibration parameter that was fitted, with the values of the decks.
+    """A fitted calibration parameter, and its values in the decks.
 
     Attributes
     ----------

@@ -28,10 +28,10 @@ def as_written(
     for mesh and joints.  On a coarse plate with a concealed crack E went to 264 GPa for 210 without
     it, and to 212 with it.
     """
-    effects, start, (effect, *beside) = _kept(hypothesis)
+    effects, start, (effect, *others) = _kept(hypothesis)
     model = hypothesis.model
     found = fit(model, effects, hypothesis.data, mass_measurement, start).kept()
-    return HypothesisFit(effect, found, model, tuple(beside))
+    return HypothesisFit(effect, found, model, tuple(others))
 
 
 def as_foretold(
@@ -44,8 +44,8 @@ def as_foretold(
     compensate for them as far as two limits allow. They are fitted to the predicted responses with
     their priors and a standard deviation ``LEFT``, and all stay within their 95 % intervals. A
     number that the data exclude is no property of the structure. On the demo the held-out Q of the
-    deck is 0.0185 in this way, 0.0195 where numbers may leave their intervals and 0.0245 with the
-    numbers as found. :func:`as_written` serves natural frequencies and effects that change no
+    deck is 0.0185. It is 0.0195 if numbers may leave their intervals, and 0.0245 with the numbers
+    as found. Use :func:`as_written` for natural frequencies and for effects that change no
     response.
 
     Parameters
@@ -59,7 +59,7 @@ def as_foretold(
     state = evaluate(model, found.effects, found.x, False)
     foretold = whole.values * 10 ** whole.deviation(state)
     target = replace(whole, values=foretold, sigma_model=LEFT)
-    effects, x, (effect, *beside) = _kept(hypothesis)
+    effects, x, (effect, *others) = _kept(hypothesis)
     hidden = of_mesh(effects)
     bare = [_held(e, 0 * found.of(e)) if isinstance(e, MeshError) else e for e in effects]
     near = fit(model, bare, target, mass_measurement, np.where(hidden, 0.0, x))
@@ -67,7 +67,7 @@ def as_foretold(
     x = x + _share_within(sd, step := np.where(hidden, 0.0, near.x - x)) * step
     state = evaluate(model, effects, x, False)
     near = replace(near, effects=tuple(effects), x=x, state=state, data=data)
-    return HypothesisFit(effect, near.kept(), model, tuple(beside))
+    return HypothesisFit(effect, near.kept(), model, tuple(others))
 
 
 def _share_within(sd: np.ndarray, step: np.ndarray) -> float:

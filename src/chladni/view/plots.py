@@ -27,7 +27,7 @@ _STYLES: dict[str, dict[str, Any]] = {
     "model": {"color": AFTER, "lw": 1.3, "zorder": 4},
 }
 _WIDEST = 9.0  # inches of a row of bars: a page would shrink a wider one until it is unreadable
-_TOLD = 40  # most bars with a number; above that every second or third bar has one
+_MOST_LABELS = 40  # most bars with a number; above that every second or third bar has one
 _MORE = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 
 
@@ -127,8 +127,8 @@ def frequency_ladder(
             at + offset, 100 * (np.asarray(model, float) / test - 1), wide, color=colour, label=name
         )
     ax.axhline(0, color=TEST, lw=0.9)
-    told = at[:: 1 + len(test) // _TOLD]
-    ax.set_xticks(told, [f"{f:.4g}" for f in test[told]], rotation=60, fontsize=8)
+    labelled = at[:: 1 + len(test) // _MOST_LABELS]
+    ax.set_xticks(labelled, [f"{f:.4g}" for f in test[labelled]], rotation=60, fontsize=8)
     ax.set(xlabel="frequency of the test [Hz]", ylabel="model - test [%]")
     ax.grid(axis="y", lw=0.3, alpha=0.6)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, **LEGEND)
@@ -173,7 +173,7 @@ def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | N
         ax.annotate(f" {-value:.4g}" if value else " best", (value, k), va="center", fontsize=8)
     ax.set_xscale("symlog", linthresh=5)
     ax.invert_yaxis()
-    ax.set_xlabel("log evidence below the best (longer is less likely)")
+    ax.set_xlabel("log evidence below the best (a longer bar is less likely)")
     ax.set_xlim(0, max(10.0, 4 * float(below.max())))
     ax.spines[["top", "right"]].set_visible(False)
     return save(figure, path)
@@ -193,7 +193,7 @@ def fit_test(path: Path | str, rows: Mapping[str, tuple[float, float, float, flo
         ax.barh(k, high - low, left=low, color="#aab4bf", height=0.5)
         ax.plot(1.0, k, "|", color="#555555", ms=12)
         ax.plot(value, k, "o", color=AFTER if value <= high else BEFORE, ms=7, clip_on=False)
-    ax.set(xscale="log", xlabel="over the median of draws of the model itself [-]")
+    ax.set(xscale="log", xlabel="relative to the median of draws from the model [-]")
     ax.set_xlim(left=edge)
     ax.set_yticks(range(len(rows)), list(rows))
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
