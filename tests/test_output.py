@@ -116,7 +116,7 @@ def test_what_is_in_the_way_stays_and_nothing_is_lost(tmp_path, blocked):
     else:
         write_text(out / blocked, "mine")
     before = {name: (out / name).read_text() for name in listed(out)}
-    with pytest.raises(FileError, match=r"c\.txt is there already.*results are in .*results-1"):
+    with pytest.raises(FileError, match=r"c\.txt exists and no .*results are in .*results-1"):
         wrote(out, "a.json", "c.txt", "d.txt")
     kept = out / "results-1"
     assert {"a.json", "c.txt", "d.txt"} <= {p.name for p in kept.iterdir()}
@@ -126,7 +126,7 @@ def test_what_is_in_the_way_stays_and_nothing_is_lost(tmp_path, blocked):
 def test_a_file_the_run_reads_is_never_replaced(tmp_path):
     """Not even where an earlier run of the command wrote it."""
     wrote(tmp_path, "updated.bdf")
-    with pytest.raises(FileError, match=r"updated\.bdf is a file this run reads"):
+    with pytest.raises(FileError, match=r"updated\.bdf is an input file of this run"):
         wrote(tmp_path, "updated.bdf", "b.json", inputs=[tmp_path / "updated.bdf"])
     assert (tmp_path / "results-1" / "b.json").exists()
 
@@ -148,7 +148,7 @@ def test_a_move_that_fails_half_way_is_taken_back(tmp_path, monkeypatch):
     (tmp_path / "a.json").write_text("of the first run")
     with monkeypatch.context() as patch:
         breaking_at(patch, tmp_path, OSError(28, "No space left on device"))
-        with pytest.raises(FileError, match="No space left on device; nothing was replaced"):
+        with pytest.raises(FileError, match="No space left on device; no file was replaced"):
             wrote(tmp_path, "a.json", "b.json")
     assert (tmp_path / "a.json").read_text() == "of the first run"
     assert (tmp_path / "b.json").exists()
@@ -170,7 +170,7 @@ def test_a_move_that_is_interrupted_is_taken_back(tmp_path, monkeypatch):
 
 def test_a_disk_that_is_full_is_said(tmp_path):
     with (
-        pytest.raises(FileError, match="No space left on device; nothing was written"),
+        pytest.raises(FileError, match="No space left on device; no file was written"),
         run_folder(tmp_path, "modes"),
     ):
         raise OSError(ENOSPC, "No space left on device")
@@ -204,7 +204,7 @@ def test_the_lock_is_free_again_however_a_run_ends(tmp_path):
             raise fault
     (tmp_path / "run.json").write_text("{")
     for _ in range(2):
-        with pytest.raises(FileError, match="no list of results"):
+        with pytest.raises(FileError, match="not a list of results"):
             wrote(tmp_path, "a.json")
 
 
@@ -243,7 +243,7 @@ def test_a_second_process_is_refused(tmp_path):
 @pytest.mark.parametrize("text", ["{", "[]", '{"command": 1}', '{"command": "modes", "files": 3}'])
 def test_a_damaged_list_is_said(tmp_path, text):
     (tmp_path / "run.json").write_text(text)
-    with pytest.raises(FileError, match=r"run\.json is no list of results"):
+    with pytest.raises(FileError, match=r"run\.json is not a list of results"):
         wrote(tmp_path, "a.json")
 
 

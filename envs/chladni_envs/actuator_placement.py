@@ -82,7 +82,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             self.allowed &= self.margin >= 1
         if self.allowed.sum() < n_actuators:
             raise ShapeError(
-                f"{n_actuators} actuators were asked for; access and rattle leave "
+                f"{n_actuators} actuators were requested; access and rattle leave "
                 f"{self.allowed.sum()} of {n} candidates"
             )
         seen = np.sqrt(np.diag(self.shaker.observed)[::2])

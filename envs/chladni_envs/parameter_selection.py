@@ -67,7 +67,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
                 self.catalogue = recorded.catalogue
                 self.names += self.catalogue.names
         elif effects:
-            raise ShapeError("effects of the catalogue are those of a case; give case= a folder")
+            raise ShapeError("effects of the catalogue need a case; give case= a folder")
         self.given, self.cost, self.render_mode = problem, cost, render_mode
         self.p = len(problem) if problem is not None else p
         self.own = self.p - (len(self.catalogue.candidates) if self.catalogue else 0)  # ordinary
@@ -112,7 +112,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         """
         if self.catalogue is None:
             raise ShapeError(
-                "nothing of the catalogue is here to be fitted; make it with effects=True"
+                "no effect of the catalogue can be fitted here; make it with effects=True"
             )
         return self.catalogue.gain(np.flatnonzero(kept[self.own :]).tolist())
 

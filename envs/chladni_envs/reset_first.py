@@ -13,4 +13,4 @@ def refuse_before_reset(env: gym.Env, state: str, asked: str) -> None:
         It names the request and the call that is needed first.
     """
     if not hasattr(env, state):
-        raise ResetNeeded(f"{asked}: call reset() first; there is no state to tell of before")
+        raise ResetNeeded(f"{asked}: call reset() first; there is no state before")

@@ -76,7 +76,7 @@ def write_npz(path: Path | str, **arrays: np.ndarray) -> Path:
     """Write compressed arrays; texts become fixed-width unicode, so no pickle is needed."""
     held = {name: np.asarray(array) for name, array in arrays.items()}
     if objects := [name for name, array in held.items() if array.dtype.hasobject]:
-        raise FileError(f"{path}: {named(objects)} hold Python objects, which would need a pickle")
+        raise FileError(f"{path}: {named(objects)} contain Python objects, which need a pickle")
     return atomic(path, lambda part: np.savez_compressed(part, **held))  # type: ignore[arg-type]
 
 
@@ -122,7 +122,7 @@ def run_folder(
         except OSError as error:
             if error.errno != ENOSPC:
                 raise
-            raise FileError(f"{out}: {error.strerror}; nothing was written") from error
+            raise FileError(f"{out}: {error.strerror}; no file was written") from error
         finally:
             shutil.rmtree(part, ignore_errors=True)
 
@@ -202,7 +202,7 @@ def _scratch(out: Path) -> Path:
     try:
         return Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=out))
     except OSError as error:
-        raise FileError(f"{out}: nothing can be written there ({error.strerror})") from error
+        raise FileError(f"{out}: no file can be written there ({error.strerror})") from error
 
 
 def _earlier(out: Path, command: str) -> set[str]:
@@ -210,16 +210,16 @@ def _earlier(out: Path, command: str) -> set[str]:
     path = out / LIST
     for name, by in _MARKS.items():
         if by != command and (out / name).exists():
-            raise FileError(f"{out} holds the results of chladni {by}; give another --out")
+            raise FileError(f"{out} has the results of chladni {by}; give another --out")
     if not path.exists():
         return set()
     try:
         held = json.loads(path.read_text(encoding="utf-8"))
         by, names = str(held["command"]), {str(name) for name in held["files"]}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FileError(f"{path} is no list of results; give another --out") from error
+        raise FileError(f"{path} is not a list of results; give another --out") from error
     if by != command:
-        raise FileError(f"{out} holds the results of chladni {by}; give another --out")
+        raise FileError(f"{out} has the results of chladni {by}; give another --out")
     return {name for name in names if not (Path(name).is_absolute() or ".." in Path(name).parts)}
 
 
@@ -245,7 +245,7 @@ def _move(part: Path, out: Path, before: set[str], inputs: set[Path]) -> None:
     except (FileError, OSError) as error:
         why = error if isinstance(error, FileError) else f"{out}: {error.strerror}"
         kept = _kept(part, out)
-        raise FileError(f"{why}; nothing was replaced, the results are in {kept}") from error
+        raise FileError(f"{why}; no file was replaced, and the results are in {kept}") from error
 
 
 def _refuse_blocked(out: Path, names: Sequence[str], mine: set[str], inputs: set[Path]) -> None:
@@ -253,15 +253,15 @@ def _refuse_blocked(out: Path, names: Sequence[str], mine: set[str], inputs: set
     for name in names:
         target = out / name
         if target.resolve() in inputs:
-            raise FileError(f"{target} is a file this run reads")
+            raise FileError(f"{target} is an input file of this run")
         if name not in mine and os.path.lexists(target):
             raise FileError(
-                f"{target} is there already and no {LIST} says that this command wrote it; move "
-                "it away, or give another --out"
+                f"{target} exists and no {LIST} shows that this command wrote it; move it away, "
+                "or give another --out"
             )
         above = next((p for p in target.parents if p.exists()), out)
         if not above.is_dir():
-            raise FileError(f"{above} is there already and is no folder")
+            raise FileError(f"{above} exists and is not a folder")
 
 
 def _swapped(part: Path, out: Path, names: Sequence[str], mine: set[str]) -> None:

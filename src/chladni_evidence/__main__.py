@@ -120,18 +120,22 @@ def _seeds(asked: argparse.Namespace) -> range:
 def _parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="chladni_evidence", description=__doc__)
     commands = top.add_subparsers(required=True, dest="command")
-    screen = commands.add_parser("screen", help="how often faults are named, sound recordings not")
+    screen = commands.add_parser("screen", help="rates of named faults and of false alarms")
     screen.add_argument("--seeds", required=True, help="first and last, as 600-649")
     screen.add_argument("--faults", default="", help="only these, with commas")
     screen.add_argument("--long", action="store_true", help=f"{TIMES} times as many lines")
-    fuzzed = commands.add_parser("fuzz", help="injured inputs: a sentence or a result, always")
+    fuzzed = commands.add_parser(
+        "fuzz", help="damaged inputs: each must give a sentence or a result"
+    )
     fuzzed.add_argument("--inputs", type=int, default=10_000)
-    fuzzed.add_argument("--minutes", type=float, default=math.inf, help="no longer than this")
+    fuzzed.add_argument("--minutes", type=float, default=math.inf, help="time limit")
     fuzzed.add_argument("--seed", type=int, default=1)
     fuzzed.add_argument("--kinds", default="", help="only these, with commas")
-    fuzzed.add_argument("--decks", type=Path, help="a folder of more decks to injure")
+    fuzzed.add_argument("--decks", type=Path, help="a folder of further decks to damage")
     fuzzed.add_argument("--out", type=Path, required=True)
-    found = commands.add_parser("identify", help="poles, damping, intervals against known ones")
+    found = commands.add_parser(
+        "identify", help="poles, damping and intervals compared with known ones"
+    )
     found.add_argument("--seeds", required=True, help="first and last, as 600-649")
     found.add_argument(
         "--noise", default="", help=f"only these, with semicolons: {'; '.join(NOISES)}"
@@ -142,13 +146,15 @@ def _parser() -> argparse.ArgumentParser:
     known = commands.add_parser("recovery", help="calibrate to known values: coverage of intervals")
     known.add_argument("--seeds", required=True, help="first and last, as 600-619")
     known.add_argument("--out", type=Path, required=True)
-    kept = commands.add_parser("record", help="diagnose cases once, and keep all that decides them")
+    kept = commands.add_parser(
+        "record", help="diagnose cases once, and keep the data of their decisions"
+    )
     kept.add_argument("case", type=Path, nargs="+", help="a case folder")
     kept.add_argument("--out", type=Path, required=True, help="a folder for one file a case")
     again = commands.add_parser("replay", help="decide recorded cases again, and without each rule")
     again.add_argument("--noise", type=float, default=1.0, help="times the noise of the responses")
-    again.add_argument("--floor", type=float, help="sd that nothing explains [decades]")
-    again.add_argument("file", type=Path, nargs="+", help="what record wrote")
+    again.add_argument("--floor", type=float, help="unexplained standard deviation [decades]")
+    again.add_argument("file", type=Path, nargs="+", help="files written by record")
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")
@@ -158,7 +164,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--limit", type=float, default=3600.0, help="seconds a diagnosis may take")
     command.add_argument(
         "--recorder", choices=RECORDERS, default=PLAIN,
-        help="how recordings are made: noise on every line, or a test on the virtual bench",
+        help="source of recordings: noise on every line, or a test on the virtual bench",
     )  # fmt: skip
     command.add_argument("--out", type=Path, required=True)
     return top

@@ -95,7 +95,7 @@ def published(place: BlindFolder) -> Seals:
         truths, files = ({n: words[k] for n, words in lines.items()} for k in (1, 3))
         found = Seals(**held, truths=truths, files=files)
         if strange := [n for n in truths if not re.fullmatch(r"[\w-]+", n)]:
-            raise ValueError(f"{strange[0]!r} is no name of a case")
+            raise ValueError(f"{strange[0]!r} is not a case name")
         if found.purpose not in PURPOSES:
             raise ValueError(f"purpose {found.purpose!r}; there are {', '.join(PURPOSES)}")
     except (KeyError, IndexError, AttributeError, TypeError, ValueError) as error:
@@ -136,7 +136,7 @@ def unchanged_cases(place: BlindFolder, seals: Seals) -> None:
     if changed:
         raise FileError(
             f"{place.out}: the files of {named(changed)} are not those whose hash was published; "
-            "put them back, or make the cases anew in another --out"
+            "restore them, or make the cases again in another --out"
         )
 
 
@@ -154,8 +154,8 @@ def opened_truth(place: BlindFolder, seals: Seals, name: str) -> dict[str, Any]:
     truth = read_json(path, "")
     if (truth["seed"] < REPORTING) != (seals.purpose == "tune"):
         raise AccuracyError(
-            f"{path}: seed {truth['seed']} in a folder that is to {seals.purpose}; seeds below "
-            f"{REPORTING} tune, from {REPORTING} on they report"
+            f"{path}: seed {truth['seed']} in a folder with the purpose {seals.purpose}; seeds "
+            f"below {REPORTING} tune, from {REPORTING} they report"
         )
     return truth
 
@@ -173,7 +173,7 @@ def read_json(path: Path, made_by: str) -> dict[str, Any]:
     except OSError as error:
         raise FileError(f"{path}: {error.strerror}" + f"; {made_by}" * bool(made_by)) from error
     except ValueError as error:
-        raise FileError(f"{path} is no JSON: {error}") from error
+        raise FileError(f"{path} is not JSON: {error}") from error
     if not isinstance(found, dict):
-        raise FileError(f"{path} holds no object")
+        raise FileError(f"{path} has no object")
     return found

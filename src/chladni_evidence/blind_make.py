@@ -41,8 +41,8 @@ def make(
     seeds = sorted({o.seed for o in chosen})
     if purpose(seeds) != why:
         raise LabelError(
-            f"seeds {seeds[0]}-{seeds[-1]} are to {purpose(seeds)}, not to {why}; seeds that tune "
-            "and seeds that report are never the same"
+            f"seeds {seeds[0]}-{seeds[-1]} are for {purpose(seeds)}, not for {why}; seeds that "
+            "tune and seeds that report must differ"
         )
     place = BlindFolder(out)
     make_folder(out)
@@ -64,9 +64,9 @@ def _begun(place: BlindFolder, chosen: Sequence[Order]) -> dict[str, Order]:
     begun = place.out / "blind.json"
     if begun.exists():
         if read_json(begun, "").get("orders") != mark.hexdigest():
-            raise FileError(f"{place.out} holds other blind cases; give another --out")
+            raise FileError(f"{place.out} has other blind cases; give another --out")
     elif any(place.out.iterdir()):
-        raise FileError(f"{place.out} holds other files; give an --out of its own")
+        raise FileError(f"{place.out} has other files; give another --out")
     else:
         write_json(begun, {"orders": mark.hexdigest(), "cases": len(chosen)})
     drawn = np.random.default_rng(list(mark.digest())).permutation(len(chosen))
@@ -87,8 +87,8 @@ def _each(orders: dict[str, Order], place: BlindFolder, workers: int, say: Say) 
                 say(_said(jobs[job], job.result(), done, len(orders)))
         except BrokenProcessPool as error:
             raise FileError(
-                "a process that made cases was ended from outside, as where memory runs short; "
-                "the same command goes on, with fewer --workers"
+                "a process that made cases was ended from outside, possibly by too little "
+                "memory; the same command continues, with fewer --workers"
             ) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -134,7 +134,7 @@ def _seals(
 ) -> Seals:
     made = [name for name in orders if place.truth(name).exists()]
     if not made:
-        raise FileError(f"no case could be made; {place.out / 'sealed'} says why")
+        raise FileError(f"no case could be made; see {place.out / 'sealed'}")
     return Seals(
         why, set_name, seeds, own_version(), len(orders) - len(made),
         {name: hash_of(place.truth(name)) for name in made},

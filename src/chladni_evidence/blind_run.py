@@ -42,8 +42,8 @@ def run(
         names = [n for n in seals.truths if not place.answer(n).exists()]
         if names and seals.purpose == "report" and place.opened.exists():
             raise FileError(
-                f"{out}: the truths were opened, so that {names[0]} can no longer be answered "
-                "blindly; make cases of other seeds"
+                f"{out}: the truths were opened, so {names[0]} cannot be answered blindly; make "
+                "cases with other seeds"
             )
         say(f"{len(seals.truths)} cases, {len(seals.truths) - len(names)} answered before")
         commands = ("diagnose", "calibrate") if calibrated else ("diagnose",)

@@ -38,11 +38,11 @@ def score(outs: Sequence[Path], say: Say) -> list[Row]:
     """
     every = [(BlindFolder(out), published(BlindFolder(out))) for out in outs]
     if len({seals.purpose for _, seals in every}) > 1:
-        told = ", ".join(f"{place.out} is to {seals.purpose}" for place, seals in every)
+        told = ", ".join(f"{place.out} has the purpose {seals.purpose}" for place, seals in every)
         raise LabelError(f"{told}; cases that tune and cases that report are never scored together")
     sealed = Counter(h for _, seals in every for h in seals.truths.values())
     if sealed and max(sealed.values()) > 1:
-        raise LabelError("some of the cases are in two of the folders, and would be counted twice")
+        raise LabelError("some cases are in two of the folders and would count twice")
     for place, seals in every:
         _answers_hold(place, seals)
     rows = [r for place, seals in every for r in _rows(place, seals)]
@@ -68,8 +68,8 @@ def _answers_hold(place: BlindFolder, seals: Seals) -> None:
     unanswered = [n for n in seals.truths if not place.answer(n).exists()]
     if unanswered:
         raise FileError(
-            f"{place.out}: no answer to {named(unanswered)} yet, so nothing is opened; "
-            f"`chladni blind run {place.out}` goes on"
+            f"{place.out}: {named(unanswered)} has no answer yet, so no truth is opened; continue "
+            f"with `chladni blind run {place.out}`"
         )
     unchanged_cases(place, seals)
     due = hash_of(place.seals)
@@ -78,8 +78,8 @@ def _answers_hold(place: BlindFolder, seals: Seals) -> None:
         _answers(given, place.answer(name))
         if (given.get("seals"), given.get("files")) != (due, seals.files[name]):
             raise FileError(
-                f"{place.answer(name)} was not given to the case as it is published: it is older "
-                "than the seals, or of another folder; take it away and run again"
+                f"{place.answer(name)} does not belong to the published case: it is older than "
+                "the seals, or from another folder; remove it and run again"
             )
     now = {name: hash_of(place.answer(name)) for name in seals.truths}
     if seals.purpose == "report" and place.opened.exists():
@@ -88,7 +88,7 @@ def _answers_hold(place: BlindFolder, seals: Seals) -> None:
         if changed:
             raise AccuracyError(
                 f"{place.out}: answers to {named(changed)} are younger than the opening of their "
-                "truths; a report answers once, further cases need further seeds"
+                "truths; a report allows one answer, further cases need further seeds"
             )
     write_json(place.opened, now)
 

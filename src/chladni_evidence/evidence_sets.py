@@ -211,7 +211,7 @@ def seed_range(text: str) -> range:
     first, _, last = text.partition("-")
     last = last or first
     if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last)):
-        raise LabelError(f"seeds {text!r} are no range; write 600-604")
+        raise LabelError(f"seeds {text!r} are not a range; write 600-604")
     return range(int(first), int(last) + 1)
 
 
@@ -226,13 +226,13 @@ def purpose(seeds: Sequence[int]) -> Purpose:
     tuning = [s < REPORTING for s in seeds]
     if any(tuning) != all(tuning):
         raise LabelError(
-            f"seeds {min(seeds)}-{max(seeds)}: those below {REPORTING} tune, from {REPORTING} on "
-            "they report; a run is for one or the other"
+            f"seeds {min(seeds)}-{max(seeds)}: those below {REPORTING} tune, from {REPORTING} "
+            "they report; a run has one purpose"
         )
     return "tune" if tuning[0] else "report"
 
 
 MEANT: dict[Purpose, str] = {
     "tune": "these seeds are for tuning: never report them",
-    "report": "these seeds report: nothing may be looked up or tuned on them",
+    "report": "these seeds report: do not inspect or tune on them",
 }

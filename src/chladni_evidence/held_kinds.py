@@ -20,7 +20,7 @@ def compliant_support(site: Site, rng: np.random.Generator, size: float) -> Hidd
     """
     a, held = site.article, clamps(site.article)
     if not held:
-        raise ModelError("the article has no supports, so that no clamp of it can give")
+        raise ModelError("the article has no supports, so it has no clamp")
     clamp = held[int(rng.integers(len(held)))]
     rows = a.rows(clamp.grids)
     z = site.normal(int(rows[0]))

@@ -86,7 +86,7 @@ def thinning(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A patch of a sheet thinner by 12 to 25 % in its middle, t (1 - α e^(-d²/2R²))."""
     a, part = site.article, site.part(rng)
     if not (a.shells.part == a.part(part)).any():
-        raise ModelError(f"part {part} has no sheet that could be thinner")
+        raise ModelError(f"part {part} has no sheet to thin")
     centre = a.points[rng.choice(site.rows(part))]
     R = float(rng.uniform(0.06, 0.12)) * site.size * min(size, 1.6) ** 0.5
     alpha = min(0.45, float(rng.uniform(0.12, 0.25)) * size)
@@ -183,7 +183,7 @@ def _disc(site: Site, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, A
     a, part = site.article, site.part(rng)
     of_part = a.shells.part == a.part(part)
     if not of_part.any():
-        raise ModelError(f"part {part} has no sheet a patch could be on")
+        raise ModelError(f"part {part} has no sheet for a patch")
     centre = a.points[rng.choice(site.rows(part))]
     d = np.linalg.norm(a.points[a.shells.nodes].mean(axis=1) - centre, axis=1)
     R = max(float(rng.uniform(0.12, 0.2)) * site.size, float(np.sort(d[of_part])[:FEWEST][-1]))
@@ -208,7 +208,7 @@ def prestress(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     a, name = site.article, site.part(rng)
     part = a.part(name)
     if not (a.shells.part == part).any():
-        raise ModelError(f"part {name} has no sheet that could stand under a membrane force")
+        raise ModelError(f"part {name} has no sheet for a membrane force")
     along, across = tensors(a, part)
     if rng.integers(2):
         along, across = across, along

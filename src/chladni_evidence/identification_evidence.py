@@ -23,9 +23,9 @@ INSIDE, CHANNELS, LINES = 15, 30, 900
 TWO_SIGMA = 1.96
 KINDS = {
     "share": "2 % of |H|, stated by the recording",
-    "share, unsaid": "2 % of |H|, stated by nobody",
+    "share, unsaid": "2 % of |H|, not stated",
     "floor": "2 % of the rms of each channel at every line, stated",
-    "floor, unsaid": "2 % of the rms of each channel at every line, stated by nobody",
+    "floor, unsaid": "2 % of the rms of each channel at every line, not stated",
 }
 
 

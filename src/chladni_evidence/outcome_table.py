@@ -122,7 +122,7 @@ def calibration_against_diagnosis(rows: Sequence[Row]) -> str:
         if r["effect"] not in NULLS and r["beside"]["calibration"] is not None
     ]
     if not both:
-        return "plain calibration was not asked"
+        return "plain calibration was not tested"
     lines = [f"{'something hidden, medians':<28}{'calibration':>12}{'diagnosis':>12}{'n':>5}"]
     for key, (what, factor) in FIGURES.items():
         pairs = [(a[key], b[key]) for a, b in both if None not in (a[key], b[key])]

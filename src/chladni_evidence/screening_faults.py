@@ -111,7 +111,7 @@ def turned(made: Sound, rng: np.random.Generator) -> Spoilt:
             phi = seen(made.modes, foot, np.eye(3)[[axis]] * rng.choice([-1.0, 1.0]))[0]
             if np.sqrt((np.abs(made.accelerance(phi[None])) ** 2).mean()) > SEEN * typical:
                 return _with_row(made, int(i), phi, rng)
-    raise ModelError(f"no sensor of {made.bench.name} sees anything along another axis")
+    raise ModelError(f"no sensor of {made.bench.name} has motion along another axis")
 
 
 def misplaced(made: Sound, rng: np.random.Generator) -> Spoilt:

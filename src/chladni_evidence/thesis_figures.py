@@ -50,7 +50,7 @@ def _of(recording: BenchRecording, row: int) -> Curve:
 def _named(test: ThesisTest, row: int) -> str:
     """A channel in words."""
     name = test.stepped[0].frf.outputs[row]
-    return f"{name}, beside the shaker" if row == test.subject.drive else name
+    return f"{name}, next to the shaker" if row == test.subject.drive else name
 
 
 def _cords(path: Path, test: ThesisTest) -> Path:

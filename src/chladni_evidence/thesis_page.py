@@ -14,14 +14,14 @@ from .thesis_bench import ThesisTest
 from .thesis_findings import BANDS, ThesisFindings, dispersion
 from .thesis_modes import BAND, CORDS, spread
 
-READING = ("what the thesis says of it", "thesis", "ours")
+READING = ("statement of the thesis", "thesis", "ours")
 RANGES = ((10, 60, 0.7), (60, 100, 1.9), (100, 156, 2.3), (156, 200, 1.0))  # of table 5: Hz, %
 
 
 def thesis_page(pictures: dict[str, Path], test: ThesisTest, found: ThesisFindings) -> PageParts:
     """Sections of the page, tables first as in the thesis."""
     sections = [
-        Section("What was tested", [Facts(_facts(test, found)), Text(_TESTED)]),
+        Section("Test article and schedule", [Facts(_facts(test, found)), Text(_TESTED)]),
         Section("Table 3: the schedule of the stepped sine", _schedule(found)),
         Section("Table 4: mass", _masses(found)),
         Section("Table 5: natural frequencies", _frequencies(found)),
@@ -65,13 +65,13 @@ def numbers(test: ThesisTest, found: ThesisFindings) -> dict[str, Any]:
 
 
 _TESTED = [
-    "The thesis' tailgate is a maker's drawing that nobody else has. Ours is the open tailgate of "
-    "this package with a hem that holds; its first fourteen modes have the mean damping of "
-    "table 6, by rank. Everything else follows: three articles scatter as tables 4 to 6 do, two "
-    "cords hold the upper bolt holes and ring near 23 and 24.5 Hz, a shaker with its stinger "
-    "drives the planner's best place (the thesis' best and second best rattled), 30 "
-    "accelerometers of 5 g sit where the planner puts them and one beside the shaker. So what can "
-    "be the same are schedules, spreads and what is read from a figure, never a frequency.",
+    "The drawing of the thesis' tailgate is not public. Ours is the open tailgate of this "
+    "package with a stiff hem; its first fourteen modes have the mean damping of table 6, by "
+    "rank. The rest follows the thesis. Three articles scatter as in tables 4 to 6. Two cords "
+    "hold the upper bolt holes and resonate near 23 and 24.5 Hz. A shaker with its stinger "
+    "drives the planner's best place (the thesis' best and second best rattled). 30 "
+    "accelerometers of 5 g are at the planner's places and one is next to the shaker. Schedules, "
+    "spreads and readings from figures can therefore agree, but frequencies cannot.",
     "Frequencies and figures are measured: recorded on the bench, identified from 10 to 195 Hz "
     "without 23 to 27.5 Hz, as in section 5.1.",
 ]
@@ -109,11 +109,11 @@ def _schedule(found: ThesisFindings) -> list[Block]:
     ]  # fmt: skip
     return [
         Table(heads, rows, ("range [Hz]",), "Delay and measure in cycles, as printed and as run."),
-        Text(["The same: the table is what the bench runs. The last column no lab can print: what "
-              "is left of the transient of the lines before, the worst channel, median over the "
-              "lines of the range. 20 to 50 Hz holds 264.4 lines at 200 an octave, so 264 "
-              "are run. The thesis prints no force; ours falls to 0.7, 0.5 and 0.2 of the level "
-              "above 50, 100 and 200 Hz."]),
+        Text(["The same: the table is what the bench runs. No lab can measure the last column: "
+              "the remaining transient of the lines before, for the worst channel, as the median "
+              "over the lines of the range. 20 to 50 Hz holds 264.4 lines at 200 an octave, so "
+              "264 are run. The thesis prints no force; ours falls to 0.7, 0.5 and 0.2 of the "
+              "level above 50, 100 and 200 Hz."]),
     ]  # fmt: skip
 
 
@@ -160,12 +160,12 @@ def _frequencies(found: ThesisFindings) -> list[Block]:
     heads = ("range [Hz]", "printed [%]", "of its own values [%]", "ours [%]")
     off, zeta = found.worst
     return [
-        Table(_HEADS, rows, caption="Hz. Partners are nearest in frequency: shapes of the thesis' "
-              "modes are not published, so rows side by side need not be the same motion."),
+        Table(_HEADS, rows, caption="Hz. Partners are nearest in frequency. The thesis publishes "
+                                    "no shapes, so one row may contain two different motions."),
         Table(heads, bands, ("range [Hz]",), "Highest difference, (largest - smallest) / mean."),
-        Text(["Frequencies are those of another tailgate. Differences are comparable, for articles "
-              "scatter as the thesis' do. From 156 to 200 Hz the thesis prints 1.0 %, while its "
-              "mode 12 (181.1, 184.1, 181.5 Hz) differs by 1.6 %.",
+        Text(["The frequencies belong to another tailgate. Differences are comparable, because "
+              "the articles scatter as in the thesis. From 156 to 200 Hz the thesis prints 1.0 "
+              "%, while its mode 12 (181.1, 184.1, 181.5 Hz) differs by 1.6 %.",
               f"Against the poles the bench itself has A is {number(100 * off, 2)} % off in "
               f"frequency and {number(100 * zeta, 2)} % in damping at most."]),
     ]  # fmt: skip
@@ -200,10 +200,10 @@ def _cords(found: ThesisFindings) -> list[Block]:
     ]  # fmt: skip
     return [
         Table(READING, rows, READING, "Ours: tailgates A; B; C, sensor nearest to a cord."),
-        Text(["How much of a cord is in a response depends on where shaker and sensor are, and no "
-              "sensor of ours sits at a hole. Where the first mode moves, it is by less than half "
-              "its bandwidth of 1 %; rubber moves it most, for ours is damping alone, without a "
-              "stiffness of its own."]),
+        Text(["The contribution of a cord depends on the places of shaker and sensor, and none "
+              "of our sensors is at a hole. The first mode changes by less than half its "
+              "bandwidth of 1 %. Rubber changes it most, because ours has damping but no "
+              "stiffness."]),
     ]  # fmt: skip
 
 
@@ -223,7 +223,7 @@ def _circles(found: ThesisFindings) -> list[Block]:
     ]
     return [
         Table(READING, rows, READING, "Section 5.2, tailgate A."),
-        Text(["Mobility, which leaves modes of low and of high frequency alike. 200 lines an "
+        Text(["Mobility, which weights modes of low and high frequency equally. 200 lines an "
               "octave put 2ζ/0.00347 lines between half-power points: 3.2 at 0.56 % damping, 7.3 "
               "at 1.26 %, so that the thesis' counts are of the whole bandwidth; its mode 4 of "
               "0.37 % has two, which the thesis' least of three leaves out."]),
@@ -239,9 +239,8 @@ def _levels(found: ThesisFindings) -> list[Block]:
     return [
         Table(READING, rows, READING, "Squared difference over what noise explains, its p-value, "
               "rms of log10 of the ratio over all lines and channels."),
-        Text(["Nothing rattles on this bench unless it is told to (`chladni bench --local "
-              "clearance`); the curves lie on each other, as the thesis saw them after wood and "
-              "screws had stopped what rattled."]),
+        Text(["This bench rattles only with `chladni bench --local clearance`. The curves "
+              "coincide, as in the thesis after wood and screws had stopped the rattling."]),
     ]  # fmt: skip
 
 
@@ -255,8 +254,8 @@ def _articles(found: ThesisFindings) -> list[Block]:
     return [
         Table(READING, rows, READING, "Rms over channels and lines of 20 log |H| about the mean of "
               "the articles."),
-        Text(["Scatter of ours is drawn alike for all modes, so it need not diminish about 300 Hz, "
-              "where the thesis' articles happen to agree; it grows as modes crowd."]),
+        Text(["Our scatter is equal for all modes, so it need not diminish near 300 Hz, where "
+              "the thesis' articles happen to agree; it grows with the modal density."]),
     ]  # fmt: skip
 
 
@@ -271,9 +270,9 @@ def _excitations(found: ThesisFindings) -> list[Block]:
     ]  # fmt: skip
     return [
         Table(READING, rows, READING, "Means of A, B and C; half the difference of 20 log |H|."),
-        Text(["The same order of things: anti-resonances first, articles differ more. Ours are "
-              "nearer to each other than the thesis', for nothing on this bench changes between "
-              "two tests: no hour goes by, no cable moves, no room is loud."]),
+        Text(["The order is the same: anti-resonances differ first, and articles differ more. "
+              "Our articles are closer than those of the thesis, because this bench does not "
+              "change between two tests: time, cables and room noise have no effect."]),
     ]  # fmt: skip
 
 
@@ -297,13 +296,15 @@ def _state_space(test: ThesisTest, found: ThesisFindings) -> list[Block]:
     )
     low, high, along = *CORDS, ", ".join(hertz(f) for f in test.along[0])
     return [
-        Table(READING, rows, READING, f"{BAND[0]:g} to {BAND[1]:g} Hz without {low:g} to "
-              f"{high:g} Hz; identified by chladni, whose order is what pays."),
-        Text([f"Our identification, too, finds modes twice ({doubles} poles in the three "
-              "articles). Here the reason is known: noise is far below, but table 3 leaves some "
-              "of the transient of one line in the next, which no linear model of the article "
-              "answers to. Where every line is waited for by 200 cycles they are gone (tried: nine "
-              f"poles of A, then none). Cords ring along themselves, too, at {along} "
-              "Hz in A: who taps them across does not hear it. Below 15 Hz weak channels are off: "
-              "there the article swings on its cords, and the residual term L/s² is not enough."]),
+        Table(READING, rows, READING, f"{BAND[0]:g} to {BAND[1]:g} Hz without {low:g} to {high:g} "
+                                      "Hz; identified by chladni, which chooses the order by "
+                                      "evidence."),
+        Text([f"Our identification finds modes twice too ({doubles} poles in the three articles). "
+              "Here the reason is known: the noise is low, but with table 3 a part of the "
+              "transient of one line remains in the next, and a linear model of the article "
+              "cannot explain it. With a wait of 200 cycles at every line they disappear (tried: "
+              f"nine poles of A, then none). Cords resonate along their axis too, at {along} Hz "
+              "in A; tapping across does not show this. Below 15 Hz weak channels are "
+              "inaccurate: there the article moves on its cords, and the residual term L/s² is "
+              "not enough."]),
     ]  # fmt: skip

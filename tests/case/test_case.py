@@ -140,7 +140,7 @@ def test_the_base_moves_where_the_deck_holds_it(folder: Path) -> None:
     H = a_frf(("12:+Z",), ("base:+Z",))
     change(folder, 'sensors = ["12:+Z"]', "")
     write_npz(folder / "a.npz", FRF(H.values, H.frequency, H.outputs, H.inputs, "transmissibility"))
-    with pytest.raises(ChladniError, match=r"'base:\+Z': the base moves, but the deck holds no"):
+    with pytest.raises(ChladniError, match=r"'base:\+Z': the base moves, but the deck has no"):
         load_case(folder)
     (folder / "plate.bdf").write_text(deck(held=True))
     case = load_case(folder)
@@ -194,7 +194,7 @@ def change(folder: Path, old: str, new: str, name: str = "case.toml") -> None:
         ("mass_sd = 0.002", "position_sd = 1", "line 10: .* between 0 and 0.6"),
         ("mass_sd = 0.002", "gain_sd = 7", "line 10: .* between 0 and 1"),
         ('field = "t"', 'field = "E"', r"line 27: .* frees the same numbers .* of line 21;"),
-        ("fit = [", "fit = [[", "case.toml is no TOML: .*line 15"),
+        ("fit = [", "fit = [[", "case.toml is not TOML: .*line 15"),
     ],
 )  # fmt: skip
 def test_faults_of_a_case(folder: Path, old: str, new: str, said: str) -> None:

@@ -31,7 +31,7 @@ def test_each_repair_undoes_its_fault() -> None:
     np.testing.assert_allclose(found.frf.values, TRUE.values[:, :2])
     np.testing.assert_allclose(found.frf.variance[:, 1, 0], 1e-4 * (9.81 / 0.5) ** 2)  # type: ignore[index]
     said = " ".join(found.notes)
-    for word in ("3:+Z left out", "2:+Z by -0.5", "times 9.81", "delay of 0.001 s"):
+    for word in ("3:+Z excluded", "2:+Z by -0.5", "factor = 9.81", "delay = 0.001 s"):
         assert word in said
 
 
@@ -39,7 +39,7 @@ def test_nothing_is_mended_in_silence_or_unasked() -> None:
     untouched = Recording("a", TRUE)
     assert mended(untouched, 1.0, 0.0, []).frf is TRUE
     assert mended(untouched, 1.0, 0.0, []).notes == ()
-    with pytest.raises(FileError, match="leaves every output out"):
+    with pytest.raises(FileError, match="excludes every output"):
         mended(untouched, 1.0, 0.0, [Sensor(o, use=False) for o in TRUE.outputs])
 
 

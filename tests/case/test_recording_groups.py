@@ -51,7 +51,7 @@ def test_lines_and_outputs_that_one_has_alone_are_left_out_and_named() -> None:
     assert both.frf.outputs == OUT[:2]
     np.testing.assert_array_equal(both.frf.values[:, :, 0], a.frf.values[1:, :2, 0])
     assert "22:+Z" in both.notes[-1]
-    assert "1 lines that only one of them has" in both.notes[-1]
+    assert "1 lines in only one of them" in both.notes[-1]
 
 
 def test_a_test_at_other_lines_is_refused() -> None:
@@ -91,7 +91,7 @@ def test_the_same_numbers_are_no_repeat() -> None:
             refuse_copies([a, noisy, copy], "[test] recordings")
         refuse_copies([a, noisy, replace(copy, article="B")], "[test] recordings")
     said = notes_of([a, replace(b, article="B")])
-    assert any("b.npz (article B; the same numbers: it is a copy" in note for note in said)
+    assert any("b.npz (article B; the same numbers: a copy" in note for note in said)
 
 
 def test_a_file_is_listed_once(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_a_word_is_said_once_and_not_against_the_file() -> None:
         described([told(file="a.npz"), told(file="a.npz")], "a.npz", [a])
     nothing = np.full(1, np.nan)
     table = PoleTable(np.ones(1), nothing, nothing, np.ones(1, int), ("bare",))
-    with pytest.raises(FileError, match="has a column state of its own"):
+    with pytest.raises(FileError, match="has its own column state"):
         described([told(file="p.csv", state="x")], "p.csv", [Recording("p.csv", poles=table)])
 
 

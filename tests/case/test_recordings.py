@@ -52,7 +52,7 @@ def test_a_state_is_named() -> None:
 
 
 def test_a_name_nobody_has_is_refused_with_those_there_are() -> None:
-    with pytest.raises(ChladniError, match=r"no recording is called so; there are .*b.npz, B"):
+    with pytest.raises(ChladniError, match=r"no recording is so named; there are .*b.npz, B"):
         compared_first(section(use="c.npz"), [FIRST, SECOND])
 
 
@@ -62,7 +62,7 @@ def test_the_others_are_measured_against_it() -> None:
     double = FRF(2 * a.values, a.frequency, a.outputs, a.inputs, "accelerance")
     assert deviation(a, double) == pytest.approx(np.log10(2))
     said = notes_of([FIRST, Recording("d.npz", frf=double)])
-    assert any("d.npz (repeat; 0.3 decades rms off)" in note for note in said)
+    assert any("d.npz (repeat; 0.3 decades rms apart)" in note for note in said)
 
 
 def test_what_else_a_file_holds_is_named() -> None:
@@ -116,7 +116,7 @@ def test_places_count_where_numbers_coincide_by_chance(tmp_path: Path, factor: f
     recorded = [Recording("a.uff", nodes=nodes)]
     found = places(section(), TestSetup(), made, labels, "output", recorded, notes)
     np.testing.assert_allclose(found.points, there, atol=1e-9)
-    assert any("3 of 3 are off): the places were taken" in n for n in notes)
+    assert any("3 of 3 differ): the places were used" in n for n in notes)
     assert any("fit the deck in mm" in n for n in notes) == (factor != 1)
 
 
@@ -141,7 +141,7 @@ def test_labels_that_count_are_channels(tmp_path: Path, nodes: dict[int, np.ndar
     ("inputs", "quantity", "said"),
     [
         (("1:+Z",), "transmissibility", "its input must be base"),
-        (("base:+Z",), "accelerance", "what a moving base causes is"),
+        (("base:+Z",), "accelerance", "the quantity of a moving base is"),
         (("base:+Z", "1:+Z"), "transmissibility", "cannot both be inputs"),
     ],
 )

@@ -250,7 +250,7 @@ def test_a_set_that_pays_in_part_is_asked_where_the_leader_leaves_too_much():
 def test_what_may_stand_in_the_place_of_one_is_one_of_several():
     alternatives = (
         (),
-        (AlternativeRow("adhesive-stiffness", 4.0, "E of 300 MPa is that of no sealant"),),
+        (AlternativeRow("adhesive-stiffness", 4.0, "E of 300 MPa is too high for a sealant"),),
     )
     made = table(*SINGLES, sets=[together("set 0", PAID, TWO, alternatives=alternatives)])
     assert decision(made).one_of == ("point-mass", "adhesive-stiffness")

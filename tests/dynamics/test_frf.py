@@ -119,7 +119,7 @@ def test_transmissibility_stays():
         np.ones((1, 1, 1), complex), np.array([1.0]), ("1:+Z",), ("base:+Z",), "transmissibility"
     )
     assert H.to("transmissibility") is H
-    with pytest.raises(LabelError, match="no way from transmissibility"):
+    with pytest.raises(LabelError, match="transmissibility cannot be converted"):
         H.to("mobility")
 
 

@@ -137,7 +137,7 @@ def test_only_its_part_is_pulled():
 def test_grids_that_count_in_different_frames_are_refused(sheet):
     axes = np.tile(np.eye(3), (len(sheet.points), 1, 1))
     axes[3] = axes[3][[1, 2, 0]]
-    with pytest.raises(ModelError, match="different frames"):
+    with pytest.raises(ModelError, match="different displacement frames"):
         prestressed(replace(sheet, axes=axes), 0, np.eye(3), 100.0)
     turned = np.tile(np.eye(3)[[1, 2, 0]], (len(sheet.points), 1, 1))
     same = prestressed(replace(sheet, axes=turned), 0, np.eye(3), 1000.0)

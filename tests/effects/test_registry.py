@@ -56,9 +56,9 @@ FAULTS = {
     "raises": ("broken:FAMILY", "raise RuntimeError('no\\nlicence')", "RuntimeError: no licence"),
     "lacks it": ("broken:FAMILY", "", "AttributeError"),
     "is not there": ("nowhere:FAMILY", "", "ModuleNotFoundError"),
-    "is something else": ("broken:FAMILY", "FAMILY = 3", "is a int, no chladni"),
+    "is something else": ("broken:FAMILY", "FAMILY = 3", "is a int, not a chladni"),
     "takes a name": (
-        "broken:FAMILY", "from chladni.effects.point_mass import FAMILY", "another one has that",
+        "broken:FAMILY", "from chladni.effects.point_mass import FAMILY", "another effect has this",
     ),
 }  # fmt: skip
 
@@ -84,11 +84,11 @@ def test_a_package_that_cannot_be_used_is_one_sentence(installed, monkeypatch, t
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"effect": type("Loose", (Bolt,), {"name": "Loose Bolt"})}, "small letters and hyphens"),
+        ({"effect": type("Loose", (Bolt,), {"name": "Loose Bolt"})}, "lower case with hyphens"),
         ({"effect": type("Nameless", (Bolt,), {"name": "nothing"})}, "is its own"),
-        ({"candidates": None}, "neither candidates nor places"),
-        ({"cards": ()}, "or a reason why none can"),
-        ({"no_cards": "too heavy"}, "or a reason why none can"),
+        ({"candidates": None}, "neither candidates nor known places"),
+        ({"cards": ()}, "or a reason why it has none"),
+        ({"no_cards": "too heavy"}, "or a reason why it has none"),
     ],
 )
 def test_a_family_that_is_not_whole_is_refused(changes, said):

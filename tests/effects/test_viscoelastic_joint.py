@@ -47,7 +47,7 @@ def mastic(reduced):
     unknown = (
         Parameter("E", "Pa", 0.0, SD, 6e6, step=1.0),
         Parameter("loss factor", "-", 0.0, LOSS_SD, LOSS, nominal=NO_LOSS),
-        Parameter("damping beside it", "-", 0.0, LEVEL_SD, USUAL),
+        Parameter("other damping", "-", 0.0, LEVEL_SD, USUAL),
     )
     effect = ViscoelasticJoint(
         unknown, "the bead", joint=bead.joint, operator=bead.operator,

@@ -40,7 +40,7 @@ def test_a_sound_recording_is_left_in_peace(given: bool) -> None:
     frf = recording() if given else replace(recording(), variance=None)
     found = screened(Recording("a", frf), identify(frf))
     assert found.findings == ()
-    assert "nothing found" in found.sentence
+    assert "no fault found" in found.sentence
 
 
 def test_a_channel_of_noise_is_dead() -> None:

@@ -41,7 +41,7 @@ def test_modes_apart_are_peaks_of_their_own(found):
 def test_two_poles_of_one_shape_in_one_peak_are_said_and_joined(found):
     twin = beside(found, 0, 1, 1.0, shape=0)
     (said,) = peak_notes(twin)
-    assert said.startswith("40 and 40.4 Hz stand in one peak")
+    assert said.startswith("40 and 40.4 Hz are in one peak")
     joined = twins_joined(twin)
     assert joined.order == 2
     assert_allclose(joined.residues.sum(axis=0), twin.residues.sum(axis=0))

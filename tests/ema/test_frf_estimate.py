@@ -140,8 +140,8 @@ def test_double_hits_are_left_out() -> None:
     force[2, 400:405] = 0.5 * force[2].max()
     found = estimate(record(force))
     assert found.averages == 4
-    assert "1 of 5 hits were double" in " ".join(found.notes)
-    with pytest.raises(FileError, match="every hit is a double one"):
+    assert "1 of 5 hits are double" in " ".join(found.notes)
+    with pytest.raises(FileError, match="all hits are double"):
         estimate(record(force[[2, 2]]))
 
 
@@ -216,7 +216,7 @@ def test_clipped_channels_are_named_and_round_tops_are_not() -> None:
     [
         (EstimateSettings(excitation="shock"), LabelError, "no 'shock'; there are hammer"),  # type: ignore[arg-type]
         (EstimateSettings(method="H3"), LabelError, "there are H1, H2, Hv, LPM"),  # type: ignore[arg-type]
-        (EstimateSettings(method="LPM"), LabelError, "which a hit lacks"),
+        (EstimateSettings(method="LPM"), LabelError, "that of a hit is smooth"),
         (EstimateSettings(exponential=2.0), LabelError, r"falls to \(0, 1\], not 2"),
         (EstimateSettings(band=(400.0, 500.0)), FileError, "holds 0 of its lines"),
         (EstimateSettings(excitation="random", resolution=1e-3), FileError, "need blocks of"),

@@ -187,15 +187,15 @@ def test_two_levels_have_a_trend_and_no_element():
     assert first.signature == "friction"
     assert not first.fits
     assert first.held_out is None
-    assert "three levels would tell" in level_notes(study)[0]
+    assert "three levels would show" in level_notes(study)[0]
 
 
 def test_notes_name_the_mode_that_moves_alone():
     said = level_notes(studied("cubic spring", "response"))
-    assert said[0].startswith("nonlinear: natural frequencies move with level: 40")
+    assert said[0].startswith("nonlinear: natural frequencies change with level: 40")
     assert sum(note.startswith("nonlinear") for note in said) == 1
     calm = level_notes(level_study([at(1.0), at(8.0, seed=1)]))
-    assert calm == ["no natural frequency and no damping moves with level (1, 8)"]
+    assert calm == ["no natural frequency or damping changes with level (1, 8)"]
 
 
 def test_one_level_says_nothing():

@@ -109,9 +109,9 @@ def test_exchange_agent_walks_to_its_layout_under_rules(moves):
 
 
 def test_impossible_environments_are_refused_when_made():
-    with pytest.raises(ShapeError, match="3 sensors cannot tell 6 modes"):
+    with pytest.raises(ShapeError, match="3 sensors cannot distinguish 6 modes"):
         gym.make(SENSORS, phi=random_shapes(), n_sensors=3)
-    with pytest.raises(ShapeError, match="0 sensors cannot tell"):
+    with pytest.raises(ShapeError, match="0 sensors cannot distinguish"):
         gym.make(SENSORS, n_sensors=0)
     with pytest.raises(LabelError, match="there are delete and add"):
         gym.make(SENSORS, moves="swap")

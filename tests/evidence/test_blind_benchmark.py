@@ -113,7 +113,7 @@ def test_every_step_explains_itself(step):
 
 @pytest.mark.parametrize("text", ["109-100", "some", "-3", ""])
 def test_seeds_that_are_no_range_are_refused(text):
-    with pytest.raises(LabelError, match="are no range"):
+    with pytest.raises(LabelError, match="are not a range"):
         seed_range(text)
     assert seed_range("7") == range(7, 8)
 
@@ -122,12 +122,12 @@ def test_seeds_that_tune_never_report(tmp_path):
     """By the seeds, by the command, and before anything is written."""
     assert purpose([500, 599]) == "tune"
     assert purpose([600, 601]) == "report"
-    with pytest.raises(LabelError, match="for one or the other"):
+    with pytest.raises(LabelError, match="a run has one purpose"):
         purpose([599, 600])
     for option in (("--seeds", "600"), ("--seeds", "560", "--purpose", "report")):
         done = call("make", "--set", "panels", *option, "--out", tmp_path / "run")
         assert done.exit_code == 2
-        assert "never the same" in done.stderr
+        assert "must differ" in done.stderr
     assert not (tmp_path / "run").exists()
 
 
@@ -191,7 +191,7 @@ def test_answers_are_given_once_and_scored_after_all(tmp_path, calls):
     torso = place.work("case-1", "diagnose") / "diagnosis.json"
     torso.parent.mkdir(parents=True)
     torso.write_text('{"verdict": "missing')
-    with pytest.raises(FileError, match="no answer to case-1 yet, so nothing is opened"):
+    with pytest.raises(FileError, match="case-1 has no answer yet, so no truth is opened"):
         score([tmp_path], str)
     assert not place.opened.exists()
     assert run(tmp_path, 1, str, calibrated=False) == ["case-1"]
@@ -259,7 +259,7 @@ def test_a_report_answers_once(tmp_path, calls):
         score([place.out], str)
         place.answer("case-1").unlink()
         if why == "report":
-            with pytest.raises(FileError, match="no longer be answered blindly"):
+            with pytest.raises(FileError, match="cannot be answered blindly"):
                 run(place.out, 1, str)
             place.opened.rename(tmp_path / "aside")
             run(place.out, 1, lambda text: None, limit=1.0)
@@ -283,9 +283,9 @@ def test_tuning_and_report_are_never_scored_together(tmp_path, calls):
     assert done.exit_code == 2
     assert "never scored together" in done.stderr
     assert not one.opened.exists()
-    with pytest.raises(LabelError, match="counted twice"):
+    with pytest.raises(LabelError, match="would count twice"):
         score([one.out, one.out], str)
-    with pytest.raises(AccuracyError, match="seed 600 in a folder that is to tune"):
+    with pytest.raises(AccuracyError, match="seed 600 in a folder with the purpose tune"):
         score([wrong.out], str)
     assert len(score([one.out], str)) == 2
 

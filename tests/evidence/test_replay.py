@@ -35,7 +35,7 @@ def test_a_case_is_read_as_it_was_written(tmp_path):
 
 def test_what_was_not_recorded_is_said(tmp_path):
     bad = tmp_path / "x.npz"
-    bad.write_bytes(b"no archive")
+    bad.write_bytes(b"not an archive")
     with pytest.raises(FileError, match=r"x\.npz: no recorded case"):
         read_case(bad)
     bare = row("crack", 200.0)

@@ -32,8 +32,8 @@ GOOD = {
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("level", np.ones(3), "level holds 3 values"),
-        ("level", np.array(np.inf), "level is inf; an amplitude is finite and not negative"),
+        ("level", np.ones(3), "level has 3 values"),
+        ("level", np.array(np.inf), "level is inf; an amplitude must be finite and not negative"),
         ("level", np.array(np.nan), "level is nan"),
         ("level", np.array(-2.0), "level is -2"),
         ("level", np.array("2020-01-01", dtype="datetime64[s]"), "level holds datetime64"),
@@ -44,7 +44,7 @@ GOOD = {
         ("frequency_hz", F[:, None], r"frequencies are \(6, 1\); one list is due"),
         ("frequency_hz", F - 15.0, "negative or not a number"),
         ("huge", np.zeros(3), "unknown array huge"),
-        ("quantity", np.array(["mobility", "mobility"]), "quantity holds 2 texts; it is one"),
+        ("quantity", np.array(["mobility", "mobility"]), "quantity has 2 texts; it must be one"),
         ("outputs", np.array([["1:+Z"], ["2:+Z"]]), "outputs holds an array of 2 dimensions"),
         (
             "values",
@@ -88,11 +88,11 @@ def test_an_unknown_array_is_refused_before_it_is_unpacked(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a = " + "[" * 3000 + "]" * 3000, "is no TOML"),
-        ("a = " + "9" * 5000, "is no TOML"),
-        ("[model]", r"is no TOML: \[model\] is there twice \(at line 2,"),
-        ("[test.a]\n[test.a]", r"is no TOML: \[test\.a\] is there twice"),
-        ("a = 1\na = 2\nb = 3", "is no TOML: a key is there twice"),
+        ("a = " + "[" * 3000 + "]" * 3000, "is not TOML"),
+        ("a = " + "9" * 5000, "is not TOML"),
+        ("[model]", r"is not TOML: \[model\] occurs twice \(at line 2,"),
+        ("[test.a]\n[test.a]", r"is not TOML: \[test\.a\] occurs twice"),
+        ("a = 1\na = 2\nb = 3", "is not TOML: a key occurs twice"),
     ],
 )
 def test_toml_beyond_any_use(tmp_path: Path, text: str, said: str) -> None:
@@ -120,7 +120,7 @@ def test_numbers_of_hundreds_of_digits_are_not_repeated(tmp_path: Path) -> None:
 def test_a_cell_without_end(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text('frequency_hz,output,input,real,imag\n1,"' + "x" * 200_000 + "\n")
-    with pytest.raises(ChladniError, match=r"a\.csv is no table"):
+    with pytest.raises(ChladniError, match=r"a\.csv is not a table"):
         read_csv(path, "mobility")
 
 
@@ -128,7 +128,7 @@ def test_a_cell_without_end(tmp_path: Path) -> None:
     ("old", "new", "said"),
     [
         ("         1   3", "         1   9", "direction 9 of node 1"),
-        ("         6         1", "       -20         1", "it says it holds -20 values"),
+        ("         6         1", "       -20         1", "it states -20 values"),
     ],
 )
 def test_universal_files(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -258,7 +258,7 @@ def test_a_node_at_two_places_is_refused(tmp_path: Path) -> None:
         (7, 6, "3", "byte order 3 is unknown"),
         (13, 6, "1", r"real numbers are of format 1 \(DEC VMS\)"),
         (13, 6, "3", r"real numbers are of format 3 \(IBM 370\)"),
-        (19, 12, "9", "its head has 9 lines"),
+        (19, 12, "9", "states 9 lines of its head"),
         (31, 12, "100", "holds 100 bytes of numbers, 144 are there"),
         (31, 12, "288", "holds 288 bytes of numbers, 144 are there"),
         (31, 12, "many", "does not hold four counts"),
@@ -293,7 +293,9 @@ def test_coherence_in_percent_is_refused(tmp_path: Path) -> None:
             assert frf.coherence is not None
             assert frf.coherence.max() <= 1
         else:
-            with pytest.raises(ChladniError, match=r"a\.npz: a coherence lies between 0 and 1.*"):
+            with pytest.raises(
+                ChladniError, match=r"a\.npz: a coherence must be between 0 and 1.*"
+            ):
                 read_npz(path)
 
 

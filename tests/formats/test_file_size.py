@@ -65,5 +65,5 @@ def test_the_user_may_raise_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv(OVERRIDE, "4")
     refuse_large(tmp_path, int(3e9))
     monkeypatch.setenv(OVERRIDE, "much")
-    with pytest.raises(FileError, match="'much' is no number of gigabytes"):
+    with pytest.raises(FileError, match="'much' is not a number of gigabytes"):
         refuse_large(tmp_path, 1)

@@ -75,9 +75,9 @@ REFUSED = {
         file(function()).replace(b"  1.00000E+00", b"*" * 13, 1), r"dataset 1 .*\*{12}"),
     "not a number": (file(function(y=np.where(F == 13, np.nan, H))), "1 values are not numbers"),
     "beyond measure": (file(function(y=np.where(F == 13, 1e280, H))), "1 values are not numbers"),
-    "more values than it says": (file(function(count=6)), "7 values are there, it says it holds 6"),
+    "more values than it says": (file(function(count=6)), "7 values are present, but it states 6"),
     "fewer values than it says": (file(function(count=9)), "7 of 9 values .* truncated"),
-    "no phase": (file(function(y=H.real)), "without phase"),
+    "no phase": (file(function(y=H.real)), "needs phase"),
     "against frequency in rpm": (
         file(function(abscissa=(19, "rpm"))), r"abscissa, data type 19 \(rpm\)"),
     "volts": (file(function(numerator=(12, "V"))), "no calibration"),

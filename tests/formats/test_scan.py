@@ -33,7 +33,7 @@ def test_an_open_sheet_is_said_to_be_open(tmp_path):
     scan = read_scan(_saved(tmp_path, CORNERS, SHEET), 1e-3)
     assert np.isnan(scan.volume)
     assert len(scan.notes) == 1
-    assert "4 free edges (80 %), 0.1 m long" in scan.notes[0]
+    assert "4 free edges (80 %), 0.1 m in total" in scan.notes[0]
 
 
 def test_triangles_wound_against_each_other_are_named(tmp_path):
@@ -104,7 +104,7 @@ def _changed(folder, name, old, new):
         ("a.stl", "vertex ", "vertex 3e38 0 0", r"point 2 .* is at \(3e\+35, 0, 0\) m"),
         ("a.stl", "endsolid|endloop", "", None),  # a keyword that is not needed
         ("a.ply", "3 ", "3 0 -1 2", "cell 2 .* names point -1; there are 0 to 7"),
-        ("a.ply", "3 ", None, "says it holds 20 lines, but 19 can be read"),
+        ("a.ply", "3 ", None, "states 20 lines, but only 19 can be read"),
         ("a.ply", r"[-\d.]+ [-\d.]+ ", "0 inf 0", r"point 2 .*inf"),
         ("a.obj", "f ", "f 1 2 -3", r"a\.obj, line \d+: a face names vertex -3"),
         ("a.obj", "f ", "f 0/1 1/1 2/1", r"a\.obj, line \d+: a face names vertex 0"),
@@ -129,7 +129,7 @@ def test_a_binary_stl_is_as_long_as_it_says(tmp_path, change):
     path.write_bytes({
         "cut": data[:-50], "longer": data + data[-50:], "count": data[:80] + b"\3\0\0\0" + data[84:]
     }[change])  # fmt: skip
-    with pytest.raises(FileError, match=r"says it holds \d+ triangles, but \d+ can be read"):
+    with pytest.raises(FileError, match=r"states \d+ triangles, but only \d+ can be read"):
         read_scan(path, 1e-3)
 
 

@@ -127,7 +127,7 @@ def test_magnitude_and_phase_are_real_and_imaginary_part(
         ("frequency_hz,output,input,real,imag,phase\n", "unknown column 'phase'; known are"),
         (
             "frequency_hz,output,input,magnitude,phase_rad\n1,1:+Z,1:+Z,-9,1\n",
-            "line 2: a magnitude of -9 is none; is it in decibels",
+            "line 2: a magnitude cannot be -9; convert decibels",
         ),
         (HEAD + "1,1:+Z,1:+Z,1\n", "line 2: 4 cells, the header has 5"),
         (HEAD + "1,1:+Z,1:+Z,1,1\n2,1:+Z,1:+Z,nan,1\n", "line 3: real is 'nan'"),

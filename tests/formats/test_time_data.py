@@ -194,7 +194,7 @@ def test_what_is_wrong_with_a_table_is_said(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("arrays", "said"),
     [
-        ({"force": FORCE, "acceleration": MOTION, "fs": -1.0}, "fs is one number above zero"),
+        ({"force": FORCE, "acceleration": MOTION, "fs": -1.0}, "fs must be one number above zero"),
         ({"force": FORCE, "fs": RATE}, "one array force and one of acceleration"),
         ({"force": FORCE, "acceleration": MOTION, "fs": RATE, "huge": FORCE}, "unknown array huge"),
         ({"data": MOTION, "units": ["N"], "fs": RATE}, "1 units for the 2 channels"),
@@ -219,11 +219,11 @@ def test_damaged_and_new_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "g.npz").write_bytes(bytes(range(256)))
     for name, said in (
         ("b.mat", "cannot be read as MAT"),
-        ("c.mat", "MATLAB 7.3 .HDF5., which is not read; save it with -v7"),
+        ("c.mat", "MATLAB 7.3 .HDF5., which is not supported; save it with -v7"),
         ("d.wav", "cannot be read as WAV"),
         ("e.npz", "cannot be read as NPZ: Object arrays"),
         ("f.wav", "no file"),
-        ("g.npz", "cannot be read as NPZ: it is no archive"),
+        ("g.npz", "cannot be read as NPZ: it is not an archive"),
     ):
         with pytest.raises(ChladniError, match=rf"{name}.*{said}|{said}.*{name}"):
             read_recordings(tmp_path / name)
@@ -252,7 +252,7 @@ def test_a_wav_that_is_shorter_than_it_says_is_refused(tmp_path: Path) -> None:
     at = data.index(b"data") + 4
     for changed in (data[: len(data) // 2], data[:at] + b"\0\0\1\0" + data[at + 4 :]):
         path.write_bytes(changed)
-        with pytest.raises(ChladniError, match=r"a.wav says it holds \d+ bytes of samples, but"):
+        with pytest.raises(ChladniError, match=r"a.wav states \d+ bytes of samples, but"):
             read_recordings(path)
 
 
@@ -260,7 +260,7 @@ def test_channels_said_twice_are_refused_and_those_not_said_named(tmp_path: Path
     path = csv(tmp_path / "a.csv")
     table = tmp_path / "a.channels.csv"
     table.write_text(CHANNELS + "2,12:+Z,g,4\n")
-    with pytest.raises(ChladniError, match=r"line 5: channel 2 is there twice, before in line 3"):
+    with pytest.raises(ChladniError, match=r"line 5: channel 2 occurs twice, first in line 3"):
         read_recordings(path)
     table.write_text(CHANNELS.rpartition("3,")[0])
     (found,) = read_recordings(path)

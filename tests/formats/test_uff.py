@@ -231,7 +231,7 @@ def test_what_is_wrong_is_said_in_a_sentence(tmp_path: Path, kind: str) -> None:
         (record(rsp_node=5, ordinate_spec_data_type=8), "accelerance .*and receptance"),
         (record(rsp_node=5, ordinate_spec_data_type=0), "dataset 2 .*state quantity"),
         (record(rsp_node=5, ordinate_axis_units_lab="m/s"), "accelerance, .*says mobility"),
-        (record(rsp_node=5, data=np.arange(10.0)), "dataset 2 .*without phase"),
+        (record(rsp_node=5, data=np.arange(10.0)), "dataset 2 .*needs phase"),
         (record(rsp_node=5, ref_node=6), "no output was measured for all"),
     ],
 )
@@ -308,7 +308,7 @@ def test_zeros_and_missing_files(tmp_path: Path) -> None:
     zeros = record(data=np.zeros(10, complex))
     with pytest.raises(FileError, match="empty"):
         read_uff(foreign(tmp_path / "a.uff", zeros))
-    with pytest.raises(FileError, match=r"no file .*b\.uff; beside it there are a\.uff"):
+    with pytest.raises(FileError, match=r"no file .*b\.uff; the folder has a\.uff"):
         read_uff(tmp_path / "b.uff")
 
 

@@ -110,7 +110,7 @@ def test_hankel_values_do_not_depend_on_coordinates():
 def test_an_unseen_state_has_no_balanced_realisation():
     f, zeta, phi_out, phi_in = specimen()
     phi_out[:, 2] = 0
-    with pytest.raises(AccuracyError, match="not both seen and driven"):
+    with pytest.raises(AccuracyError, match="not both observable and controllable"):
         balanced(system(f, zeta, phi_out, phi_in))
 
 

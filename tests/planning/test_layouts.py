@@ -153,9 +153,9 @@ def test_ranking_goes_on_below_the_layout():
 
 
 def test_fewer_sensors_than_modes_is_refused():
-    with pytest.raises(ShapeError, match="2 sensors cannot tell 3 modes"):
+    with pytest.raises(ShapeError, match="2 sensors cannot distinguish 3 modes"):
         effective_independence(phi, 2)
-    with pytest.raises(ShapeError, match="10 sensors cannot tell 3 modes apart among 9"):
+    with pytest.raises(ShapeError, match="10 sensors cannot distinguish 3 modes among 9"):
         effective_independence(phi, 10)
 
 
@@ -164,12 +164,12 @@ def test_prior_makes_few_sensors_possible():
 
 
 def test_twin_modes_are_refused():
-    with pytest.raises(ShapeError, match="look alike"):
+    with pytest.raises(ShapeError, match="two modes are equal there"):
         effective_independence(phi[:, [0, 1, 1]], 5)
 
 
 def test_unseen_mode_is_refused():
-    with pytest.raises(ShapeError, match="not seen"):
+    with pytest.raises(ShapeError, match="one is invisible"):
         effective_independence(phi * [1, 1, 0], 5)
 
 
@@ -428,7 +428,11 @@ def test_deletion_respects_tight_regions(seed):
         (Rules([99]), LabelError, "numbered 0 to 8"),
         (Rules([0, 1, 2, 3, 4, 5]), ShapeError, "6 are fixed"),
         (Rules(forbidden=np.arange(6)), ShapeError, "3 of the 9 candidates are allowed"),
-        (Rules(near=~np.eye(9, dtype=bool)), ShapeError, "do not fit at the least distance"),
+        (
+            Rules(near=~np.eye(9, dtype=bool)),
+            ShapeError,
+            "do not fit at the requested minimum distance",
+        ),
         (Rules([0, 1], near=~np.eye(9, dtype=bool)), ShapeError, "0 and 1 are too near"),
         (Rules(region=np.arange(9) // 5, most={0: 0, 1: 2}), ShapeError, "room for 2"),
         (Rules(region=np.arange(9) // 5, least={4: 1}), LabelError, "no candidate is in region 4"),

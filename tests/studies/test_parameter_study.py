@@ -235,15 +235,15 @@ def test_a_number_is_written_everywhere_it_stands(mm):
         ("q=1:2", "there are E, rho"),
         ("E=3e5:1e5", "must increase"),
         ("E=0%:100%", "above zero"),
-        ("E=1:2:3", "is no range"),
+        ("E=1:2:3", "is not a range"),
         ("E=nan:2", "must increase"),
         ("K of PBUSH 9=1:2", "no element of PBUSH 9"),
         ("suspension=1:2", "is an effect"),
         ("E at 12=1:2", 'write "E of PART=LOW:HIGH"'),
-        ("E=1", "is no range"),
-        ("E=90%:", "is no range"),
-        ("E=%:2", "is no range"),
-        ("E of 1=90%:110%:lin", "is no range"),
+        ("E=1", "is not a range"),
+        ("E=90%:", "is not a range"),
+        ("E=%:2", "is not a range"),
+        ("E of 1=90%:110%:lin", "is not a range"),
     ],
 )
 def test_a_bad_range_names_itself(mm, text, named):
@@ -256,7 +256,7 @@ def test_a_bad_range_names_itself(mm, text, named):
 @pytest.mark.parametrize(
     ("vary", "named"),
     [
-        ((), "nothing is varied"),
+        ((), "no parameter is varied"),
         (("t=90%:110%", "t=80%:110%"), "vary the same number"),
         (("E=90%:110%", "E of plate=80%:110%"), "vary the same number"),
         (("nu=90%:190%"), "--vary"),

@@ -140,7 +140,7 @@ def test_it_goes_on_by_the_same_command(out, folder):
         (("--sampler", "dice"), "saltelli"),
         (("--seed", "-1"), "seed"),
         (("--workers", "0"), "workers"),
-        (("--workers", "7777777777777777"), "gain nothing on"),
+        (("--workers", "7777777777777777"), "bring no gain on"),
         (("--band", "9"), "--band"),
         (("--input", "1:+Z"), "both ends"),
         (("--input", "999:+Z", "--output", "1:+Z"), "999"),

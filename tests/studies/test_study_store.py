@@ -73,12 +73,12 @@ def test_a_failed_sample_is_finished_too(model, tmp_path, calls):
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        ({"vary": THREE[:2]}, "what is varied"),
-        ({"vary": ("t=90%:111%", *THREE[1:])}, "what is varied"),
+        ({"vary": THREE[:2]}, "the parameters and their ranges"),
+        ({"vary": ("t=90%:111%", *THREE[1:])}, "the parameters and their ranges"),
         ({"settings": StudySettings(samples=13, modes=2)}, "samples (12 there, 13 now)"),
         ({"settings": StudySettings(samples=12, modes=2, seed=1)}, "seed (0 there, 1 now)"),
         ({"settings": StudySettings(samples=12, modes=2, sampler="lhs")}, "sampler (sobol there"),
-        ({"settings": StudySettings(samples=12, modes=3)}, "what is asked of a sample"),
+        ({"settings": StudySettings(samples=12, modes=3)}, "the results of a sample"),
     ],
 )
 def test_another_study_is_refused(model, tmp_path, change, named):
@@ -109,7 +109,7 @@ def test_another_deck_is_another_study(deck, tmp_path):
 
 def test_files_that_are_no_study_are_left_alone(model, tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(FileError, match="no study"):
+    with pytest.raises(FileError, match="not a study"):
         chladni.study(model, THREE, SETTINGS, out=tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
     with pytest.raises(FileError, match="is a file"):

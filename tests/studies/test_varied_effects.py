@@ -92,17 +92,17 @@ def test_a_mass_on_a_tube(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("point-mass=0.1:0.2", "where\\? write point-mass at GRID"),
+        ("point-mass=0.1:0.2", "no place; write point-mass at GRID"),
         ("point-mass at 99999=0.1:0.2", "grid 99999 is on no shell and no beam"),
-        ("crack=1:2", "crack takes more than one number or a grid; what can be varied are"),
+        ("crack=1:2", "crack takes more than one number or a grid; point-mass"),
         ("local-resonator at 12=1:2", "local-resonator takes more than one number"),
         ("orthotropic-material=1:2", "takes more than one number"),
-        ("suspension=1:2", "where it acts is not known; a case"),
-        ("point-mass at 12=90%:110%", "nothing there of which to take a share"),
+        ("suspension=1:2", "its place is not known; a case"),
+        ("point-mass at 12=90%:110%", "no value there, so a share is not possible"),
         ("point-mass at 12=2:1", "must increase"),
         ("point-mass at 12=0:1:log", "must increase and be above zero"),
         ("point-mass at 12=-1:1", "must increase and not begin below zero"),
-        ("point-mass at 12=a:b", "is no range"),
+        ("point-mass at 12=a:b", "is not a range"),
         ("point-mass of plate=1:2", 'write "point-mass at GRID=LOW:HIGH"'),
     ],
 )

@@ -28,7 +28,7 @@ WORN = {"decks": dict.fromkeys(CalibratedDeck, (1.1, 1.1)) | {CalibratedDeck.GIV
 
 
 def fit_of(name, key):
-    odd = "E of 300 MPa is that of no sealant" if name == "adhesive-stiffness" else ""
+    odd = "E of 300 MPa is too high for a sealant" if name == "adhesive-stiffness" else ""
     effect = SimpleNamespace(name=name, text=f"{name} at grid 7", implausible=lambda x: odd)
     return SimpleNamespace(effect=effect, fit=SimpleNamespace(of=lambda e: np.zeros(1)), key=key)
 
@@ -85,7 +85,11 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
         ),
         (
             table(row("hem-contact", 200.0), row("adhesive-stiffness", 199.0)),
-            ("evidence (2 ln B = 1.0) against adhesive-stiffness", "that of no sealant", "settle"),
+            (
+                "evidence (2 ln B = 1.0) against adhesive-stiffness",
+                "too high for a sealant",
+                "settle",
+            ),
         ),
         (
             table(row("crack", 15.0, votes=Votes(0.0))),

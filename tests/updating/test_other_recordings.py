@@ -90,8 +90,8 @@ def test_frequencies_that_move_from_level_to_level_are_named(stretch, moves):
     others, _ = others_identified(question, (20.0, 170.0))
     first = AtLevel(question.level, question.frf, identify(question.frf, (20.0, 170.0)))
     note = level_notes(level_study([first, *levels(others)]))[0]
-    drifted = "every mode moves by one factor from level to level (1, 4)"
-    calm = "no natural frequency and no damping moves with level (1, 4)"
+    drifted = "all modes change by one factor from level to level (1, 4)"
+    calm = "no natural frequency or damping changes with level (1, 4)"
     assert note.startswith(drifted if moves else calm)
 
 

@@ -164,7 +164,7 @@ def test_poles_outside_of_the_band_are_refused(tmp_path: Path) -> None:
 
 def test_time_records_are_no_responses(tmp_path: Path) -> None:
     np.savez(tmp_path / "t.npz", force=np.zeros(4), fs=np.array(48e3))
-    with pytest.raises(ChladniError, match=r"t\.npz: time data holds one array force and one of"):
+    with pytest.raises(ChladniError, match=r"t\.npz: time data need one array force and one of"):
         load_case(case_of(tmp_path, "t.npz", plate_deck(), 'quantity = "accelerance"\n'))
 
 

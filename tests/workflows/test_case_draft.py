@@ -126,7 +126,7 @@ def test_by_the_nearest_with_its_distance(deck, frf, places, tmp_path):
     assert set(ways(made).values()) == {"nearest"}
     inside = made.dofs[0]  # the others may lie beyond the plate's edge
     assert inside.distance == pytest.approx(0.02, rel=1e-3)
-    assert any("places are more than 10 mm off the mesh" in n for n in made.notes)
+    assert any("places are more than 10 mm from the mesh" in n for n in made.notes)
 
 
 def test_what_is_missing_is_named_with_its_remedy(deck, frf, places, tmp_path):

@@ -106,8 +106,8 @@ def test_a_sensor_may_have_a_name(planned, tmp_path):
     ("text", "name", "told"),
     [
         (None, "none.json", "no file"),
-        ("{}", "plan.json", "is no plan.json"),
-        ("[1, 2]", "plan.json", "is no plan.json"),
+        ("{}", "plan.json", "is not a plan.json"),
+        ("[1, 2]", "plan.json", "is not a plan.json"),
         ("label,role\n2:+Z,output\n", "sensors.csv", "names no input"),
         ("label,role\n2:+Z,output\n999:+Z,input\n", "sensors.csv", "no grid 999"),
     ],

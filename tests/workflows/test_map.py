@@ -76,7 +76,7 @@ def test_a_file_that_lies_elsewhere_is_brought_or_refused(deck, tmp_path):
     )
     done = call("map", deck, away, "--units", "mm-t-s", "--out", tmp_path / "out")
     assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
-    assert "bring it onto the deck" in done.output
+    assert "move it onto the deck" in done.output
     done = call("map", deck, away, "--units", "mm-t-s", "--align", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     (part,) = json.loads((tmp_path / "out" / "mapping.json").read_text())["parts"]
@@ -233,7 +233,7 @@ def test_words_about_thickness_are_refused_by_a_sentence(folder, tmp_path, line,
         (["formed.k"], "--units"),
         (["formed.k", "--units", "mm-t-s", "--pair", "inner"], "PART=ID"),
         (["formed.k", "--units", "mm-t-s", "--pair", "nose=1"], "nose"),
-        (["formed.k", "--units", "mm-t-s", "--formed-units", "SI"], "is the unit system right"),
+        (["formed.k", "--units", "mm-t-s", "--formed-units", "SI"], "check the unit system"),
     ],
 )
 def test_what_cannot_be_mapped_is_told(deck, formed, tmp_path, words, told):

@@ -162,5 +162,5 @@ def test_a_base_without_supports_is_refused(heavy, tmp_path, command):
     (tmp_path / "case.toml").write_text(heavy.path.read_text())
     done = CliRunner().invoke(application(), [command, str(tmp_path), "--out", str(tmp_path / "x")])
     assert done.exit_code == 2
-    assert "the base moves, but the deck holds no grid by SPC" in done.stderr
+    assert "the base moves, but the deck has no grid with SPC" in done.stderr
     assert not (tmp_path / "x").exists()

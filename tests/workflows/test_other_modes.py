@@ -145,7 +145,7 @@ def test_modes_of_another_deck_are_refused(plain, tmp_path):
     far = punch(tmp_path / "far.pch", f, motion, model.assembly.ids + 5000)
     done = call("correlate", model.source, "--modes", far, "--out", tmp_path / "out")
     assert done.exit_code == 2
-    assert "is it of this deck" in done.output
+    assert "belongs to this deck" in done.output
 
 
 def test_a_deck_without_modes_is_told_what_is_due(plain, tmp_path):

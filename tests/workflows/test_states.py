@@ -181,6 +181,6 @@ def test_two_shakers_an_article_and_a_level(tmp_path):
     notes = " ".join(told["notes"])
     assert "stacked with a.npz as one test with 2 inputs" in notes
     assert "other.npz and the recording that is fitted differ by" in notes
-    assert "nonlinear: natural frequencies move with level: " in notes
+    assert "nonlinear: natural frequencies change with level: " in notes
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "no deck can be expected to come closer" in page

@@ -150,7 +150,7 @@ def record(
     """
     driven = rig.article.on_table or rig.setup.shaker is not None
     if (test.excitation == "hammer") == driven:
-        raise ModelError("a hammer hits an article without a shaker, anything else needs one")
+        raise ModelError("a hammer test has no shaker; all other tests need one")
     rate = sampling_rate(test.band[1])
     channels = channels or channels_of(rig, rng)
     run = PhysicalRun(rig, rate, test)

@@ -115,7 +115,9 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
     """
     setup = setup or BenchSetup()
     if article.on_table and (setup.shaker is not None or article.laws):
-        raise ModelError("a shaker table moves the supports: no shaker and no local forces beside")
+        raise ModelError(
+            "a shaker table moves the supports, so it allows neither a shaker nor local forces"
+        )
     r = len(article.frequency)
     usual = cords_for(article.weight, len(article.hangers), setup.rubber)
     cords = usual if setup.cords is None else setup.cords

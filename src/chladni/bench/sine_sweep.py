@@ -94,7 +94,8 @@ def swept(
     seconds = test.sweeps * sum(line.seconds for line in lines)
     said = (
         f"stepped sine: {len(lines)} lines, {test.sweeps} sweeps, {seconds / 60:.3g} minutes on "
-        f"the bench; the transient left in a line is at most {100 * max(sweep.left):.2g} % of it"
+        f"the bench; the remaining transient of a line is at most {100 * max(sweep.left):.2g} % "
+        "of it"
     )
     return BenchRecording(
         rig.article.name, test, frf, float(test.sweeps), sweep.time(), None,

@@ -93,12 +93,12 @@ def _field(section: TomlSection) -> str:
     if what in {f.name for f in families() if f.placed is None}:
         raise FileError(
             f"{section.at('field')} = {what!r} has an unknown place, so calibration cannot free "
-            f"it; diagnose looks for it; what can be freed are {', '.join(freeable)}"
+            f"it; diagnose searches for it; fields that can be freed: {', '.join(freeable)}"
         )
     if what in PLANNED:
         raise FileError(
-            f"{section.at('field')} = {what!r} is an effect no model stands behind yet; what can "
-            f"be freed are {', '.join(freeable)}"
+            f"{section.at('field')} = {what!r} is an effect without a model; fields that can be "
+            f"freed: {', '.join(freeable)}"
         )
     return section.text("field", among=freeable) or ""
 
@@ -124,7 +124,7 @@ def _placed(section: TomlSection, made: Assembly, what: str, name: str) -> FreeP
     for k in positions:
         if k not in usable:
             raise FileError(
-                f"{section.at('parts')}: {made.parts[k].name} is no isotropic sheet "
+                f"{section.at('parts')}: {made.parts[k].name} is not an isotropic sheet "
                 f"({_kind(made.parts[k])}), so it cannot be made orthotropic"
             )
     chosen = (positions or usable) if what == "orthotropic-material" else []
@@ -179,9 +179,7 @@ def _lumps(
     """(family, rows) of the springs, bushes or masses a card stands for."""
     where = section.at("parts")
     if kind not in _LUMPS:
-        raise LabelError(
-            f"{where}: {kind} {id} has no number to free; there are {', '.join(_LUMPS)}"
-        )
+        raise LabelError(f"{where}: {kind} {id} has no free number; there are {', '.join(_LUMPS)}")
     ids = _elements(deck, kind, id)
     family = _LUMPS[kind]
     rows = np.flatnonzero(np.isin(getattr(made, family).ids, ids)).tolist()
@@ -223,14 +221,14 @@ def _all_that_have(
         lumps["bushes"] = np.flatnonzero(made.bushes.stiffness.any(axis=1)).tolist()
     if not positions and not any(lumps.values()):
         there = ", ".join(dict.fromkeys(_kind(p) for p in made.parts)) or "no parts"
-        raise FileError(f"{section.at('field')} = {field!r}: nothing in the deck has it ({there})")
+        raise FileError(f"{section.at('field')} = {field!r}: no part of the deck has it ({there})")
     return positions, lumps
 
 
 def _serves(section: TomlSection, part: Part, field: str) -> None:
     """Refuse a field the part has not."""
     if field not in fields_of(part):
-        have = ", ".join(fields_of(part)) or "nothing that can be freed"
+        have = ", ".join(fields_of(part)) or "no field that can be freed"
         raise FileError(
             f"{section.at('field')} = {field!r} cannot be freed of {part.name}, {_kind(part)}, "
             f"which has {have}"

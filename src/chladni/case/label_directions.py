@@ -38,8 +38,8 @@ def ways_said(made: Assembly, found: MeasuredDofs, tabled: Iterable[str]) -> lis
         return []
     is_ = "says" if len(other) == 1 else "say"
     return [
-        f"{named(other)} {is_} another direction than the table of sensors: the table counts; "
-        "mend it, or the label"
+        f"{named(other)} {is_} another direction than the table of sensors: the table is used; "
+        "correct the table or the label"
     ]
 
 

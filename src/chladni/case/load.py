@@ -100,7 +100,9 @@ class Case:
         out = [*self.notes, *unread(self.given, command)]
         if self.sensor_masses and command in key("sensors.csv", "mass").used:
             said = weight(self.assembly, self.outputs, self.inputs, "sensors.csv")
-            out.append(f"{said}, at {len(self.sensor_masses)} grids; the weighed mass is without.")
+            out.append(
+                f"{said}, at {len(self.sensor_masses)} grids; the weighed mass excludes them."
+            )
         return out
 
     def lines(self, frequency: np.ndarray) -> np.ndarray:
@@ -147,7 +149,7 @@ def load_case(path: str | Path) -> Case:
     notes += notes_of(recordings, "use" in test)
     notes += remarks(deck, STRUCTURAL)
     if allow:
-        notes.append(f"passed over as [model] allow says: {named(allow, 20)}")
+        notes.append(f"ignored by [model] allow: {named(allow, 20)}")
     if outside:
         notes.append(OUTSIDE)
     band, exclude = _bands(keys, recordings, notes)
@@ -185,7 +187,7 @@ def load_case(path: str | Path) -> Case:
 def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
     """A file the case names, in its folder unless others are allowed."""
     if "\0" in name:
-        raise FileError(f"{section.at(key)} = {name[:60]!r} is no name of a file")
+        raise FileError(f"{section.at(key)} = {name[:60]!r} is not a file name")
     path = section.file.parent / name
     way = Path(os.path.normpath(name))
     if not outside and (way.is_absolute() or ".." in way.parts):
@@ -211,7 +213,7 @@ def _thickness(
     if name is None:
         for word, value in (("thickness_units", own), ("thickness_place", place)):
             if value is not None:
-                raise FileError(f"{model.at(word)} is of a file of thickness, but none is named")
+                raise FileError(f"{model.at(word)} needs a file of thickness, but none is named")
         return made, []
     path = _file(model, "thickness", name, outside)
     try:
@@ -227,7 +229,7 @@ def _recordings(
     """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
     if (factor := test.number("factor")) == 0:
-        raise FileError(f"{test.at('factor')} = 0 leaves nothing of the recording")
+        raise FileError(f"{test.at('factor')} = 0 removes the recording")
     how = test.text("frequency_unit", among=tuple(HERTZ)) or "Hz", test.flag("conjugated")
     listed = [(test, "recordings", name) for name in test.list("recordings", str) or []]
     named = {name for _, _, name in listed}
@@ -265,8 +267,8 @@ def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
         if set(ours) != set(theirs):
             only = sorted(set(ours) ^ set(theirs))
             raise FileError(
-                f"{test.at('recordings')}: {first.name} and {other.name} disagree on {word}: "
-                f"{named(only)} in one of them only"
+                f"{test.at('recordings')}: {first.name} and {other.name} disagree on {word}: only "
+                f"one of them has {named(only)}"
             )
     if a.quantity != b.quantity:
         raise FileError(
@@ -282,7 +284,9 @@ def _setup(test: TomlSection, made: Assembly, outside: bool) -> TestSetup:
     mass = test.number("mass", low=1e-9)
     mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0), high=mass or 1e300)
     if mass is None and mass_sd is not None:
-        raise FileError(f"{test.at('mass_sd')} says how far a mass is known, but there is no mass")
+        raise FileError(
+            f"{test.at('mass_sd')} gives the standard deviation of a mass, but there is no mass"
+        )
     hangers = test.list("hangers", int) or []
     for grid in hangers:
         grid_row(made, grid, test.at("hangers"))
@@ -322,7 +326,7 @@ def _base_and_quantity(
         due = (
             "its input must be base:+X, +Y or +Z"
             if not base.any()
-            else ('what a moving base causes is quantity = "transmissibility"')
+            else ('the quantity of a moving base is quantity = "transmissibility"')
         )
         raise FileError(
             f"{test.at('quantity')}: {recordings[0].name} is {quantity} from "
@@ -356,11 +360,13 @@ def _inside(
         lines = int(np.count_nonzero((low <= f) & (f <= high)))
         if high - low < 0.5 * (band[1] - band[0]) or lines < 2:
             raise FileError(
-                f"{section.at(key)} = [{band[0]:g}, {band[1]:g}] Hz lies outside of {r.name}, "
-                f"which holds {f[0]:g} to {f[-1]:g} Hz ({lines} lines in common)"
+                f"{section.at(key)} = [{band[0]:g}, {band[1]:g}] Hz lies outside {r.name}, which "
+                f"covers {f[0]:g} to {f[-1]:g} Hz ({lines} lines in common)"
             )
         if (low, high) != band and max(low - band[0], band[1] - high) > 0.02 * (high - low):
-            notes.append(f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, all {r.name} holds")
+            notes.append(
+                f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, the range of {r.name}"
+            )
         band = (low, high)
     return band
 
@@ -378,7 +384,7 @@ def _held(
     if value is None:
         return None, band
     if not outputs:
-        raise FileError(f"{section.at('sensors')}: there are no FRFs of which to hold any out")
+        raise FileError(f"{section.at('sensors')}: there are no FRFs to hold out")
     if isinstance(value, list):
         labels = section.list("sensors", str) or []
         for label in labels:
@@ -387,9 +393,11 @@ def _held(
                     f"{section.at('sensors')}: no output {label!r}; there are {named(outputs, 8)}"
                 )
         if set(labels) >= set(outputs):
-            raise FileError(f"{section.at('sensors')} names every output; none is left to fit")
+            raise FileError(
+                f"{section.at('sensors')} names every output, so no output is left to fit"
+            )
         return tuple(labels), band
     count = section.number("sensors", low=0, high=max(len(outputs) - 1, 0)) or 0.0
     if count != int(count):
-        raise FileError(f"{section.at('sensors')} = {count:g} is no whole number")
+        raise FileError(f"{section.at('sensors')} = {count:g} is not a whole number")
     return int(count), band

@@ -41,11 +41,11 @@ class FormedThickness:
         ]
         if fit is not None:
             out.append(
-                f"{self.source.name} was brought onto the deck from {fit.start}; the nearer 80 % "
-                f"of it stay {1e3 * fit.residual:.3g} mm rms away."
+                f"{self.source.name} was moved onto the deck from {fit.start}; its closest 80 % "
+                f"have a distance of {1e3 * fit.residual:.3g} mm rms."
             )
         if half := [p.part for p in parts if p.coverage < HALF_COVERED]:
-            out.append(f"Less than half of {', '.join(half)} found its sheet in the file.")
+            out.append(f"Less than half of {', '.join(half)} has a matching sheet in the file.")
         return [*out, *self.notes]
 
 
@@ -96,8 +96,9 @@ def _refuse_elsewhere(path: Path, mapped: Mapped, place: str) -> None:
     if found < LEAST_COVERED:
         lies = place == PLACES[0]
         raise FileError(
-            f"{path}: {100 * found:.2g} % of the area of {len(mapped.parts)} parts found a sheet "
-            f"in it; {'bring it onto the deck (aligned)' if lies else 'is it of another part?'}"
+            f"{path}: {100 * found:.2g} % of the area of {len(mapped.parts)} parts has a matching "
+            "sheet in it; "
+            f"{'move it onto the deck (aligned)' if lies else 'it may belong to another part'}"
         )
 
 

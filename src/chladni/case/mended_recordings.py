@@ -34,10 +34,10 @@ def with_frf(
         found = estimate(r.time, settings or EstimateSettings())
     except ChladniError as error:
         raise FileError(
-            f"{r.name}: {error} (chladni test {r.name} estimates FRFs with settings of your own)"
+            f"{r.name}: {error} (chladni test {r.name} estimates FRFs with your settings)"
         ) from error
     notes = tuple(f"{r.name}: {said}" for said in found.notes)
-    said = f"{r.name}: FRFs estimated from time data by {found.method}, as chladni test does"
+    said = f"{r.name}: FRFs estimated from time data by {found.method}, as in chladni test"
     with_it = replace(
         r, frf=found.frf, notes=(*r.notes, said, *notes), added_damping=found.added_damping
     )
@@ -76,23 +76,23 @@ def mended(r: Recording, factor: float, delay: float, sensors: Sequence[Sensor])
     if unused:
         kept = [o for o in frf.outputs if o not in unused]
         if not kept:
-            raise FileError(f"{r.name}: the table of sensors leaves every output out")
+            raise FileError(f"{r.name}: the table of sensors excludes every output")
         frf = frf.sel(outputs=kept)
-        notes.append(f"{r.name}: {', '.join(unused)} left out, as the table of sensors says")
+        notes.append(f"{r.name}: {', '.join(unused)} excluded by the table of sensors")
     gains = np.array([_row(table, o).gain for o in frf.outputs])
     drives = np.array([table[i, "input"].gain if (i, "input") in table else 1.0
                        for i in frf.inputs])  # fmt: skip
     if (gains != 1).any() or (drives != 1).any():
         named = [*zip(frf.outputs, gains, strict=True), *zip(frf.inputs, drives, strict=True)]
         said = ", ".join(f"{label} by {g:g}" for label, g in named if g != 1)
-        notes.append(f"{r.name}: gains of the table of sensors taken off: {said}")
+        notes.append(f"{r.name}: divided by the gains of the table of sensors: {said}")
         frf = _times(frf, drives[None, None, :] / gains[None, :, None])
     if factor != 1:
         frf = _times(frf, np.array(factor))
-        notes.append(f"{r.name}: all FRFs times {factor:g}, as [test] factor says")
+        notes.append(f"{r.name}: all FRFs multiplied by [test] factor = {factor:g}")
     if delay:
         frf = _times(frf, np.exp(2j * np.pi * frf.frequency * delay)[:, None, None])
-        notes.append(f"{r.name}: a delay of {delay:g} s taken off, as [test] delay says")
+        notes.append(f"{r.name}: [test] delay = {delay:g} s removed")
     return replace(r, frf=frf, notes=tuple(notes))
 
 
@@ -100,7 +100,7 @@ def read_as(r: Recording, unit: str, conjugated: bool) -> Recording:
     """A recording whose frequencies are in a unit of ``HERTZ``, or whose phases are reversed."""
     frf, poles, k, notes = r.frf, r.poles, HERTZ[unit], list(r.notes)
     if k != 1:
-        notes.append(f"{r.name}: frequencies read in {unit}, as [test] frequency_unit says")
+        notes.append(f"{r.name}: frequencies read in {unit} ([test] frequency_unit)")
         if frf is not None:
             frf = replace(frf, frequency=frf.frequency * k)
         if poles is not None:
@@ -108,7 +108,7 @@ def read_as(r: Recording, unit: str, conjugated: bool) -> Recording:
             poles = replace(poles, frequency=f, frequency_sd=sd)
     if conjugated and frf is not None:
         frf = replace(frf, values=frf.values.conj())
-        notes.append(f"{r.name}: all FRFs conjugated, as [test] conjugated says")
+        notes.append(f"{r.name}: all FRFs conjugated ([test] conjugated)")
     return replace(r, frf=frf, poles=poles, notes=tuple(notes))
 
 

@@ -45,9 +45,9 @@ def _told(section: TomlSection, r: Recording) -> Recording:
     level = section.number("level", low=0.0)
     for word, said, own in (("article", article, r.article), ("level", level, r.level)):
         if own not in ("", None) and said not in (None, own):
-            raise FileError(f"{section.at(word)} = {said!r}, but {r.name} itself says {own!r}")
+            raise FileError(f"{section.at(word)} = {said!r}, but {r.name} states {own!r}")
     if state and r.poles is not None and any(r.poles.states):
-        raise FileError(f"{section.at('state')}: {r.name} has a column state of its own")
+        raise FileError(f"{section.at('state')}: {r.name} has its own column state")
     if state and r.poles is not None:
         r = replace(r, poles=replace(r.poles, state=(state,) * len(r.poles.state)))
     mass = section.number("mass", low=1e-9)
@@ -98,9 +98,9 @@ def refuse_copies(recordings: Sequence[Recording], where: str) -> None:
                 continue
             if same_numbers(a.frf, b.frf):
                 raise FileError(
-                    f"{where}: {b.name} holds the same numbers as {a.name}; a repeat is a "
-                    "measurement of its own: leave one of them out, or name another article, "
-                    "level or state in [[recording]]"
+                    f"{where}: {b.name} has the same numbers as {a.name}, so it is not a repeat: "
+                    "leave one of them out, or name another article, level or state in "
+                    "[[recording]]"
                 )
 
 
@@ -155,8 +155,8 @@ def _joined(a: Recording, b: Recording) -> Recording:
     if len(i) < LEAST_SHARED * most:
         raise FileError(
             f"{a.name} and {b.name} drive one article at different places, but only {len(i)} of "
-            f"{most} lines are the same: measure them at the same lines, or name them as articles "
-            "of their own ([[recording]] article)"
+            f"{most} lines are the same: measure them at the same lines, or name them as separate "
+            "articles ([[recording]] article)"
         )
     outputs = _shared(a.frf, b.frf)
     parts = [_rows(a.frf, i, outputs), _rows(b.frf, j, outputs)]
@@ -164,9 +164,9 @@ def _joined(a: Recording, b: Recording) -> Recording:
     inputs = len(a.frf.inputs) + len(b.frf.inputs)
     said = f"{b.name}: stacked with {a.name} as one test with {inputs} inputs"
     if left:
-        said += f"; outputs that only one of them has are left out: {', '.join(left[:6])}"
+        said += f"; outputs in only one of them are left out: {', '.join(left[:6])}"
     if len(i) < most:
-        said += f"; {most - len(i)} lines that only one of them has are left out"
+        said += f"; {most - len(i)} lines in only one of them are left out"
     return replace(
         a, name=f"{a.name} + {b.name}", frf=_side_by_side(parts), nodes={**b.nodes, **a.nodes},
         axes={**b.axes, **a.axes}, functions=(*a.functions, *b.functions),

@@ -28,11 +28,11 @@ def compared_first(test: TomlSection, read: Sequence[Recording]) -> tuple[Record
     if len(chosen) != 1:
         known = ", ".join(dict.fromkeys(n for r in read for n in _names(r))) or "none"
         count = f"{len(chosen)} recordings are" if chosen else "no recording is"
-        raise FileError(f"{test.at('use')} = {wanted!r}: {count} called so; there are {known}")
+        raise FileError(f"{test.at('use')} = {wanted!r}: {count} so named; there are {known}")
     first = chosen[0]
     rest = [r for r in ranked if r is not first]
     if first.frf is None and first.poles is None:
-        raise FileError(f"{test.at('use')} = {wanted!r} holds neither FRFs nor poles")
+        raise FileError(f"{test.at('use')} = {wanted!r} has neither FRFs nor poles")
     if first.poles is not None and wanted in first.poles.states:
         first = replace(first, poles=_state_first(first.poles, wanted))
     return (first, *rest)
@@ -92,7 +92,7 @@ def notes_of(recordings: Sequence[Recording], alone: bool = True) -> list[str]:
     idle += [r.name for r in recordings[1:] if first.frf is None or r.frf is None]
     if held:
         out.append(
-            f"{first.name} is compared with the model; no fit sees the others, calibrate and "
+            f"{first.name} is compared with the model; the others are held out, and calibrate and "
             f"diagnose score the decks on them: {'; '.join(held)}"
         )
     if idle:
@@ -102,7 +102,7 @@ def notes_of(recordings: Sequence[Recording], alone: bool = True) -> list[str]:
     elif first.level is not None or first.article:
         level = "" if first.level is None else f"level {first.level:g}"
         said = ", ".join(s for s in (first.article and f"article {first.article}", level) if s)
-        out.append(f"{first.name} ({said}) is what is fitted; nothing scales with level")
+        out.append(f"{first.name} ({said}) is fitted; no quantity scales with level")
     for r in recordings:
         out += _idle(r)
     return out
@@ -112,8 +112,8 @@ def _every_state(among: Sequence[str]) -> str:
     """How states are gone about."""
     named = ", ".join(repr(s) for s in among)
     return (
-        f"states {named}: calibrate and diagnose take each of them, what is common is shared; "
-        "other commands take the first ([test] use names another)"
+        f"states {named}: calibrate and diagnose use all of them with shared parameters; other "
+        "commands use the first ([test] use names another)"
     )
 
 
@@ -122,9 +122,9 @@ def _other(first: Recording, r: Recording) -> str:
     assert first.frf is not None
     assert r.frf is not None
     away = deviation(first.frf, r.frf)
-    far = "at other lines" if away is None else f"{away:.2g} decades rms off"
+    far = "at other lines" if away is None else f"{away:.2g} decades rms apart"
     if same_numbers(first.frf, r.frf):
-        far = "the same numbers: it is a copy, or was made without noise"
+        far = "the same numbers: a copy, or simulated without noise"
     said = [f"state {r.state!r}"] * (r.state != first.state)
     said += [f"article {r.article}"] * (r.article != first.article)
     said += [f"level {r.level:g}"] if r.level is not None and r.level != first.level else []
@@ -157,7 +157,7 @@ def _poles(r: Recording, alone: bool) -> list[str]:
             "([test] use names another)"
         )
     if np.isfinite(r.poles.damping).any():
-        out.append(f"{r.name}: the damping of the poles is not used, no damping is fitted")
+        out.append(f"{r.name}: the damping of the poles is not used, because no damping is fitted")
     return out
 
 
@@ -166,8 +166,8 @@ def _idle(r: Recording) -> list[str]:
     out = []
     if r.frf is None and r.poles is None and (used := responses(r.functions)):
         out.append(
-            f"{r.name}: {len(used)} records of responses ({used[0].kind}) and no force: correlate, "
-            "calibrate and diagnose take natural frequencies from them"
+            f"{r.name}: {len(used)} records of responses ({used[0].kind}) and no force: "
+            "correlate, calibrate and diagnose use their natural frequencies"
         )
     if r.shapes is not None:
         out.append(f"{r.name}: its {len(r.shapes.frequency)} mode shapes are not used")

@@ -46,8 +46,8 @@ def places(
     elsewhere = seated and not numbers_agree(made, nodes)
     if not seated and count_channels(spoken):
         raise LabelError(
-            f"{test.at('recordings')}: the labels {named(spoken, 3)} number channels: no "
-            "coordinates say that they are the grids of these numbers; give each its grid or its "
+            f"{test.at('recordings')}: the labels {named(spoken, 3)} are taken as channel "
+            "numbers, because no coordinates show that they are grids; give each its grid or "
             "place in sensors.csv"
         )
     known = {**table, **{n: _spoken(n, test, made, nodes, axes, elsewhere) for n in spoken}}
@@ -114,7 +114,7 @@ def _off_said(made: Assembly, role: Role, given: list[np.ndarray]) -> list[str]:
     if off <= 1e-6 * float(np.linalg.norm(np.ptp(made.points, axis=0))):
         return []
     what = "nearest points of the shells" if len(made.shells) else "nearest grids"
-    return [f"places of {role}s are up to {1e3 * off:.3g} mm off the mesh: the {what} count"]
+    return [f"places of {role}s are up to {1e3 * off:.3g} mm from the mesh: the {what} are used"]
 
 
 def _nodes_said(
@@ -138,22 +138,22 @@ def _nodes_said(
     out = []
     if free := [n for n in ids if n not in row and n in nodes]:
         out.append(
-            f"nodes {named(free)} of the recording are no grids of the deck: they sit where the "
-            "recording has them, read in the deck's basic frame"
+            f"nodes {named(free)} of the recording are not grids of the deck: they are at the "
+            "places of the recording, read in the deck's basic frame"
         )
     if turned := [n for n in ids if n in axes]:
-        out.append(f"directions at nodes {named(turned)} are along the recording's own axes there")
+        out.append(f"directions at nodes {named(turned)} are along the recording's local axes")
     both = [n for n in ids if n in row and n in nodes]
     if both and unit != "m":
-        out.append(f"coordinates of the recording fit the deck in {unit}: they were read so")
+        out.append(f"coordinates of the recording were read in {unit}, which fits the deck")
     away = {n: float(np.linalg.norm(made.points[row[n]] - nodes[n])) for n in both}
     if away and max(away.values()) > OFF * size_of(made):
         worst = max(away, key=lambda n: away[n])
         off = sum(d > OFF * size_of(made) for d in away.values())
         out.append(
             f"node {worst} of the recording is {away[worst]:.3g} m away from grid {worst} of the "
-            f"deck ({off} of {len(away)} are off): the {'places' if elsewhere else 'grids'} were "
-            "taken; rows of sensors.csv say it otherwise"
+            f"deck ({off} of {len(away)} differ): the {'places' if elsewhere else 'grids'} were "
+            "used; rows of sensors.csv can change this"
         )
     return out
 
@@ -188,7 +188,7 @@ def weight_of_sensors(
 ) -> str:
     """State the mass of the sensors and of the devices at the drive points, in words."""
     grams = [1e3 * sum(m for _, m in sensor_masses(made, at)) for at in (outputs, inputs)]
-    named = ("sensors of {:.3g} g in all", "{:.3g} g where it is driven")
+    named = ("sensors of {:.3g} g in all", "{:.3g} g at the drive point")
     said = [text.format(g) for text, g in zip(named, grams, strict=True) if g]
     return f"The model carries {' and '.join(said)} ({table})"
 
@@ -208,7 +208,7 @@ def _place(
 
 def _base(made: Assembly, sensor: Sensor, where: str) -> np.ndarray:
     if len(made.supports) == 0:
-        raise LabelError(f"{where}: the base moves, but the deck holds no grid by SPC")
+        raise LabelError(f"{where}: the base moves, but the deck has no grid with SPC")
     if sensor.direction is None:
         raise LabelError(f"{where}: the base has no normal; write base:+X, base:+Y or base:+Z")
     return sensor.direction
@@ -230,12 +230,14 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
     if away > _FAR * size:
         raise LabelError(
-            f"{where}: its place ({named(place.tolist())}) m is {away:.3g} m away from the "
-            f"structure, which is {size:.3g} m across; places are in metres, basic frame"
+            f"{where}: its place ({named(place.tolist())}) m is {away:.3g} m from the structure, "
+            f"which is {size:.3g} m across; places are in metres, basic frame"
         )
     way = sensor.direction if sensor.direction is not None else normal
     if way is None:
-        raise LabelError(f"{where}: no shell there, hence no normal; give +X, +Y, +Z or nx, ny, nz")
+        raise LabelError(
+            f"{where}: it has no shell and so no normal; give +X, +Y, +Z or nx, ny, nz"
+        )
     return grid, place if grid == 0 else made.points[row], way, sensor
 
 
@@ -255,6 +257,6 @@ def grid_row(made: Assembly, grid: int, where: str) -> int:
         return row
     near = made.ids[np.argsort(np.abs(made.ids - grid), kind="stable")[:3]].tolist()
     raise LabelError(
-        f"{where}: the deck has no grid {grid}, the nearest ids are {named(near)}; "
-        "a place that is no grid goes into sensors.csv"
+        f"{where}: the deck has no grid {grid}, the nearest ids are {named(near)}; write other "
+        "places into sensors.csv"
     )

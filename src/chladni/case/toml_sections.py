@@ -22,9 +22,9 @@ def _why(said: str) -> str:
     if "digits)" in said:
         return "a number has thousands of digits"
     said = re.sub(rf"\((?:{_QUOTED},? ?)+\)", _dotted, said)
-    said = re.sub(r"Cannot declare (\[.*\]) twice", r"\1 is there twice", said)
+    said = re.sub(r"Cannot declare (\[.*\]) twice", r"\1 occurs twice", said)
     said = re.sub(r"Cannot mutate immutable namespace (\[.*\])", r"\1 has a value already", said)
-    return said.replace("Cannot overwrite a value", "a key is there twice")
+    return said.replace("Cannot overwrite a value", "a key occurs twice")
 
 
 def _dotted(names: re.Match[str]) -> str:
@@ -107,7 +107,7 @@ class TomlSection:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise FileError(f"{self.at(key)} = {_short(value)} is not a number")
         if abs(value) > 1e300:
-            raise FileError(f"{self.at(key)} = {_short(value)} is beyond any use")
+            raise FileError(f"{self.at(key)} = {_short(value)} is too large")
         if not low <= value <= high:
             bound = f"at least {low:g}" if high > 1e299 else f"between {low:g} and {high:g}"
             raise FileError(f"{self.at(key)} = {value:g}; it must be {bound}")
@@ -122,9 +122,9 @@ class TomlSection:
         word = {str: "text in quotes", int: "whole numbers"}[kind]
         for item in items:
             if isinstance(item, bool) or not isinstance(item, kind):
-                raise FileError(f"{self.at(key)} holds {_short(item)}; write a list of {word}")
+                raise FileError(f"{self.at(key)} contains {_short(item)}; write a list of {word}")
             if isinstance(item, int) and not 0 < item < 2**31:
-                raise FileError(f"{self.at(key)} holds {_short(item)}, which is no id of a grid")
+                raise FileError(f"{self.at(key)} contains {_short(item)}, which is not a grid id")
         return items
 
     def band(self, key: str) -> tuple[float, float] | None:
@@ -195,9 +195,9 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
     except UnicodeDecodeError as error:
         raise FileError(f"{path.name} is {not_text(error)}") from error
     except RecursionError as error:
-        raise FileError(f"{path.name} is no TOML: its brackets are nested too deep") from error
+        raise FileError(f"{path.name} is not TOML: its brackets are nested too deep") from error
     except ValueError as error:  # TOMLDecodeError, and numbers beyond any use
-        raise FileError(f"{path.name} is no TOML: {_why(str(error))}") from error
+        raise FileError(f"{path.name} is not TOML: {_why(str(error))}") from error
     headers, lines = _places(text)
     tables = {}
     for name, value in values.items():

@@ -116,8 +116,8 @@ class _Problem:
         except NotDefinite as error:
             at = label(*self.dofs[self.fronts.order[error.row]])
             raise ModelError(
-                f"K - σM is not positive definite at σ = {sigma:.2e} (seen at {at}): "
-                "a part hangs on nothing, or a stiffness is negative"
+                f"K - σM is not positive definite at σ = {sigma:.2e} (seen at {at}): a part is "
+                "not connected, or a stiffness is negative"
             ) from error
 
     def below(self, s: float) -> int:
@@ -191,7 +191,7 @@ def _small(
         except LinAlgError as error:
             fault = error
     else:
-        raise ModelError("K - σM is not positive definite: a part hangs on nothing") from fault
+        raise ModelError("K - σM is not positive definite: a part is not connected") from fault
     if len(lam) and lam[0] < -max(_GUESS * scale.typical, scale.rounding):
         raise ModelError(f"a stiffness is negative: the lowest λ is {lam[0]:.2e} rad²/s²")
     return lam, phi
@@ -317,8 +317,8 @@ def _heaviest(problem: _Problem) -> str:
     d = np.where(problem.dofs[:, 1] <= 3, problem.M.diagonal(), 0.0)
     k, usual = int(np.argmax(d)), np.median(d[d > 0]) if np.any(d > 0) else np.inf
     return (
-        f"is a mass or a stiffness out of all proportion? {label(*problem.dofs[k])} has "
-        f"{d[k] / usual:.2g} times the usual mass"
+        f"a mass or a stiffness may be wrong: {label(*problem.dofs[k])} has {d[k] / usual:.2g} "
+        "times the usual mass"
     )
 
 

@@ -29,8 +29,8 @@ def _coherence(gamma: np.ndarray) -> np.ndarray:
     low, high = float(np.min(gamma)), float(np.max(gamma))
     if not (low >= -_LOOSELY and high <= 1 + _LOOSELY):
         raise ShapeError(
-            f"a coherence lies between 0 and 1, here it runs from {low:g} to {high:g}; is it in "
-            "percent?"
+            f"a coherence must be between 0 and 1, but runs from {low:g} to {high:g}; convert per "
+            "cent to a ratio"
         )
     return np.clip(gamma, 0.0, 1.0)
 
@@ -122,7 +122,8 @@ class FRF:
             return self
         if quantity not in _ORDER or self.quantity not in _ORDER:
             raise LabelError(
-                f"no way from {self.quantity} to {quantity!r}; only among {named(_ORDER)}"
+                f"{self.quantity} cannot be converted to {quantity!r}; conversions exist among "
+                f"{named(_ORDER)}"
             )
         n = _ORDER[quantity] - _ORDER[self.quantity]
         omega = 2 * np.pi * self.frequency[:, None, None]

@@ -46,8 +46,9 @@ def static_solver(
         work = np.abs(np.einsum("nk,nk->k", X, B))
         if np.any(extra > _DRIVEN * work):
             raise ModelError(
-                "a load drives a motion that has neither stiffness nor mass, as a bar without "
-                "inertia about its axis can turn; hold it, give it inertia, or drive another way"
+                "a load drives a motion that has neither stiffness nor mass, for example the "
+                "rotation of a bar without inertia about its axis; hold it, give it inertia, or "
+                "drive another dof"
             )
         return X
 

@@ -129,7 +129,7 @@ def _shape(system: StateSpace, product: np.ndarray, drive: list[str]) -> np.ndar
     at = [(system.outputs.index(text), system.inputs.index(text)) for text in drive]
     k, j = max(at, key=lambda pair: abs(o[pair[0]] * i[pair[1]]))
     if o[k] * i[j] <= 0:
-        raise AccuracyError(f"a mode takes energy from nowhere at {system.outputs[k]}: not passive")
+        raise AccuracyError(f"a mode supplies energy at {system.outputs[k]}: not passive")
     scale = np.sqrt(i[j] / o[k])
     further = [n for n, text in enumerate(system.inputs) if text not in system.outputs]
     return np.r_[o * scale, i[further] / scale]

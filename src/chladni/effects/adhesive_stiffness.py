@@ -33,7 +33,7 @@ class AdhesiveStiffness(Effect):
     """K + (e^x - 1) K_bead + (e^g - 1) K_others: one modulus for the bead, one for all others."""
 
     name = "adhesive-stiffness"
-    claim = "a bead of adhesive is far softer or stiffer than the deck has it"
+    claim = "a bead of adhesive is far softer or stiffer than in the deck"
     rounds = 2
 
     joint: Connection | None = None
@@ -73,7 +73,8 @@ class AdhesiveStiffness(Effect):
         if self.parameters[0].scale >= SEALANT or E <= SEALANT:
             return ""
         return (
-            f"E of {E / 1e6:.0f} MPa is that of no sealant, which has less than {SEALANT / 1e6:g}"
+            f"E of {E / 1e6:.0f} MPa is too high for a sealant, which has less than "
+            f"{SEALANT / 1e6:g}"
         )
 
 
@@ -166,7 +167,7 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA"),
-    settled_by="pull a coupon of the adhesive, or cut through the joint and look at it",
-    needs="adhesive of solids between sheets",
+    settled_by="test a coupon of the adhesive, or cut through the joint and inspect it",
+    needs="adhesive (solids) between sheets",
     on_sheets=True,
 )

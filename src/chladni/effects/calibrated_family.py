@@ -13,7 +13,7 @@ from .model_families import ModelFamily
 class CalibratedFamily(ModelFamily):
     """The factor of a joint family, written into the deck: on E of solids or on K of bushes."""
 
-    claim = "joints of a kind are far stiffer or softer than the deck has them"
+    claim = "joints of one kind are far stiffer or softer than in the deck"
     kind = "calibration"
     writable = True
     called = "stiffness, times the deck's"

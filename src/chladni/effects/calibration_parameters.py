@@ -32,7 +32,7 @@ class PartScale(Effect):
     """E, rho or t (of beams: the wall) of one part, or of several together, times e^x."""
 
     name = "part-scale"
-    claim = "a calibration parameter of the deck is off"
+    claim = "a calibration parameter of the deck is wrong"
     kind = "calibration"
 
     quantity: str = "E"

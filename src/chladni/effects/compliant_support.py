@@ -73,7 +73,7 @@ class CompliantSupport(Effect):
     """A clamp on springs, x = ln of stiffness over scale: one along an axis, one about an axis."""
 
     name = "compliant-support"
-    claim = "a clamp that the deck holds rigidly gives"
+    claim = "a clamp is compliant where the deck is rigid"
     lets_go: ClassVar[bool] = True
     rounds: ClassVar[int] = 1
 
@@ -241,7 +241,7 @@ def _said(clamp: Clamp, direction: SupportDirection) -> str:
         f"along {_named(direction.frame[0])}" if c == 1 else f"about {_named(direction.frame[1])}"
         for c in direction.components
     ]
-    return f"the supports of {grids} round ({at} mm), {' and '.join(how)}"
+    return f"the supports of {grids} near ({at} mm), {' and '.join(how)}"
 
 
 def _named(axis: np.ndarray) -> str:
@@ -254,7 +254,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     assembly = article.assembly
     every = clamps(assembly)
     if not every:
-        raise ModelError("the structure has no supports, so that no clamp of it can give")
+        raise ModelError("the structure has no supports, so it has no clamp")
     built = structure(assembly)
     modes = normal_modes(built.system, DRAWN)
     elastic = modes.frequency > 0

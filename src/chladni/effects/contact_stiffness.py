@@ -54,7 +54,7 @@ class ContactStiffness(Effect):
     """K + k bᵀ b, b the relative motion of two sheets across the gap."""
 
     name = "contact-stiffness"
-    claim = "two sheets touch where the model has a gap between them"
+    claim = "two sheets touch where the model has a gap"
 
     place: ClosePlaces | None = None
     rows: sp.csr_array | None = None

@@ -160,7 +160,10 @@ class Crack(Effect):
 
     name = "crack"
     elastic = True
-    claim = "bending stiffness is lost along a line: a crack, a bead ground off, a bend annealed"
+    claim = (
+        "bending stiffness is reduced along a line, for example by a crack, a ground bead or an "
+        "annealed bend"
+    )
 
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
@@ -320,6 +323,6 @@ FAMILY = Family(
     candidates=candidates,
     closer=closer,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
-    settled_by="look for a crack there with dye or a magnifying glass, and tap on both its sides",
+    settled_by="search for a crack there with dye or a magnifying glass, and tap on both sides",
     on_sheets=True,
 )

@@ -58,7 +58,7 @@ class ModalDiscrepancy(Effect):
     """Independent small errors of the stiffness of each mode."""
 
     name = "jitter"
-    claim = "elements of another formulation give slightly other frequencies"
+    claim = "another element formulation gives slightly different frequencies"
     kind = "nuisance"
     writable = False
 
@@ -75,7 +75,7 @@ class JointFootprint(MeshError):
     """Change of modal stiffness: x times that of joints on shells half as wide."""
 
     name = "joint-footprint"
-    claim = "a joint holds as much of a sheet as a shell of the mesh is wide, not as it does"
+    claim = "a joint acts over the width of one shell of the mesh, not over its real width"
 
 
 Places = Callable[[Structure], sp.csr_array]  # rows of the measured dofs, on any mesh

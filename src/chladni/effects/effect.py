@@ -203,7 +203,7 @@ class Effect:
     """
 
     name: ClassVar[str] = "nothing"
-    claim: ClassVar[str] = "the model is right as it is"
+    claim: ClassVar[str] = "the model is right"
     kind: ClassVar[str] = "physics"  # physics, test, calibration, nuisance
     writable: ClassVar[bool] = True  # whether a deck can represent it
     remakes_structure: ClassVar[bool] = False  # strong: mesh error and basis are computed again

@@ -32,7 +32,7 @@ class ExtraSupport(MovableAttachment):
     """
 
     name = "extra-support"
-    claim = "the structure touches something stiff that the model does not have"
+    claim = "the structure touches a stiff object that the model lacks"
     elastic = True
 
     @classmethod
@@ -124,5 +124,5 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("CBUSH", "PBUSH", "CORD2R"),
-    settled_by="lift the structure off whatever touches it there, and measure again",
+    settled_by="remove every contact of the structure there, and measure again",
 )

@@ -91,13 +91,13 @@ class Family:
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(-[a-z]+)*", self.name) or self.name == Effect.name:
             raise ModelError(
-                f"{self.effect.__name__} has the name {self.name!r}; a family's is its own, in "
-                "small letters and hyphens, as point-mass"
+                f"{self.effect.__name__} has the name {self.name!r}; a family needs its own name "
+                "in lower case with hyphens, for example point-mass"
             )
         if self.placed is None and self.candidates is None:
-            raise ModelError(f"{self.name} has neither candidates nor places it is known to act at")
+            raise ModelError(f"{self.name} has neither candidates nor known places")
         if bool(self.cards) == bool(self.no_cards):
-            raise ModelError(f"{self.name} needs the cards that hold it, or a reason why none can")
+            raise ModelError(f"{self.name} needs its cards, or a reason why it has none")
 
     @property
     def name(self) -> str:

@@ -23,7 +23,7 @@ class FoldBending(Effect):
     """A factor e^(x s) on the bending stiffness of one part, s the share of a group at folds."""
 
     name = "fold-bending"
-    claim = "a fold is stiffer or softer in bending than shells that meet at an angle"
+    claim = "a fold is stiffer or softer in bending than shells joined at an angle"
     kind = "nuisance"
     writable = False
 

@@ -38,7 +38,7 @@ class HemContact(Effect):
     """
 
     name = "hem-contact"
-    claim = "the sheets of a hem do not slide along it, as soft sealant alone would let them"
+    claim = "the sheets of a hem cannot slide along it as they would with soft sealant alone"
 
     line: HemLine | None = None
     rows: sp.csr_array | None = None
@@ -125,7 +125,7 @@ def along_stretch(line: HemLine, rows: sp.csr_array, tried: int) -> HemContact:
     middle = Parameter("s", "m", 1.0, 3**-0.5, half, "linear", step=0.1)
     reach = Parameter("L", "m", 0.0, STRETCH_SD, STRETCH * line.length, step=0.3)
     return replace(
-        whole, parameters=(*whole.parameters, middle, reach), text=f"along some of {line.name}"
+        whole, parameters=(*whole.parameters, middle, reach), text=f"along a part of {line.name}"
     )
 
 
@@ -149,7 +149,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     """Block the sliding along a whole string, with 1e9 to 1e10 N/m²."""
     lines = hem_lines(article.assembly)
     if not lines:
-        raise ModelError("the structure has no string of adhesive along which a hem could hold")
+        raise ModelError("the structure has no line of adhesive and so no hem")
     line = lines[int(rng.integers(len(lines)))]
     k = float(10 ** rng.uniform(9.0, 10.0))
     made = line.gripped(article.assembly, k * line.share)
@@ -161,7 +161,7 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("GRID", "RBE3", "CBUSH", "PBUSH", "CORD2R"),
-    settled_by="cut through the hem and look whether its sheets touch or the sealant is hard",
-    needs="strings of adhesive between two sheets",
+    settled_by="cut through the hem and check if its sheets touch or the sealant is hard",
+    needs="lines of adhesive between two sheets",
     on_sheets=True,
 )

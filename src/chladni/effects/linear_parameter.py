@@ -19,7 +19,7 @@ class LinearScale(Effect):
     """
 
     kind = "calibration"
-    claim = "a calibration parameter of the deck is off"
+    claim = "a calibration parameter of the deck is wrong"
 
     slope: Slope | None = None
     write: Callable[[Assembly, float], Assembly] | None = None

@@ -41,7 +41,7 @@ class LocalResonator(MovableAttachment):
 
     name = "local-resonator"
     lone = True  # parallel resonators form a partial fraction: enough of them fit any response
-    claim = "something on the structure swings on a spring of its own"
+    claim = "a part on the structure vibrates on its own spring"
     own_dofs: ClassVar[int] = 1
 
     nowhere: sp.csr_array = field(default_factory=lambda: sp.csr_array((1, 0)))  # zero row
@@ -216,5 +216,5 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("GRID", "CONM2", "PBUSH", "CBUSH", "CORD2R"),
-    settled_by="hold by hand what might swing there, or tap it, and measure again",
+    settled_by="hold or tap the parts that may vibrate there, and measure again",
 )

@@ -26,7 +26,7 @@ class MassPatch(SheetPatch):
     """Additional mass per area M q(x) / ∫ q dA, M in total; it does not stiffen the sheet."""
 
     name = "mass-patch"
-    claim = "something lies spread on the sheet that the model does not have"
+    claim = "the sheet has a distributed mass that the model lacks"
     quantity = "rho"
     scanned = -1.0
     grows = (0.05, np.inf)  # of the mass scanned: range accepted
@@ -127,6 +127,6 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
-    settled_by="look what lies on the sheet there, and weigh it",
+    settled_by="search for material on the sheet there, and weigh it",
     on_sheets=True,
 )

@@ -51,7 +51,7 @@ class MembranePrestress(Effect):
     """
 
     name = "membrane-prestress"
-    claim = "a sheet stands under a membrane force: it was strained, warmed or cooled in its place"
+    claim = "a sheet has a membrane force, because it was strained, heated or cooled in place"
 
     part: int = 0
     tensors: np.ndarray = field(default_factory=lambda: np.zeros((2, 3, 3)))
@@ -158,8 +158,8 @@ def prestressed(assembly: Assembly, part: int, tensor: np.ndarray, N: float) -> 
     pairs, k = force.springs
     if assembly.axes is not None and np.ptp(assembly.axes[np.unique(pairs)], axis=0).max() > 1e-9:
         raise ModelError(
-            f"the grids of {assembly.parts[part].name} count displacements in different frames "
-            "(CD), so that scalar springs between them cannot hold a membrane force"
+            f"the grids of {assembly.parts[part].name} have different displacement frames (CD), "
+            "so scalar springs between them cannot represent a membrane force"
         )
     made, at = with_mean(assembly, pulled_rim(assembly, part, tensor))
     moments = sp.csr_array(frames(assembly).T @ force.moments)
@@ -294,6 +294,6 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("GRID", "RBE3", "CELAS2"),
-    settled_by="test again at another temperature, or with what clamps the sheet let loose",
+    settled_by="test again at another temperature, or with the clamps of the sheet released",
     on_sheets=True,
 )

@@ -35,7 +35,7 @@ class ModelFamily(LinearScale):
     """A factor e^x on the operator of a family in K."""
 
     name = "family"
-    claim = "joints and elements are never quite as stiff as a deck says"
+    claim = "joints and elements never have exactly the stiffness of the deck"
     kind = "nuisance"
     writable = False
 

@@ -219,6 +219,6 @@ FAMILY = Family(
     conceal,
     placed=material_axes,
     cards=("MAT8", "CORD2R", "CQUAD4", "CTRIA3"),
-    settled_by="bend strips cut along the sheet and across it",
+    settled_by="test strips in bending, cut along the sheet and across it",
     on_sheets=True,
 )

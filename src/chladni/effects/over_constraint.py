@@ -31,7 +31,7 @@ class OverConstraint(Effect):
     """K - K_j / (1 + k/k_0), K_j = k_0 bᵀb the firm spring in the tie: k and k_0 in series."""
 
     name = "over-constraint"
-    claim = "what the model ties rigidly gives in reality"
+    claim = "a joint is compliant where the model has a rigid tie"
     rounds = 1  # a released component may have its own mode
 
     tie: RigidTie | None = None
@@ -107,7 +107,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     """Give a rigid tie of the article a stiffness of 30 to 1000 N/mm."""
     ties = rigid_ties(article.assembly)
     if not ties:
-        raise ModelError("the structure has no rigid element beside those of its fasteners")
+        raise ModelError("the structure has no rigid elements except those of its fasteners")
     tie = ties[int(rng.integers(len(ties)))]
     k = float(10 ** rng.uniform(4.5, 6.0))
     made = sprung(article.assembly, tie, k)
@@ -122,6 +122,6 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("GRID", "RBE2", "CBUSH", "PBUSH"),
-    settled_by="tap on either side of the tie with a small hammer: do its sides move alike?",
-    needs="rigid elements (RBE2, RBAR) beside those at fasteners",
+    settled_by="tap on both sides of the tie with a small hammer, and compare their motion",
+    needs="rigid elements (RBE2, RBAR) except those at fasteners",
 )

@@ -21,7 +21,7 @@ class PointMass(MovableAttachment):
     """M + m Σ bᵀb over three translations b, at an unknown place."""
 
     name = "point-mass"
-    claim = "something sits on the structure that the model does not have"
+    claim = "the structure carries a mass that the model lacks"
     matrix = "M"
 
     @classmethod
@@ -82,5 +82,5 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("CONM2",),
-    settled_by="weigh the structure with all that hangs on it",
+    settled_by="weigh the structure with all attached parts",
 )

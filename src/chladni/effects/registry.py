@@ -114,8 +114,8 @@ def _installed() -> tuple[Family, ...]:
         found = _loaded(entry)
         if found.name in out or any(found.name == own.name for own in BUILT_IN):
             raise ExtensionError(
-                f"{_whose(entry)} offers the effect {found.name!r}, and another one has that name "
-                "already; rename or uninstall one of them"
+                f"{_whose(entry)} offers the effect {found.name!r}, but another effect has this "
+                "name; rename or uninstall one of them"
             )
         out[found.name] = found
     return tuple(out.values())
@@ -132,7 +132,7 @@ def _loaded(entry: EntryPoint) -> Family:
     if not isinstance(found, Family):
         raise ExtensionError(
             f"{_whose(entry)} offers the effect {entry.name!r}, but {entry.value} is a "
-            f"{type(found).__name__}, no chladni.effects.family.Family; repair or uninstall it"
+            f"{type(found).__name__}, not a chladni.effects.family.Family; repair or uninstall it"
         )
     return found
 

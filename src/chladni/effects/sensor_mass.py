@@ -67,5 +67,5 @@ FAMILY = Family(
     conceal,
     placed=sensor_mass,
     cards=("CONM2",),
-    settled_by="measure again with half of the sensors taken off",
+    settled_by="measure again with half of the sensors removed",
 )

@@ -35,7 +35,7 @@ class ShakerRestraint(Effect):
     """
 
     name = "shaker-restraint"
-    claim = "the shaker's stinger holds, or its force gauge weighs, beside the force it brings"
+    claim = "the shaker's stinger adds stiffness, or its force gauge adds mass"
 
     shares: Share = ()
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)

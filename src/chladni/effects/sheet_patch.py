@@ -159,7 +159,7 @@ class SheetPatch(Effect):
         """The fitted place, where the change of the sheet is largest."""
         grid, deepest = self.deepest(x)
         point = tuple(float(v) for v in deepest)
-        text = f"on {self.parts[0]} round ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
+        text = f"on {self.parts[0]} near ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
         radius = self.radius_at(x)
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
 

@@ -30,7 +30,7 @@ class StiffnessPatch(SheetPatch):
 
     name = "stiffness-patch"
     elastic = True
-    claim = "the sheet is softer here than the deck says, and no lighter"
+    claim = "the sheet is softer here than in the deck, with the same mass"
     quantity = "E"
     scanned = -1.0
     grows = (0.1, np.inf)  # a smaller loss, or a stiffening, is not accepted
@@ -104,6 +104,6 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("MAT1", "MAT8", "PSHELL", "CQUAD4", "CTRIA3"),
-    settled_by="tap the sheet there and beside it with a small hammer, and gauge its thickness",
+    settled_by="tap the sheet there and next to it with a small hammer, and measure its thickness",
     on_sheets=True,
 )

@@ -18,7 +18,7 @@ class ThicknessDistribution(SheetPatch):
     """t(x) = t0 (1 - α q(x)), α = 0.6 / (1 + e^-x): a smooth local thinning of one sheet."""
 
     name = "thickness-distribution"
-    claim = "the sheet is thinner here than the deck says"
+    claim = "the sheet is thinner here than in the deck"
     quantity = "t"
     scanned = -2.0
     grows = (0.05, np.inf)  # a smaller thinning, or a thickening, is not accepted
@@ -89,6 +89,6 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("CQUAD4", "CTRIA3"),
-    settled_by="gauge the thickness of the sheet there",
+    settled_by="measure the thickness of the sheet there",
     on_sheets=True,
 )

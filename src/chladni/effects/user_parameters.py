@@ -52,7 +52,7 @@ class UserParameter(Effect):
     """Members that share their parameters; a single parameter may have bounds of ln factor."""
 
     name = "part-scale"
-    claim = "a calibration parameter of the deck is off"
+    claim = "a calibration parameter of the deck is wrong"
     kind = "calibration"
 
     members: tuple[Effect, ...] = ()

@@ -54,7 +54,7 @@ class ViscoelasticJoint(Effect):
     """
 
     name = "viscoelastic-joint"
-    claim = "a joint gives and dissipates: its modulus is complex and rises with frequency"
+    claim = "a joint is compliant and dissipates: its modulus is complex and rises with frequency"
     rounds = 2
     lone = True  # the damping of the modes supports only one such effect
 
@@ -129,7 +129,7 @@ class ViscoelasticJoint(Effect):
         name, (eta, a, _) = self.parameters[0], self.exponent(x)
         f = np.geomspace(*self.band, 5)
         rows = [f"{k:.4g} Hz: {name.name} times {(k / self.reference) ** a:.4f}" for k in f]
-        head = f"{self.text}: {name.name} in its card is that at {self.reference:.4g} Hz"
+        head = f"{self.text}: {name.name} in its card is valid at {self.reference:.4g} Hz"
         tail = (
             f"GE {eta:.4f} at all frequencies; tables of MATF1 (SOL 108, 111) or PBUSHT hold both"
         )
@@ -142,7 +142,10 @@ class ViscoelasticJoint(Effect):
     def location(self, x: np.ndarray) -> Location:
         """The joint, and the frequency dependence of its stiffness, which MAT1 cannot represent."""
         name, (_, a, _) = self.parameters[0].name, self.exponent(x)
-        rise = f"{name} is that at {self.reference:.3g} Hz and goes with frequency to the {a:.2f}"
+        rise = (
+            f"{name} is valid at {self.reference:.3g} Hz and proportional to frequency to the "
+            f"power {a:.2f}"
+        )
         return replace(self.where(), text=f"{self.text}; {rise}")
 
     def becomes(self, x: np.ndarray) -> str:
@@ -204,7 +207,7 @@ def _of_one(
     unknown: tuple[Parameter, ...] = (
         Parameter(name, unit, 0.0, SD, E or 1.0, step=1.0, starts=STARTS),
         Parameter("loss factor", "-", 0.0, LOSS_SD, LOSS, nominal=NO_LOSS),
-        Parameter("damping beside it", "-", 0.0, LEVEL_SD, damping.usual),
+        Parameter("other damping", "-", 0.0, LEVEL_SD, damping.usual),
     )
     if abs(others).max() > 1e-9 * abs(K).max():
         unknown = (*unknown, shared_factor(f"{name} of others", one.family, sd))
@@ -298,8 +301,8 @@ FAMILY = Family(
     candidates=candidates,
     cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBUSH", "CBUSH"),
     settled_by=(
-        "repeat the test at another temperature, which shifts a viscoelastic joint and no other, "
-        "and at another level of excitation, which shifts a joint that slips and not this one"
+        "repeat the test at another temperature, which changes only a viscoelastic joint, and at "
+        "another level of excitation, which changes only a slipping joint"
     ),
-    needs="adhesive of solids or bushes between sheets or beams",
+    needs="adhesive (solids) or bushes between sheets or beams",
 )

@@ -51,7 +51,7 @@ class WeldCompliance(Effect):
 
     name = "weld-compliance"
     elastic = True
-    claim = "a weld or a fastener is softer than the deck has it"
+    claim = "a weld or a fastener is softer than in the deck"
     rounds = 1  # a weld that is gone may free a mode of its own
 
     joint: Connection | None = None
@@ -256,7 +256,7 @@ def drawn(article: Article, rng: np.random.Generator) -> tuple[Connection, dict[
     """A fastener of the article, and where it is."""
     found = fasteners(structure(article.assembly))
     if not found:
-        raise ModelError("the structure has no weld, screw or bush that could carry less")
+        raise ModelError("the structure has no weld, screw or bush")
     joint = found[int(rng.integers(len(found)))]
     return joint, {"point_m": joint.point.tolist()}
 
@@ -274,6 +274,6 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBAR", "CBAR", "PBUSH", "CBUSH"),
-    settled_by="tap on either side of the joint with a small hammer, and pull a coupon of it",
+    settled_by="tap on both sides of the joint with a small hammer, and test a coupon of it",
     needs=NEEDS,
 )

@@ -20,7 +20,7 @@ class WeldMissing(WeldCompliance):
     """The joint times e^-12 s, others of its kind times e^g; the rest is too small to estimate."""
 
     name = "weld-missing"
-    claim = "a weld or a fastener that the deck has is missing, or holds nothing"
+    claim = "a weld or a fastener of the deck is missing or carries no load"
 
     @staticmethod
     def strength(softness: float) -> Parameter:
@@ -63,6 +63,6 @@ FAMILY = Family(
     conceal,
     candidates=candidates,
     cards=("MAT1", "CHEXA", "CPENTA", "CTETRA", "CBAR", "CBUSH", "PBUSH"),
-    settled_by="look at that joint, and test it by ultrasound or a chisel",
+    settled_by="inspect that joint, and test it by ultrasound or a chisel",
     needs=NEEDS,
 )

@@ -22,15 +22,15 @@ LOUD = 2.5  # factor between recording and model beyond which a unit is wrong
 NEAR_FACTOR = 0.3  # ln: how near a named factor has to be
 ALIKE = 0.6  # MAC from which a mode of the model is the one of the test
 FACTORS = {  # what multiplies the recording to mend it: how it comes about
-    9.80665: "responses in g taken for m/s²",
-    1 / 9.80665: "responses in m/s² taken for g",
-    1 / 4.4482216: "forces in lbf taken for N",
-    4.4482216: "forces in N taken for lbf",
-    1e-3: "responses in mm taken for m",
-    1e3: "responses in m taken for mm",
-    0.0254: "responses in inches taken for m",
-    1 / 0.0254: "responses in m taken for inches",
-    9.80665 / 4.4482216: "responses in g and forces in lbf taken for m/s² and N",
+    9.80665: "responses in g read as m/s²",
+    1 / 9.80665: "responses in m/s² read as g",
+    1 / 4.4482216: "forces in lbf read as N",
+    4.4482216: "forces in N read as lbf",
+    1e-3: "responses in mm read as m",
+    1e3: "responses in m read as mm",
+    0.0254: "responses in inches read as m",
+    1 / 0.0254: "responses in m read as inches",
+    9.80665 / 4.4482216: "responses in g and forces in lbf read as m/s² and N",
 }
 QUANTITIES = ("receptance", "mobility", "accelerance")
 
@@ -100,7 +100,7 @@ def phase_checks(
         return [], Check("phase of the modes", f"needs {LEAST_MODES} modes", None)
     omega, theta = np.abs(identified.poles), phases(identified)
     before = float(np.sqrt((np.sin(theta) ** 2).mean()))
-    said = f"modal constants {np.degrees(before):.2g} degrees rms from real"
+    said = f"the rms phase error of the modal constants is {np.degrees(before):.2g} degrees"
     found: list[Finding] = []
     fit = fitted_delay(omega, theta)
     if corrected is not None and corrected.order > LEAST_MODES:
@@ -118,7 +118,7 @@ def phase_checks(
 def _late(delay: float, sd: float, top: float) -> Finding:
     text = (
         f"all responses {'lag' if delay > 0 else 'lead'} by {1e3 * abs(delay):.3g} ms (± "
-        f"{1e3 * sd:.2g}): the modal constants turn with frequency, by "
+        f"{1e3 * sd:.2g}): the phase of the modal constants increases with frequency, to "
         f"{np.degrees(abs(delay) * top):.0f} degrees at {top / 2 / np.pi:.4g} Hz."
     )
     mend = f"in case.toml, [test]: delay = {delay:.4g}"
@@ -129,8 +129,8 @@ def _quarter(quantity: str) -> Finding:
     k = QUANTITIES.index(quantity) if quantity in QUANTITIES else -1
     others = [QUANTITIES[n] for n in (k - 1, k + 1) if 0 <= n < 3 and k >= 0]
     text = (
-        f"the modes of what is said to be {quantity} are a quarter turn out of phase: the "
-        f"responses are of another kind ({' or '.join(others) or 'not known which'})."
+        f"the modes of the declared {quantity} are 90 degrees out of phase: the responses are "
+        f"another quantity ({' or '.join(others) or 'unknown'})."
     )
     mend = f'in case.toml, [test]: quantity = "{others[-1]}"' if others else ""
     return Finding("wrong quantity", text, "fault", (), mend, 1.0)
@@ -152,9 +152,9 @@ def other_quantity(identified: Identified, others: dict[str, Identified]) -> lis
         return []
     best = min(able, key=lambda name: able[name].chi)
     text = (
-        f"read as {identified.quantity} the recording holds {identified.order} modes and leaves "
-        f"{identified.chi:.3g} times its noise; read as {best} it holds {able[best].order} and "
-        f"leaves {able[best].chi:.3g}."
+        f"read as {identified.quantity} the recording has {identified.order} modes and a residual "
+        f"of {identified.chi:.3g} times its noise; read as {best} it has {able[best].order} modes "
+        f"and a residual of {able[best].chi:.3g}."
     )
     mend = f'in case.toml, [test]: quantity = "{best}"'
     return [Finding("wrong quantity", text, "fault", (), mend)]
@@ -211,7 +211,7 @@ def level_checks(
             f"{100 * opposite:.0f} % of the modes have the sign opposite to the model's: the force "
             "gauge (or every sensor) is reversed."
         )
-        mend = f"in sensors.csv turn the direction of input {identified.inputs[0]} round"
+        mend = f"in sensors.csv reverse the direction of input {identified.inputs[0]}"
         found.append(Finding("reversed force", text, "fault", (), mend, -1.0))
     if known_gain and abs(level) > np.log(LOUD):
         found.append(_unit(level))
@@ -244,8 +244,8 @@ def _quantity(identified: Identified, order: int) -> Finding:
     n = None if k is None else k + order
     what = QUANTITIES[n] if n is not None and 0 <= n < 3 else "another quantity"
     text = (
-        f"against the model the modes {'fall' if order < 0 else 'rise'} as ω^{abs(order)}: what is "
-        f"said to be {identified.quantity} is {what}."
+        f"relative to the model the modes {'fall' if order < 0 else 'rise'} as ω^{abs(order)}: "
+        f"the declared {identified.quantity} is {what}."
     )
     mend = f'in case.toml, [test]: quantity = "{what}"'
     return Finding("wrong quantity", text, "fault", (), mend, float(order))
@@ -257,5 +257,5 @@ def _unit(level: float) -> Finding:
     if abs(level + np.log(factor)) < NEAR_FACTOR:
         mend = f"in case.toml, [test]: factor = {factor:.7g}"
         return Finding("wrong units", f"{said}: {why}.", "fault", (), mend, factor)
-    mend = 'look at the calibration, or in case.toml, [test]: gain = "unknown"'
+    mend = 'check the calibration, or in case.toml, [test]: gain = "unknown"'
     return Finding("level", f"{said}, which no unit explains.", "warning", (), mend, np.exp(level))

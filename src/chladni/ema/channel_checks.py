@@ -36,7 +36,7 @@ def channel_checks(
     """
     frf = frf.sel(band=(1e-9, np.inf))
     if len(frf.frequency) < LEAST_LINES:
-        few = f"{len(frf.frequency)} lines are too few to see anything in"
+        few = f"{len(frf.frequency)} lines are too few for checks"
         return [], [Check("channels", few, None)]
     findings: list[Finding] = []
     checks: list[Check] = []
@@ -70,7 +70,7 @@ def dead(frf: FRF, alive: Collection[str] = ()) -> tuple[list[Finding], Check]:
         if rms[k] <= 1e-4 * typical:
             text = f"output {label} is dead: its level is {rms[k] / typical:.1e} of the others'"
         elif noisy[k] > NOISE_ONLY:
-            text = f"output {label} is dead: its lines are noise alone"
+            text = f"output {label} is dead: its lines contain only noise"
         else:
             continue
         found.append(
@@ -88,13 +88,13 @@ def left_out(label: str) -> str:
 def incoherent(frf: FRF) -> tuple[list[Finding], Check]:
     """Channels and lines whose coherence is low."""
     if frf.coherence is None:
-        return [], Check("coherence", "the recording holds none", None)
+        return [], Check("coherence", "the recording has none", None)
     each = np.median(frf.coherence, axis=(0, 2))
     found = [
         Finding(
             "low coherence",
             f"output {label} has a median coherence of {c:.2f}, so its noise is large.",
-            "warning", (label,), "look at its cable and mounting, or average longer", float(c),
+            "warning", (label,), "check its cable and mounting, or average longer", float(c),
         )
         for label, c in zip(frf.outputs, each, strict=True)
         if c < COHERENT
@@ -127,7 +127,7 @@ def reversed_drive(frf: FRF) -> tuple[list[Finding], Check]:
     """Check that the input power is positive at every spectral line, Re(mobility) > 0."""
     points = drive_points(frf)
     if not points:
-        return [], Check("drive point", "no output is where the force acts", None)
+        return [], Check("drive point", "no output is at the drive point", None)
     found, shares = [], []
     for i, j, sign in points:
         share = driving_share(frf, i, j, sign)
@@ -136,9 +136,9 @@ def reversed_drive(frf: FRF) -> tuple[list[Finding], Check]:
             o, p = frf.outputs[i], frf.inputs[j]
             text = (
                 f"at the drive point {o} the force takes power out of the structure: the sensor "
-                f"or the force gauge {p} is reversed, or the recording is no {frf.quantity}."
+                f"or the force gauge {p} is reversed, or the recording is not {frf.quantity}."
             )
-            mend = f"in sensors.csv turn the direction of output {o} (or of input {p}) round"
+            mend = f"in sensors.csv reverse the direction of output {o} (or of input {p})"
             found.append(Finding("reversed sign", text, "fault", (o,), mend, share))
     lowest = min(shares)
     said = f"{100 * (1 + lowest) / 2:.0f} % of the power goes into the structure"
@@ -211,12 +211,12 @@ def _doubled(
     if copied:
         text = (
             f"outputs {one} and {other}{far} are one signal under two labels: even their noise is "
-            f"the same ({ratio:.2g} of what two sensors would differ by)."
+            f"the same ({ratio:.2g} of the difference between two sensors)."
         )
         mend = f"{left_out(other)} (or {one}, whichever label is the wrong one)"
         return Finding("duplicated channels", text, "fault", names, mend, apart)
     text = (
         f"outputs {one} and {other}{far} are equal within their noise ({ratio:.2g}): one sensor "
-        "under two labels, or places that mirror each other."
+        "under two labels, or symmetric places."
     )
     return Finding("equal channels", text, "warning", names, "compare their cables", apart)

@@ -51,8 +51,7 @@ def peak_notes(found: Identified) -> list[str]:
         if len(several) > 1:
             f = " and ".join(f"{f:.5g}" for f in np.sort(found.frequency[several]))
             out.append(
-                f"{f} Hz stand in one peak and move alike: one mode whose peak is not that of a "
-                "linear one (does it change with level?), or modes that these channels cannot tell "
-                "apart"
+                f"{f} Hz are in one peak with the same shape: one mode with a nonlinear peak "
+                "(measure at two levels), or modes that these channels cannot distinguish"
             )
     return out

@@ -69,10 +69,10 @@ class Screening:
         """Summary of the findings in one sentence."""
         done = [c for c in self.checks if c.passed is not None]
         if not self.findings:
-            return f"{self.name}: nothing found in {len(done)} checks"
+            return f"{self.name}: no fault found in {len(done)} checks"
         count = Counter(f.kind + _of(f.channels) for f in self.findings)
         kinds = ", ".join(f"{n} times {what}" if n > 1 else what for what, n in count.items())
-        word = "at fault" if self.faults else "to be looked at"
+        word = "at fault" if self.faults else "to be checked"
         return f"{self.name} is {word}: {kinds}"
 
     @property
@@ -99,7 +99,7 @@ def of_all(screenings: Sequence[Screening]) -> str:
     'at fault: reversed sign in a, b; to be looked at: delay in b'
     """
     said = []
-    for severity, word in (("fault", "at fault"), ("warning", "to be looked at")):
+    for severity, word in (("fault", "at fault"), ("warning", "to be checked")):
         where: dict[str, list[str]] = {}
         for s in screenings:
             for f in s.findings:

@@ -99,8 +99,8 @@ def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()
     kind = settings.excitation or excitation_of(record)
     if settings.method == "LPM" and kind == "hammer":
         raise LabelError(
-            "LPM tells FRF and leakage apart by the roughness of the force's spectrum, which a hit "
-            "lacks; use H1, H2 or Hv"
+            "LPM needs a rough force spectrum to separate FRF and leakage, and that of a hit is "
+            "smooth; use H1, H2 or Hv"
         )
     if settings.method == "LPM" and kind not in ("sine", "multisine"):
         found = _by_polynomials(record, kind)
@@ -173,7 +173,7 @@ def _cut(record: TimeRecord, what: str) -> TimeRecord:
     n = rest if 0.9 * n < rest < n else n  # the last block may be a little shorter
     whole = starts[starts + n <= n_all]
     if n < 64 or len(whole) == 0:
-        raise FileError(f"its {len(starts)} {what} follow each other too fast to be told apart")
+        raise FileError(f"its {len(starts)} {what} follow each other too fast to be separated")
     return record.cut(whole, n)
 
 
@@ -192,16 +192,16 @@ def _hammer(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
     force, spoilt = _pulses(record.force)
     notes = []
     if spoilt.any():
-        notes.append(f"{int(spoilt.sum())} of {len(spoilt)} hits were double and are left out")
+        notes.append(f"{int(spoilt.sum())} of {len(spoilt)} hits are double hits and are left out")
     if spoilt.all():
-        raise FileError("every hit is a double one; nothing is left to average")
+        raise FileError("all hits are double hits, so none is left to average")
     record = replace(record.sel(~spoilt), force=force[~spoilt])
     fall = settings.exponential or min(1.0, DECAYED / max(_left_at_end(record.response), 1e-300))
     w = window("exponential", record.force.shape[2], fall)
     frf, averages = _averaged(record, settings, w)
     added = float(-np.log(fall) / record.duration) if fall < 1 else 0.0
     notes.insert(0, f"{len(record.force)} hits of {record.duration:.3g} s, force window, "
-                 + (f"exponential window to {fall:.2g}, which adds {added:.3g} 1/s of damping"
+                 + (f"exponential window to {fall:.2g}, which adds a damping of {added:.3g} 1/s"
                     if fall < 1 else "no exponential window"))  # fmt: skip
     power = (np.abs(np.fft.rfft(record.force)) ** 2).mean(axis=(0, 1))[1:]
     weak = np.flatnonzero(power < WEAK * power.max())
@@ -253,8 +253,8 @@ def _burst(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
     notes = [f"{len(record.force)} bursts of {record.duration:.3g} s, no window"]
     if (left := _left_at_end(record.response)) > 0.05:
         notes.append(
-            f"the response has not rung down where the blocks end ({100 * left:.2g} % is left), so "
-            "it leaks: longer blocks or shorter bursts are needed"
+            f"the response has not decayed at the end of the blocks ({100 * left:.2g} % remains), "
+            "which causes leakage: use longer blocks or shorter bursts"
         )
     return FrfEstimate(frf, "burst", settings.method, averages, notes=tuple(notes))
 
@@ -280,8 +280,8 @@ def _random(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
     )
     frf, averages = _averaged(whole, settings, "hann", OVERLAP)
     said = (
-        f"continuous random: {len(whole.force)} Hann windows of {n / record.rate:.3g} s that "
-        f"overlap by half, worth {averages:.3g} averages"
+        f"continuous random: {len(whole.force)} Hann windows of {n / record.rate:.3g} s with 50 % "
+        f"overlap, equivalent to {averages:.3g} averages"
     )
     return FrfEstimate(frf, "random", settings.method, averages, notes=(said,))
 
@@ -289,7 +289,7 @@ def _random(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
 def _multisine(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
     """Whole periods, and only the lines that are driven."""
     if settings.method == "LPM":
-        raise LabelError("whole periods do not leak, so LPM has nothing to fit; use H1, H2 or Hv")
+        raise LabelError("whole periods have no leakage for LPM to fit; use H1, H2 or Hv")
     frf, averages, said = of_periods(record, settings.method)
     note = f"{len(record.force)} periods of {record.duration:.3g} s, no window; {said}"
     return FrfEstimate(frf, "multisine", settings.method, averages, notes=(note,))

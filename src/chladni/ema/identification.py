@@ -178,8 +178,8 @@ def kept_lines(
     if keep.sum() < LEAST_LINES:
         asked = "" if band is None else " between {:g} and {:g} Hz".format(*band)
         raise FileError(
-            f"{int(keep.sum())} lines{asked} are too few to identify from; the "
-            f"recording holds {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
+            f"{int(keep.sum())} lines{asked} are too few for identification; the recording covers "
+            f"{frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
         )
     return keep
 

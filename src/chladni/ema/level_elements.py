@@ -82,12 +82,12 @@ def _slip_by_loss(amplitude: np.ndarray, loss: float, n: float) -> np.ndarray:
     return micro_slip(amplitude, loss * np.pi * (n + 2) / (4 * n), n)
 
 
-_SPRING = Number("stiffness over the mode's", STIFFNESS, (1e-3, 2e-2))
+_SPRING = Number("stiffness relative to the mode", STIFFNESS, (1e-3, 2e-2))
 _LOSS = Number("loss factor at the largest amplitude", STIFFNESS, (1e-3, 1e-2))
 _POWER = Number("power of amplitude", POWER, (0.6, 1.4))
 CUBIC = BasicElement(
     "cubic spring", "cubic", cubic,
-    (Number("k3 over the mode's stiffness", (0.0, 2.0), (-0.01, 0.01), "1/m2", -2, signed=True),),
+    (Number("k3 / the mode's stiffness", (0.0, 2.0), (-0.01, 0.01), "1/m2", -2, signed=True),),
 )  # fmt: skip
 GAP = BasicElement("spring behind a gap", "clearance", gap_spring,
             (_SPRING, Number("gap", PLACE, (0.1, 0.3, 0.7), "m", 1)))  # fmt: skip

@@ -33,13 +33,15 @@ Signature = Literal[
 ]
 MEANING: dict[Signature, str] = {
     "linear": "frequency and damping stay as the level rises",
-    "runs differ": "it moves by more than its noise, by no more than runs of one test repeat to",
-    "overlapped": "a mode that moves rings into it, so that its own doing cannot be told",
-    "friction": "a joint slips: stiffness goes and damping comes with the level",
-    "clearance": "parts meet once they move far enough: it stiffens from an amplitude on",
-    "stiffening": "it stiffens as it moves and loses no more: sheets stretch, or contact closes",
-    "softening": "it softens as it moves and loses no more: contact opens, or it grew warm",
-    "loss": "its damping moves with the level and no stiffness with it: air, foam, or the exciter",
+    "runs differ": "it changes by more than its noise, but not by more than repeats of one test "
+    "differ",
+    "overlapped": "another mode that changes overlaps with it, so its own behaviour is not known",
+    "friction": "a joint slips: stiffness falls and damping rises with the level",
+    "clearance": "parts touch when they move far enough: it stiffens above an amplitude",
+    "stiffening": "it stiffens with amplitude at constant loss: sheets stretch, or contact closes",
+    "softening": "it softens with amplitude at constant loss: contact opens, or the article "
+    "warmed up",
+    "loss": "its damping changes with the level, its stiffness does not: air, foam, or the exciter",
 }
 CALM: tuple[Signature, ...] = ("linear", "runs differ", "overlapped")  # no sign of anything
 OVERLAP = 4.0  # sums of half-bandwidths: nearer modes ring into each other
@@ -49,8 +51,8 @@ ALIKE = 0.05  # of a drift: as near do modes follow it (E falls with warmth as r
 POOR = 0.01  # chance of a right element's χ², below which an element explains nothing
 AS_GOOD = 6.0  # of BIC (e^3): elements nearer than that are not separated (Kass and Raftery 1995)
 SETTLED_BY = (
-    "measure the lowest level once more at the end: other frequencies there are a drift of the "
-    "object (warmth, a bolt that settles), the same are the level's doing"
+    "measure the lowest level again at the end: changed frequencies show a drift of the article "
+    "(temperature, a bolt that settles), equal frequencies an effect of the level"
 )
 
 

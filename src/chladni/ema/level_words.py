@@ -13,14 +13,15 @@ def level_notes(study: LevelStudy) -> list[str]:
     said = ", ".join(f"{x:g}" for x in sorted({x for m in study.modes for x in m.mode.level}))
     if study.drift:
         return [
-            f"every mode moves by one factor from level to level ({said}) and keeps its damping: "
-            f"the object drifted (warmth, mass), it is not nonlinear; to settle it, {SETTLED_BY}"
+            f"all modes change by one factor from level to level ({said}) and keep their damping: "
+            "the article drifted (temperature, mass) and is not nonlinear; to settle it, "
+            f"{SETTLED_BY}"
         ]
     moving = [f"nonlinear: {mode_sentence(m)}" for m in study.moving]
     calm = [mode_sentence(m) for m in study.modes if m.signature in ("runs differ", "overlapped")]
     if moving:
         return [*moving, *calm, f"to settle it, {SETTLED_BY}"]
-    return [*calm, f"no natural frequency and no damping moves with level ({said})"]
+    return [*calm, f"no natural frequency or damping changes with level ({said})"]
 
 
 def mode_sentence(study: ModeStudy) -> str:
@@ -30,13 +31,13 @@ def mode_sentence(study: ModeStudy) -> str:
     what = []
     if m.frequency_moves:
         f = ", ".join(f"{x:.5g}" for x in m.frequency)
-        what.append(f"natural frequencies move with level: {f} Hz at level {at}"
-                    f" ({probability(m.p_frequency)})")  # fmt: skip
+        what.append(f"natural frequencies change with level: {f} Hz at level {at} "
+                    f"({probability(m.p_frequency)})")  # fmt: skip
     if m.damping_moves:
         z = ", ".join(f"{100 * x:.3g}" for x in m.damping)
         near = "" if m.frequency_moves else f" of {m.frequency[0]:.5g} Hz"
         what.append(
-            f"damping{near} moves with level: {z} % at level {at} ({probability(m.p_damping)})"
+            f"damping{near} changes with level: {z} % at level {at} ({probability(m.p_damping)})"
         )
     return f"{'; '.join(what)}: {study.signature}, {MEANING[study.signature]}{_elements(study)}"
 
@@ -47,15 +48,13 @@ def _elements(study: ModeStudy) -> str:
     if study.signature in CALM:
         return ""
     if not study.fits:
-        return "; three levels would tell which element does it"
+        return "; three levels would show which element causes it"
     if best is None:
         lead = study.fits[0]
-        said = (
-            f"; no element explains it, {lead.element.name} comes nearest ({probability(lead.p)})"
-        )
+        said = f"; no element explains it, {lead.element.name} is closest ({probability(lead.p)})"
     else:
         said = f"; {best.element.name} explains it (p = {best.p:.2g})"
-        said += f", not told apart from {', '.join(study.as_good)}" if study.as_good else ""
+        said += f", not distinguished from {', '.join(study.as_good)}" if study.as_good else ""
     return said + held_out_sentence(study)
 
 
@@ -69,7 +68,7 @@ def held_out_sentence(study: ModeStudy) -> str:
     f, z, f0, z0 = (100 * x for x in held.misses(study.mode))
     return (
         f"; fitted on levels {', '.join(f'{x:g}' for x in levels[seen])} alone, "
-        f"{held.fit.element.name} foretells {', '.join(f'{x:g}' for x in levels[held.rows])} to "
-        f"{f:.2g} % in frequency and {z:.2g} % in damping, where one linear model misses by "
+        f"{held.fit.element.name} predicts {', '.join(f'{x:g}' for x in levels[held.rows])} with "
+        f"an error of {f:.2g} % in frequency and {z:.2g} % in damping; one linear model has "
         f"{f0:.2g} % and {z0:.2g} %"
     )

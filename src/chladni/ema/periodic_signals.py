@@ -63,4 +63,7 @@ def _between(f: np.ndarray, power: np.ndarray, driven: np.ndarray) -> str:
         return said
     ratio = power[idle].mean(axis=0) / power[driven].mean(axis=0)
     worst = 10 * np.log10(max(float(ratio.max()), 1e-30))
-    return f"{said}; the {len(idle)} between them answer {-worst:.3g} dB less, noise or distortion"
+    return (
+        f"{said}; the {len(idle)} lines between them are {-worst:.3g} dB lower, from noise or "
+        "distortion"
+    )

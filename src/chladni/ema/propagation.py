@@ -51,7 +51,7 @@ def standard_deviations(identified: Identified, made: Made) -> np.ndarray:
 def _parts(identified: Identified, made: Made) -> Iterator[tuple[np.ndarray, ModalCovariance]]:
     """Yield slopes and covariance for groups of modes that fit into memory."""
     if identified.covariance is None:
-        raise ValueError("this identification holds no covariance of its modes")
+        raise ValueError("this identification has no covariance of its modes")
     if not identified.order:
         return
     k = made(identified).shape[1]

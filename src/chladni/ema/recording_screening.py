@@ -59,7 +59,7 @@ def screened(
             findings.append(Finding("overload", text, "fault", (name.split()[-1],), mend, blocks))
         checks.append(Check("overload", f"{len(clipped)} channels are cut off", not clipped))
     else:
-        checks.append(Check("overload", "is seen in time data alone", None))
+        checks.append(Check("overload", "needs time data", None))
     more, check = levels_checked(recording, others)
     findings += more
     checks += check
@@ -105,7 +105,7 @@ def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[
         }
         findings = other_quantity(strong, read)
         if findings:
-            return findings, Check("phase of the modes", "hardly a mode stands out", False)
+            return findings, Check("phase of the modes", "too few modes are above the noise", False)
     delay = hinted_delay(strong)
     if not delay:
         return phase_checks(strong)
@@ -123,7 +123,7 @@ def strong_modes(found: Identified) -> Identified:
 def _lines(found: Identified, frequency: np.ndarray) -> Check:
     """Check the number of lines per half-bandwidth of each mode; it is never a fault."""
     if not found.order:
-        return Check("lines per half-bandwidth", "no mode stands out", None)
+        return Check("lines per half-bandwidth", "no mode is above the noise", None)
     n = lines_per_bandwidth(found, frequency)
     k = int(n.argmin())
     few = int((n < LINES).sum())

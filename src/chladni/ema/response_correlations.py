@@ -81,8 +81,8 @@ def ringing(r: Recording, band: tuple[float, float] = (0.0, np.inf)) -> Recordin
         return r
     frf, sigma = one_sided(used, band)
     note = (
-        f"{r.name}: no force was measured; poles and damping are those of its free decays, shapes "
-        "have no scale"
+        f"{r.name}: no force was measured; poles and damping come from its free decays, and "
+        "shapes have no scale"
     )
     return replace(r, frf=frf, added_damping=sigma, notes=(*r.notes, note))
 

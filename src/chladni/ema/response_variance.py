@@ -40,12 +40,12 @@ def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
 def noise_source(frf: FRF, averages: int = 1) -> str:
     """Describe in words the source of the noise in :func:`frf_variance`."""
     if frf.variance is not None:
-        return "the variance that the recording states (averages, repeats or dwells)"
+        return "the variance stated by the recording (averages, repeats or dwells)"
     if frf.coherence is not None:
-        return f"the coherence, {averages} averages being assumed, and 1 % of |H|"
+        return f"the coherence with {averages} assumed averages, and 1 % of |H|"
     return (
-        "1 % of |H| and the scatter of each channel's faint lines about their neighbours are "
-        "assumed, for the recording states nothing"
+        "1 % of |H| and the scatter of each channel's weak lines about their neighbours are "
+        "assumed, because the recording states no noise"
     )
 
 

@@ -220,11 +220,11 @@ def levels_checked(
             continue
         odd.add(name)
         sentence = (
-            f"levels {recording.level:g} and {other.level:g} do not give the same FRFs: they are "
-            f"apart {size} times as much as their noise ({p}, {compared.rms:.2g} decades rms), "
+            f"levels {recording.level:g} and {other.level:g} do not give the same FRFs: their "
+            f"difference is {size} times their noise ({p}, {compared.rms:.2g} decades rms), "
             f"{_worst(compared)}: not linear."
         )
-        mend = "name one level by use in case.toml, and read the result as that level's own"
+        mend = "choose one level by use in case.toml; the result is valid for that level"
         worst = compared.channels[:_NAMED]
         found.append(Finding("not linear", sentence, "warning", worst, mend, compared.ratio))
     needs = {"homogeneity": "needs two levels", "repeatability": "needs a second recording"}
@@ -237,7 +237,7 @@ def levels_checked(
 
 def _worst(h: Homogeneity) -> str:
     """Channels and bands in which two levels differ most, in words."""
-    said = f"most near {h.frequency[h.line.argmax()]:.4g} Hz"
+    said = f"largest near {h.frequency[h.line.argmax()]:.4g} Hz"
     if h.channels:
         said += f", at {named(h.channels, _NAMED)} (the first moves most)"
     if h.bands:
@@ -279,7 +279,7 @@ def roughness(frf: FRF) -> np.ndarray:
     """
     n = len(frf.frequency)
     if n < 5:
-        raise ShapeError(f"{n} lines are too few to see the noise in")
+        raise ShapeError(f"{n} lines are too few to estimate the noise")
     weights = np.array([-3, 12, 17, 12, -3]) / 35
     smooth = sum(w * frf.values[k : n - 4 + k] for k, w in enumerate(weights))
     power = np.abs(frf.values[2 : n - 2] - smooth) ** 2 * 35 / 18

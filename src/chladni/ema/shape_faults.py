@@ -238,12 +238,12 @@ def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float, over: float)
     label = labels[i]
     if g == -1.0:
         kind, text = "reversed sign", f"output {label} has the wrong sign in every mode"
-        mend = f"in sensors.csv turn the direction of {label} round"
+        mend = f"in sensors.csv reverse the direction of {label}"
     else:
-        turned = " and of the wrong sign" if g < 0 else ""
+        turned = " and has the wrong sign" if g < 0 else ""
         kind, text = (
             "wrong gain",
-            f"output {label} is {abs(g):.3g} times as large as it can be{turned}",
+            f"output {label} is {abs(g):.3g} times as large as the shapes allow{turned}",
         )
         mend = f"in sensors.csv give {label} the gain {g:.3g}"
     unless = "" if g == -1.0 else _UNLESS
@@ -350,7 +350,7 @@ def _replaced(
     label = labels[i]
     if kind == "copy":
         text = (
-            f"output {label} shows what {names[k]} shows ({evidence_in_words(gain)}), as if "
+            f"output {label} shows the motion of {names[k]} ({evidence_in_words(gain)}), as if "
             f"both were at one place{_UNLESS}."
         )
         mend = f'in sensors.csv give {label} the cell use = "no"'
@@ -361,10 +361,7 @@ def _replaced(
         mend = f"in sensors.csv give {label} the direction {names[k]}"
         finding = Finding("turned sensor", text, "warning", (label,), mend)
     else:
-        text = (
-            f"output {label} seems to sit elsewhere, near {names[k]} "
-            f"({evidence_in_words(gain)}){_UNLESS}."
-        )
-        mend = f"look where {label} sits and put that place into sensors.csv"
+        text = f"output {label} seems to be near {names[k]} ({evidence_in_words(gain)}){_UNLESS}."
+        mend = f"check the place of {label} and correct it in sensors.csv"
         finding = Finding("misplaced sensor", text, "warning", (label,), mend)
     return _Fault(gain, float(L[k] - misjudged - np.log(len(rows))), finding)

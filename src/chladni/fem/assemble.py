@@ -112,7 +112,9 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     idle = _without_stiffness(K, M, dofs, assembly.auto_spc)
     kept = np.flatnonzero(~idle)
     if not len(kept):
-        raise ModelError("no degree of freedom is left free; do the supports hold them all?")
+        raise ModelError(
+            "no degree of freedom is free; check that the supports do not hold all of them"
+        )
     if idle.any():
         K, M, T, dofs = K[kept][:, kept], M[kept][:, kept], sp.csr_array(T[:, kept]), dofs[kept]
     labels = np.column_stack([assembly.ids[dofs[:, 0]], dofs[:, 1]])

@@ -192,7 +192,7 @@ def by_mass(structure: Structure, row: int) -> Slope:
     old = structure.assembly.masses
     m = np.trace(old.matrix[row, :3, :3]) / 3
     if not m > 0:
-        raise ModelError(f"CONM2 {old.ids[row]} has no mass of which it could have more")
+        raise ModelError(f"CONM2 {old.ids[row]} has no mass to increase")
     one = Masses(old.ids[[row]], old.node[[row]], old.matrix[[row]] / m)
     M = spring.matrices(_bare(structure.assembly, masses=one))[2]
     return replace(_of(structure), M=congruence(structure.T, M))
@@ -267,7 +267,7 @@ def _both(half: sp.csr_array) -> sp.csr_array:
 def _mean(assembly: Assembly, position: int) -> Average:
     mean = assembly.rigid[position]
     if not isinstance(mean, Average):
-        raise ModelError(f"rigid element {mean.id} is no RBE3 and has no radius")
+        raise ModelError(f"rigid element {mean.id} is not an RBE3 and has no radius")
     return mean
 
 

@@ -45,7 +45,8 @@ class Modelled:
         """
         if frequency > self.band * (1 + _ROUNDING):
             raise ModelError(
-                f"modes up to {frequency:g} Hz are asked for; they were solved to {self.band:g} Hz"
+                f"modes up to {frequency:g} Hz are requested, but they were solved only to "
+                f"{self.band:g} Hz"
             )
         return self.modes.sel(self.modes.frequency <= frequency * (1 + _ROUNDING))
 

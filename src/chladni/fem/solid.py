@@ -249,7 +249,7 @@ def _condensed(K: np.ndarray, n: int) -> np.ndarray:
         inner = np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
     except np.linalg.LinAlgError as error:
         raise ModelError(
-            "solids have a material without stiffness in some direction; look at E, G and NU of "
+            "solids have a material without stiffness in some direction; check E, G and NU of "
             "their MAT1"
         ) from error
     return K[:, :n, :n] - K[:, :n, n:] @ inner

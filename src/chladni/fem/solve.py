@@ -43,8 +43,8 @@ def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     gap, scale = np.abs(K @ q - f).max(initial=0), np.abs(f).max(initial=0)
     if not gap <= 1e-6 * scale:
         raise ModelError(
-            f"the structure can move freely, hold it by supports: of {scale:.1e} N {gap:.1e} N "
-            f"find no resistance"
+            f"the structure can move freely, hold it by supports: {gap:.1e} N of {scale:.1e} N "
+            "meet no resistance"
         )
     return q
 
@@ -188,8 +188,8 @@ def _at(built: Structure, dofs: np.ndarray) -> np.ndarray:
     if np.any(missing := at < 0):
         point, component = built.assembly.ids[dofs[missing][0, 0]], dofs[missing][0, 1]
         raise LabelError(
-            f"{point}:+{COMPONENTS[component - 1]} cannot be moved: it depends on other dofs, "
-            f"or nothing stiff is there"
+            f"{point}:+{COMPONENTS[component - 1]} cannot be moved: it depends on other dofs, or "
+            "has no stiffness"
         )
     return at
 

@@ -25,7 +25,9 @@ def check_surface(points: np.ndarray, cells: np.ndarray) -> None:
     """
     for k in np.flatnonzero(~(np.abs(points) < FARTHEST).all(axis=1))[:1]:
         place = ", ".join(f"{x:g}" for x in points[k])
-        raise ModelError(f"point {k} (counted from 0) is at ({place}) m, which is no place")
+        raise ModelError(
+            f"point {k} (counted from 0) is at ({place}) m, which is not a finite place"
+        )
     for k, j in np.argwhere((cells < 0) | (cells >= len(points)))[:1]:
         raise ModelError(
             f"cell {k} (counted from 0) names point {cells[k, j]}; there are 0 to {len(points) - 1}"

@@ -45,8 +45,8 @@ class FormedMesh:
         known = self.nodal[np.isfinite(self.nodal)]
         if len(known) and (known.min() <= 0 or known.max() > 0.05):
             raise ModelError(
-                f"thickness runs from {known.min() * 1e3:g} to {known.max() * 1e3:g} mm; "
-                "sheets are 0 to 50 mm, is the unit system right?"
+                f"thickness runs from {known.min() * 1e3:g} to {known.max() * 1e3:g} mm, but "
+                "sheets have 0 to 50 mm; check the unit system"
             )
         for name in ("points", "cells", "thickness", "nodal"):
             object.__setattr__(self, name, readonly(getattr(self, name)))

@@ -93,15 +93,16 @@ def align(
         use_mirror = found[1][2] < 0.3 * found[0][2]
     if use_mirror and not allow_mirror:
         raise ModelError(
-            f"the formed mesh fits as a mirror image ({1e3 * found[1][2]:.2f} mm) but not as it is "
-            f"({1e3 * found[0][2]:.2f} mm): it is of the other side; allow the mirror to use it"
+            f"the formed mesh fits as a mirror image ({1e3 * found[1][2]:.2f} mm) but not "
+            f"unchanged ({1e3 * found[0][2]:.2f} mm): it belongs to the other side; allow the "
+            "mirror to use it"
         )
     R, d, residual = found[int(use_mirror)]
     extent = float(np.ptp(x, axis=0).max())
     if residual > 0.05 * extent:
         raise AccuracyError(
-            f"the formed mesh stays {1e3 * residual:.1f} mm from {target.name} after alignment; "
-            "is it of another part, or in another unit?"
+            f"the formed mesh is {1e3 * residual:.1f} mm from {target.name} after alignment; it "
+            "may belong to another part or have another unit"
         )
     return Alignment(R, d, residual, use_mirror, mirror if use_mirror else proper)
 

@@ -108,7 +108,7 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
     except (ValueError, OverflowError):
         pass
     row, word = _first_bad(words, kind)
-    raise block.fault(int(rows[row]), f"{word!r} is no number")
+    raise block.fault(int(rows[row]), f"{word!r} is not a number")
 
 
 def _split(line: str, widths: Sequence[int]) -> list[str]:
@@ -156,7 +156,7 @@ def _first_of_each(
     for k in contradicted(values, first[which])[:1]:
         (block, row), (other, before) = _at(lines, int(k)), _at(lines, int(first[which[k]]))
         where = f"line {other.at[before]} of {other.source.name}"
-        raise block.fault(row, f"{what} {ids[k]} is there twice, with other values in {where},")
+        raise block.fault(row, f"{what} {ids[k]} occurs twice, with other values in {where},")
     return first
 
 
@@ -259,8 +259,8 @@ def _with_sections(
     t = np.where(t > 0, t, gauge[:, None])
     if np.any(bare := (t <= 0).any(axis=1)):
         raise FileError(
-            f"{path}: shell {shells[bare][0, 0]} ({bare.sum()} in all) has no thickness of its own "
-            "and no *SECTION_SHELL to take it from"
+            f"{path}: shell {shells[bare][0, 0]} ({bare.sum()} in all) has neither a thickness "
+            "nor a *SECTION_SHELL"
         )
     return t
 

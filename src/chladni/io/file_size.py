@@ -21,7 +21,7 @@ def most_gigabytes() -> float:
     try:
         return float(text) if text else LARGEST
     except ValueError:
-        raise FileError(f"{OVERRIDE} = {text[:20]!r} is no number of gigabytes") from None
+        raise FileError(f"{OVERRIDE} = {text[:20]!r} is not a number of gigabytes") from None
 
 
 def refuse_large(path: Path, size: int | None = None, what: str = "holds") -> None:
@@ -40,6 +40,6 @@ def refuse_large(path: Path, size: int | None = None, what: str = "holds") -> No
     gigabytes = (path.stat().st_size if size is None else size) / 1e9
     if gigabytes > limit:
         raise FileError(
-            f"{path.name} {what} {gigabytes:.3g} GB, more than the {limit:g} GB that are read; "
-            f"{OVERRIDE}={int(gigabytes) + 1} in the environment lets it in"
+            f"{path.name} {what} {gigabytes:.3g} GB, more than the limit of {limit:g} GB; "
+            f"{OVERRIDE}={int(gigabytes) + 1} in the environment allows it"
         )

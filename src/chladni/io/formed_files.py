@@ -50,7 +50,7 @@ def _read_csv(path: Path, unit: Units) -> FormedMesh:
     table = read_table(path, ("x", "y", "z"), None)
     t = next((n for n in _THICKNESS_NAMES if n in table), None)
     if t is None:
-        raise FileError(f"{path} has columns {', '.join(table.columns)}; one of thickness is due")
+        raise FileError(f"{path} has columns {', '.join(table.columns)}, but none of thickness")
     points = np.column_stack([table.numbers(c) for c in "xyz"])
     id_ = next((n for n in _NODE_IDS if n in table), None)
     ids = table.numbers(id_).astype(np.int64) if id_ else np.arange(1, len(points) + 1)
@@ -59,8 +59,8 @@ def _read_csv(path: Path, unit: Units) -> FormedMesh:
     for k in contradicted(np.column_stack([points, thickness]), first[which])[:1]:
         before = table.line[first[which[k]]]
         raise FileError(
-            f"{path}, line {table.line[k]}: node {ids[k]} is there twice, with other values in "
-            f"line {before}"
+            f"{path}, line {table.line[k]}: node {ids[k]} occurs twice, with other values in line "
+            f"{before}"
         )
     none = np.zeros((0, 4), np.int64)
     return FormedMesh(
@@ -115,7 +115,7 @@ def _formed_of(path: Path, mesh: Any, unit: Units) -> FormedMesh:
         raise FileError(f"{path} has no quads and no triangles")
     thickness = np.vstack(t)
     for wrong in np.flatnonzero(~np.isfinite(thickness).all(axis=1))[:1]:
-        raise FileError(f"{path}: the thickness of cell {wrong} (counted from 0) is no number")
+        raise FileError(f"{path}: the thickness of cell {wrong} (counted from 0) is not a number")
     return FormedMesh(
         np.arange(1, len(points) + 1),
         points * unit.length,

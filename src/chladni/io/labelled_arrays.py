@@ -52,7 +52,9 @@ def from_xarray(data: "xarray.Dataset", quantity: Quantity | None = None) -> FRF
         raise LabelError(f"the data set has no {', '.join(missing)}; it has {', '.join(names)}")
     said = quantity or data.attrs.get("quantity")
     if said is None:
-        raise LabelError(f"nothing says what H is; give quantity, one of {', '.join(UNIT)}")
+        raise LabelError(
+            f"the quantity of H is not stated; give quantity, one of {', '.join(UNIT)}"
+        )
     arrays = {
         name: np.asarray(data[name].transpose(*_DIMS).values)
         for name in ("H", *_MORE)

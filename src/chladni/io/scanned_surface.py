@@ -110,7 +110,7 @@ def _refuse_cut(path: Path, held: int) -> None:
         )
     if due and held != due:
         raise FileError(
-            f"{path} says it holds {due} {what}, but {held} can be read: it is cut off or damaged"
+            f"{path} states {due} {what}, but only {held} can be read: it is cut off or damaged"
         )
 
 
@@ -124,12 +124,14 @@ def _remarks(points: np.ndarray, cells: np.ndarray, flat: np.ndarray) -> list[st
         length = np.linalg.norm(np.diff(points[open_], axis=1), axis=2).sum()
         share = len(open_) / len(np.unique(edges_of(cells), axis=0))
         out.append(
-            f"The scan is open: {len(open_)} free edges ({100 * share:.2g} %), "
-            f"{length:.3g} m long together; it has no volume to weigh."
+            f"The scan is open: {len(open_)} free edges ({100 * share:.2g} %), {length:.3g} m in "
+            "total; it has no volume."
         )
     turned, branched = edge_faults(cells)
     if turned:
-        out.append(f"Across {turned} edges of the scan the triangles are wound against each other.")
+        out.append(
+            f"The triangles on both sides of {turned} edges of the scan have opposite winding."
+        )
     if branched:
         out.append(f"{branched} edges of the scan are shared by more than two triangles.")
     return out

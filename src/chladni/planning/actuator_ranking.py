@@ -66,7 +66,9 @@ def best_actuators(
     n = len(shaker.each)
     among = np.flatnonzero(np.ones(n, bool) if allowed is None else allowed)
     if not 1 <= count <= len(among):
-        raise ShapeError(f"{count} actuators were asked for, {len(among)} candidates are allowed")
+        raise ShapeError(
+            f"{count} actuators were requested, but {len(among)} candidates are allowed"
+        )
     if comb(len(among), count) <= exhaustive:
         sets = [np.array(s) for s in combinations(among, count)]
         return sets[int(np.argmin([shaker.condition(s) for s in sets]))]

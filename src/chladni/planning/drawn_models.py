@@ -54,7 +54,7 @@ def ensemble(
     f_max : highest target frequency [Hz]
     spread : standard deviation of the logarithm of each part's thickness
     """
-    progress("models with drawn thickness", 0.0)
+    progress("models with random thickness", 0.0)
     where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
     modal = normal_modes(built.system, band=REACH * f_max, points=where)
     groups = element_groups(built, 1)
@@ -67,7 +67,7 @@ def ensemble(
     blocks = [modal.shapes]
     rng = np.random.default_rng(0)
     for k in range(FULL):
-        progress(f"drawn model {k + 1} of {FULL} for the basis", (k + 1) / (FULL + 2))
+        progress(f"random model {k + 1} of {FULL} for the basis", (k + 1) / (FULL + 2))
         blocks.append(_solved(built, effects, random(rng, len(effects), spread), 1.1 * f_max))
     basis = orthonormal(built.system.M, blocks, kept=modal.shapes.shape[1])
     return Ensemble(reduce(groups, basis), effects, int(rigid_modes(modal).sum()))

@@ -181,7 +181,9 @@ def balanced(system: StateSpace, *, check: float = 1e-6) -> Balanced:
     R, L = (U @ root for U, root in (_factors(Wc), _factors(Wo)))
     U, sigma, Vt = np.linalg.svd(L.T @ R)
     if sigma[-1] <= 1e-13 * sigma[0]:
-        raise AccuracyError("a state is not both seen and driven: there is no balanced realisation")
+        raise AccuracyError(
+            "a state is not both observable and controllable: there is no balanced realisation"
+        )
     T, inverse = R @ Vt.T / np.sqrt(sigma), (U / np.sqrt(sigma)).T @ L.T
     new = replace(system, A=inverse @ system.A @ T, B=inverse @ system.B, C=system.C @ T)
     for W in (inverse @ Wc @ inverse.T, T.T @ Wo @ T):

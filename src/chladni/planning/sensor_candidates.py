@@ -118,10 +118,11 @@ def find_sensor_candidates(
     clear &= grid | ~_has_one(every, clear)
     if not clear.any():
         raise ModelError(
-            f"no place of the surface is flat within {1e3 * SMALLER[-1] * foot:.2g} mm and off "
-            "edges, folds and joints by as much: refine the mesh, or give the places you have"
+            f"no place of the surface is flat within {1e3 * SMALLER[-1] * foot:.2g} mm and as far "
+            "from edges, folds and joints: refine the mesh, or give your own places"
             if unit
-            else "no place of the surface is flat and off edges, folds and joints; give --units"
+            else "no place of the surface is flat and away from edges, folds and joints; give "
+            "--units"
         )
     at = np.flatnonzero(clear)
     at = at[farthest_point_sample(every.points[at], min(3 * count, len(at)))]
@@ -137,7 +138,7 @@ def _across_beams(assembly: Assembly, count: int) -> SensorCandidates:
     """Grids of beams, each with the two axes of the basic frame that lie most across its beams."""
     nodes = assembly.beams.nodes
     if not len(nodes):
-        raise ModelError("the model has no sheet, solid or beam a sensor could be glued to")
+        raise ModelError("the model has no sheet, solid or beam for a sensor")
     along = assembly.points[nodes[:, 1]] - assembly.points[nodes[:, 0]]
     own = np.zeros((len(assembly.points), 3))
     for end in nodes.T:  # Σ l cos² to each axis

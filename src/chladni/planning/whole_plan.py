@@ -168,7 +168,7 @@ def plan(
     settings = settings or PlanSettings()
     if not any(map(thickness_of, assembly.parts)):
         settings = replace(settings, draws=0)  # nothing to draw
-    progress("places a sensor can sit at", 0.05)
+    progress("places for sensors", 0.05)
     places = find_sensor_candidates(assembly, settings.candidates, unit=unit)
     settings = replace(settings, sensors=min(settings.sensors, len(places)))
     progress("modes", 0.2)
@@ -328,7 +328,7 @@ def _layout(
         "with exchange": kept,
     }
     if settings.alike < 1:
-        layouts["with modes told apart"] = best = distinct(
+        layouts["with modes distinguished"] = best = distinct(
             c, kept, ceiling=settings.alike, rules=rules
         )
     if settings.spacing == 0 and c.rows.shape[0] == 1:

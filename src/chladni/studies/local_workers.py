@@ -22,7 +22,7 @@ from .worker_memory import keep_freed_memory
 STARTS = 3  # workers in turn that may end before they are ready
 TRIES = 4  # workers that may end in one sample
 AHEAD = 2  # samples a worker has: one is computed, one waits
-ENDED = "its worker ended without a word each time it was tried: is there memory enough?"
+ENDED = "its worker ended without a message in every attempt; there may be too little memory"
 
 
 @dataclass(eq=False)
@@ -131,5 +131,5 @@ def _ended(worker: _Worker) -> None:
 def _no_start(workers: int) -> str:
     return (
         f"{workers} local workers could not be started in {STARTS} tries; --workers 1 needs none, "
-        'and a script that asks for more needs the usual if __name__ == "__main__":'
+        'and a script with more workers needs if __name__ == "__main__":'
     )

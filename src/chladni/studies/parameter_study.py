@@ -148,7 +148,9 @@ def study(
     own = np.array([v.nominal for v in varied])
     nominal = computed(asked, -1, own)
     if nominal.why:
-        raise FileError(f"{model.source}: the deck's own values cannot be solved: {nominal.why}")
+        raise FileError(
+            f"{model.source}: the deck with its own values cannot be solved: {nominal.why}"
+        )
     _refuse_taken([v.name for v in varied], nominal.columns)
     drawn = design(settings.sampler, settings.samples, len(varied), settings.seed,
                    _places(varied, own))  # fmt: skip
@@ -174,7 +176,7 @@ def study(
         except ChladniError as error:
             raise type(error)(f"{error}; {_kept(len(rows), len(X), store)}") from error
         if case is not None and case.recordings and not case.frfs:
-            notes.append("The recording holds no FRFs, so there is no Q.")
+            notes.append("The recording has no FRFs, so there is no Q.")
         notes += [*drawn.notes, *(store.notes if store else [])]
     return ParameterStudy(
         varied, settings, drawn, X, tuple(rows[k] for k in sorted(rows)),
@@ -197,11 +199,13 @@ def _varied(
             for asked in vary
         ]
         if case is not None and case.parameters:
-            notes = ["The [[parameter]] of the case are not used: --vary says what is varied."]
+            notes = [
+                "The [[parameter]] of the case are not used, because --vary defines the parameters."
+            ]
     else:
         found, notes = of_case(case.parameters if case else (), model.assembly)
     if not found:
-        raise FileError(f"{model.source}: nothing is varied; {_choices(model.assembly)}")
+        raise FileError(f"{model.source}: no parameter is varied; {_choices(model.assembly)}")
     refuse_impossible(found, model.assembly)
     return tuple(found), notes
 
@@ -223,7 +227,7 @@ def _choices(assembly: Assembly) -> str:
     """The parameters that can be varied, as advice for an error message."""
     parts = [p for p in assembly.parts if fields_of(p)]
     if not parts:
-        return 'give --vary "K=50%:200%" or the like'
+        return 'give for example --vary "K=50%:200%"'
     some = ", ".join(f"{p.name} ({', '.join(fields_of(p))})" for p in parts[:6])
     return f'give --vary "{fields_of(parts[0])[0]} of {parts[0].name}=90%:110%"; there are {some}'
 
@@ -337,8 +341,10 @@ def _provenance(
 
 def _kept(done: int, n: int, store: StudyStore | None) -> str:
     if store is None:
-        return f"{done} of {n} samples were done and are lost, since no folder was given"
-    return f"{done} of {n} samples are kept in {store.folder}; the same command goes on from there"
+        return f"{done} of {n} samples were finished and are lost, because no folder was given"
+    return (
+        f"{done} of {n} samples are kept in {store.folder}; the same command continues from there"
+    )
 
 
 class _Clock:

@@ -32,8 +32,8 @@ BEGUN, DESIGN, ROWS, FRFS, LOCK = (
 OWN = ("sample", "status", "why", "seconds")  # columns in addition to parameters and results
 _WORDS = {
     "model": "the deck, the case or the recording",
-    "parameters": "what is varied, and how far",
-    "settings": "what is asked of a sample",
+    "parameters": "the parameters and their ranges",
+    "settings": "the results of a sample",
 }
 
 
@@ -102,7 +102,7 @@ def opened_store(
     make_folder(folder)
     begun = folder / BEGUN
     if not begun.exists() and any(p.name != LOCK for p in folder.iterdir()):
-        raise FileError(f"{folder} holds files that are no study; give an empty or a new folder")
+        raise FileError(f"{folder} has files that are not a study; give an empty or a new folder")
     with open(folder / LOCK, "a+b") as held:
         notes = []
         if not lock(held.fileno(), folder):
@@ -139,7 +139,7 @@ def _refuse_another(begun: Path, identity: dict[str, Any]) -> None:
             + (f"({there.get(key)} there, {identity[key]} now)" if key not in _WORDS else "differs")
             for key in names
         )
-        raise FileError(f"{begun.parent} holds another study: {said}; give another --out")
+        raise FileError(f"{begun.parent} has another study: {said}; give another --out")
 
 
 def finished(path: Path, n: int) -> tuple[dict[int, dict[str, Any]], int]:

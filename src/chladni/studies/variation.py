@@ -69,7 +69,7 @@ def of_case(
         if free.field not in FIELDS:
             notes.append(
                 f"{free.name} is an effect, not a number of the deck: it is not varied "
-                f'(--vary "{free.field}=LOW:HIGH" does, of one that has one number).'
+                f'(--vary "{free.field}=LOW:HIGH" varies an effect with one number).'
             )
             continue
         sd = SD.get(free.field, SD_OTHERS) if free.sd is None else free.sd
@@ -155,8 +155,8 @@ def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Unit
     if unit == "of the deck's":
         values = np.unique(values_of(assembly, free))
         raise asked.refused(
-            f"{_called(free)} has {len(values)} different values in the deck; "
-            "give a share of the deck's own, as 90%:110%, or vary one part at a time"
+            f"{_called(free)} has {len(values)} different values in the deck; give a share of the "
+            "deck's value, for example 90%:110%, or vary one part at a time"
         )
     assert units is not None
     moment = units.force * units.length if unit == "N m/rad" else units.force / units.length
@@ -174,7 +174,7 @@ def _range(asked: VaryText, nominal: float, scale: float) -> tuple[float, float]
         if not 1 / reach <= value / nominal <= reach:
             raise asked.refused(
                 f"{value / scale:g} is {value / nominal:.3g} times the deck's own "
-                f"{nominal / scale:g}; plain numbers are in the deck's own units, a share of its "
+                f"{nominal / scale:g}; plain numbers are in the deck's units, a share of its "
                 "value is written 90%:110%"
                 + ("" if asked.log or asked.name not in _REACH else ", decades 1e2:1e6:log")
             )
@@ -187,7 +187,9 @@ def refuse_impossible(chosen: Sequence[Variation], assembly: Assembly) -> None:
         if a.free.field == "nu":
             most = float(values_of(assembly, a.free).max()) * a.high / a.nominal
             if most >= 0.5:
-                raise FileError(f"{a.name!r} would reach {most:.3g}; no material has 0.5 or more")
+                raise FileError(
+                    f"{a.name!r} would reach {most:.3g}, but materials have less than 0.5"
+                )
         for b in chosen[:k]:
             shared = any(
                 set(getattr(a.free, name)) & set(getattr(b.free, name))

@@ -79,12 +79,12 @@ def _placed(asked: VaryText, kind: Family, assembly: Assembly, case: Case | None
     """The effect at the place given by the test of a case."""
     if kind.placed is None or kind.on_sheets:
         if issubclass(kind.effect, MovableAttachment) and not kind.effect.own_dofs:
-            raise asked.refused(f"where? write {kind.name} at GRID=..., with a grid of the deck")
+            raise asked.refused(f"no place; write {kind.name} at GRID=..., with a grid of the deck")
         raise _refused(asked, kind)
     every = kind.placed(_surroundings(assembly, case))
     if not every:
         raise asked.refused(
-            "where it acts is not known; a case with [test] sensors or hangers says it"
+            "its place is not known; a case with [test] sensors or hangers defines it"
         )
     if len(every[0].parameters) > 1:
         raise _refused(asked, kind)
@@ -93,8 +93,8 @@ def _placed(asked: VaryText, kind: Family, assembly: Assembly, case: Case | None
 
 def _refused(asked: VaryText, kind: Family) -> FileError:
     return asked.refused(
-        f"{kind.name} takes more than one number or a grid; what can be varied "
-        "are point-mass and extra-support at a grid, and sensor-mass and suspension of a case"
+        f"{kind.name} takes more than one number or a grid; point-mass and extra-support at a "
+        "grid can be varied, and sensor-mass and suspension of a case"
     )
 
 

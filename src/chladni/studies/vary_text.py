@@ -65,7 +65,7 @@ class VaryText:
             If an end is not a number, a share has no value to refer to, or the range is empty.
         """
         if nominal is None and "%" in self.low + self.high:
-            raise self.refused("the deck has nothing there of which to take a share")
+            raise self.refused("the deck has no value there, so a share is not possible")
         low, high = (self._number(piece, scale, nominal or 0.0) for piece in (self.low, self.high))
         if nominal is None and not self.log:
             if not 0 <= low < high < np.inf:
@@ -83,7 +83,7 @@ class VaryText:
 
 def _no_range(text: str) -> FileError:
     return FileError(
-        f"--vary {text!r}: {text.rpartition('=')[2].strip()!r} is no range; write 0.6:0.8, "
+        f"--vary {text!r}: {text.rpartition('=')[2].strip()!r} is not a range; write 0.6:0.8, "
         "90%:110% or 1e2:1e6:log"
     )
 

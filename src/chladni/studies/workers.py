@@ -33,11 +33,11 @@ def refuse_many(workers: int) -> None:
         If the number is below one, or above ``MOST_PER_CORE`` a core.
     """
     if workers < 1:
-        raise FileError(f"workers = {workers}; at least one has to do it")
+        raise FileError(f"workers = {workers}; at least one is needed")
     if workers > MOST_PER_CORE * cores():
         raise FileError(
-            f"workers = {workers}; more than {MOST_PER_CORE * cores()} gain nothing "
-            f"on {cores()} cores"
+            f"workers = {workers}; more than {MOST_PER_CORE * cores()} bring no gain on {cores()} "
+            "cores"
         )
 
 

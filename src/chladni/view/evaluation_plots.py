@@ -47,7 +47,7 @@ def amplitude_dependence(
         look = {"color": _COLOURS[k % len(_COLOURS)], "marker": "o", "ms": 3, "lw": 1.0}
         left.plot(amplitude, 100 * (f / f[-1] - 1), label=name, **look)
         right.plot(amplitude, 100 * zeta, **look)
-    for ax, what in ((left, "frequency over the faintest's [%]"), (right, "damping [%]")):
+    for ax, what in ((left, "frequency relative to the faintest [%]"), (right, "damping [%]")):
         ax.set(xscale="log", xlabel="amplitude of the response [SI]", ylabel=what)
         ax.grid(which="both", lw=0.3, alpha=0.5)
     right.set_ylim(bottom=0.0)

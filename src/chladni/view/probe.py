@@ -27,7 +27,8 @@ ADVICE = (
 )
 ROOM = 1.5e9  # bytes of address space that VTK and its pictures take, with half as much in reserve
 CRAMPED = (
-    "Pictures are drawn with matplotlib: the limit on address space (ulimit -v) leaves VTK no room."
+    "Pictures are drawn with matplotlib: the limit on address space (ulimit -v) leaves too "
+    "little for VTK."
 )
 _CHILD = """
 import pyvista

@@ -153,5 +153,5 @@ def surface(assembly: Assembly, unit: str = "m") -> Surface:
         np.concatenate(joints),
     )
     if not len(seen.faces) + len(seen.lines):
-        raise ModelError("there is nothing to draw: no shells, solids, beams or springs")
+        raise ModelError("the model has no shells, solids, beams or springs to draw")
     return seen

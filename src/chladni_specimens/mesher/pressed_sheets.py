@@ -85,8 +85,8 @@ class Patches:
         if (pieces := components(quads, len(plan))).max() > 0:
             where = plan[np.argmax(pieces)]
             raise ModelError(
-                f"{name} falls into {pieces.max() + 1} pieces, one near y {where[0]:.3f} m, "
-                f"s {where[1]:.3f} m; its patches do not meet"
+                f"{name} falls into {pieces.max() + 1} pieces, one near y {where[0]:.3f} m, s "
+                f"{where[1]:.3f} m; its patches do not touch"
             )
         points = surface(plan)
         quads, source = split_folded(points, quads)

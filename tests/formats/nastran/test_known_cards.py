@@ -75,7 +75,9 @@ def test_materials_that_follow_a_chosen_temperature_are_refused(bulk, chosen):
 
 
 def test_bulk_data_alone_says_not_whether_temperatures_are_chosen(bulk):
-    with pytest.raises(FileError, match=r"deck.bdf:8: no case control says whether TEMP .*MATT1"):
+    with pytest.raises(
+        FileError, match=r"deck.bdf:8: the case control does not select TEMP .*MATT1"
+    ):
         bulk(f"{PLATE}{TABLE}MATT1,5,7\n")
     assert bulk(f"{PLATE}MATT1,5,7\n")
 
@@ -120,7 +122,7 @@ def test_parameters_that_scale_a_matrix_are_refused(bulk, place):
         ("GRID,9,,1.,1.,1.,,,3\n", "GRID 9: SEID .*superelement"),
         ("CTUBE,90,9,1,3\nPTUBE,9,5,2.,.2,,4.\n", r"PTUBE 9: a tapered tube \(OD2 = 4\)"),
         ("CBUSH,90,9,1,3,,,,0\nPBUSH,9,M,5.\n", "PBUSH 9: a mass M is not supported"),
-        ("GRID,9,,1.,1.,1.\nCONM2,90,9,,3.\n", "mass 90 is on grid 9, which nothing joins"),
+        ("GRID,9,,1.,1.,1.\nCONM2,90,9,,3.\n", "mass 90 is on grid 9, which is not connected"),
         ("CMASS2,90,-1.,1,3\n", "CMASS2 90: its mass is negative"),
         ("PMASS,9,-1.\nCMASS1,90,9,1,3\n", "CMASS1 90: its mass is negative"),
         ("MAT8,7,1.,1.,.3\nPCOMP,7\n,7,1.\nCQUAD4,90,7,1,2,3,4\n", "MAT8 7: .*G12 0 are to be"),

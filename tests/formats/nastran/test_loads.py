@@ -118,7 +118,7 @@ def test_pressure_on_a_solid_points_inwards(bulk, marks):
 def test_marks_that_fit_no_face(bulk):
     with pytest.raises(FileError, match="grids 1 and 2 mark no face of the CHEXA"):
         analysis(bulk(CUBE + "PLOAD4,1,9,1.,,,,1,2\n"))
-    with pytest.raises(FileError, match="element 8 is no shell or solid"):
+    with pytest.raises(FileError, match="element 8 is not a shell or solid"):
         analysis(bulk(CUBE + "PLOAD4,1,8,1.,,,,1,2\n"))
 
 
@@ -270,7 +270,7 @@ def test_parameters_without_effect_are_said(bulk):
     text = PLATE + "PARAM,POST,-1\nPARAM,G,.02\nPARAM,SNORM,20.\nPARAM,K6ROT,1.\n"
     notes = analysis(bulk(text, "SOL 111\nCEND\nPARAM,LFREQ,1.\n")).notes
     assert len(notes) == 1
-    assert "PARAM LFREQ, SNORM: not acted upon" in notes[0]
+    assert "PARAM LFREQ, SNORM: ignored" in notes[0]
 
 
 @pytest.mark.skipif(not ANCHORS.exists(), reason="reference decks are not at hand")

@@ -242,11 +242,11 @@ BROKEN = {
     "nothing to repeat": ("=,*1,=\n", r":1: there is no card of one line above"),
     "no pattern": ("GRID,1\n=5\n", r":2: =5 has no replicated card above it"),
     "step of nothing": ("GRID,1,,A\n=,*1,,*2.\n", r":2: 'A' \+ '2.' cannot be added"),
-    "columns": ("GRID 1 0 0.0 0.0 0.0\n", r":1: 'GRID 1 0' is no card name"),
-    "too many free fields": ("SPC1,1,123,1,2,3,4,5,6,7\n", r"'7' stands beyond field 9"),
+    "columns": ("GRID 1 0 0.0 0.0 0.0\n", r":1: 'GRID 1 0' is not a card name"),
+    "too many free fields": ("SPC1,1,123,1,2,3,4,5,6,7\n", r"'7' is beyond field 9"),
     "no BEGIN BULK": ("SOL 103\nCEND\nGRID,1\n", r":2: CEND without a BEGIN BULK"),
     "superelement": ("CEND\nBEGIN BULK\nGRID,1\nBEGIN SUPER=1\n", r":4: superelement"),
-    "empty": ("$ nothing\n\n", "holds no bulk data"),
+    "empty": ("$ nothing\n\n", "has no bulk data"),
 }
 
 

@@ -90,7 +90,7 @@ def test_frequency_responses(tmp_path, polar, by_point):
 @pytest.mark.parametrize(
     ("keep", "said"),
     [
-        ([*range(20)], r"subcase 1: there is no point 11 in mode 2.* \(3 of 4 records\)"),
+        ([*range(20)], r"subcase 1: point 11 is missing in mode 2.* \(3 of 4 records\)"),
         ([*range(21)], r"modes.pch:21: the record of grid 11 holds 3 values, 6 are due"),
         ([*range(8), *range(9, 22)], r"modes.pch:8: the record of grid 7 holds 3 values"),
         ([*range(9), *range(7, 22)], r"subcase 1: point 7 is there twice in mode 1"),
@@ -117,7 +117,7 @@ def test_a_number_cut_in_its_digits_is_refused(tmp_path):
 
 def test_what_is_not_there(tmp_path):
     path = modes_file(tmp_path, [4.0], rng.normal(size=(1, 6, 1)), [7])
-    with pytest.raises(FileError, match="holds no frequency responses"):
+    with pytest.raises(FileError, match="has no frequency responses"):
         read_punch_responses(path)
     path.write_text(path.read_text().replace("G  ", "G O", 1))
     with pytest.raises(FileError, match=r"modes.pch:\d+: .* no record"):
@@ -158,7 +158,7 @@ def test_files_pyyeti_cannot_read(tmp_path):
     pytest.importorskip("pyyeti")
     path = tmp_path / "x.op2"
     path.write_bytes(b"not an op2 file at all, whatever its name says" * 4)
-    with pytest.raises(FileError, match="no OP2 file pyYeti can read"):
+    with pytest.raises(FileError, match="cannot be read by pyYeti as OP2"):
         read_op2_modes(path)
     with pytest.raises(FileError, match="does not exist"):
         read_op4(tmp_path / "none.op4")

@@ -64,7 +64,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -
     """
     if not path.is_file():
         near = difflib.get_close_matches(path.name, beside_it(path), 3, 0.4) or beside_it(path)[:6]
-        raise FileError(f"no file {path}; beside it there are {named(near)}")
+        raise FileError(f"no file {path}; the folder has {named(near)}")
     refuse_large(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -73,7 +73,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -
     except UnicodeDecodeError as error:
         raise FileError(f"{path.name} is {not_text(error)}") from error
     except csv.Error as error:
-        raise FileError(f"{path.name} is no table: {error}") from error
+        raise FileError(f"{path.name} is not a table: {error}") from error
     if not rows:
         raise FileError(f"{path.name} is empty; the first line names the columns {', '.join(due)}")
     header = [name.strip().lower().lstrip("# ") for name in rows[0][1]]

@@ -48,7 +48,7 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     if path.is_file():
         refuse_large(path)
     elif ending in ENDINGS and ending not in _UNIVERSAL:
-        raise FileError(f"no file {path}; beside it there are {named(beside_it(path))}")
+        raise FileError(f"no file {path}; the folder has {named(beside_it(path))}")
     if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
         return (_timed(path, _TIMED[ending](path), quantity),)
     if ending == ".npz":
@@ -83,7 +83,7 @@ def _asked(r: Recording, quantity: str | None) -> Recording:
         raise FileError(
             f"{r.name}: its units make it {r.time.quantity}, which cannot be read as {quantity}"
         )
-    note = f"read as {quantity} as asked, whatever its units say"
+    note = f"read as {quantity} as requested; its units are ignored"
     time = replace(r.time, quantity=cast(Quantity, quantity))
     return replace(r, time=time, notes=(*r.notes, note))
 
@@ -136,8 +136,8 @@ def _responses(table: CsvTable, parts: tuple[str, str]) -> np.ndarray:
         return one + 1j * other
     for k in np.flatnonzero(one < 0):
         raise FileError(
-            f"{table.path.name}, line {table.line[k]}: a magnitude of {one[k]:g} is none; is it in "
-            "decibels?"
+            f"{table.path.name}, line {table.line[k]}: a magnitude cannot be {one[k]:g}; convert "
+            "decibels to a ratio"
         )
     return one * np.exp(1j * _PHASE[parts[1]] * other)
 
@@ -203,13 +203,13 @@ def _complete(
     channel = f"{outputs[i]} / {inputs[j]}"
     if count[k, i, j] == 0:
         raise FileError(
-            f"{table.path.name}: {channel} has no line at {frequency[k]:g} Hz, where others have "
-            "one; all channels need the same frequencies"
+            f"{table.path.name}: {channel} has no line at {frequency[k]:g} Hz, but others have; "
+            "all channels need the same frequencies"
         )
     twice = np.flatnonzero((place[0] == k) & (place[1] == i) & (place[2] == j))[1]
     raise FileError(
-        f"{table.path.name}, line {table.line[rows[twice]]}: {channel} at {frequency[k]:g} Hz is "
-        "there twice; several levels or articles need a column level or article"
+        f"{table.path.name}, line {table.line[rows[twice]]}: {channel} at {frequency[k]:g} Hz "
+        "occurs twice; several levels or articles need a column level or article"
     )
 
 
@@ -228,7 +228,7 @@ def _frf(
         raise FileError(f"{name}: {tuple(outputs)[i]} is not a number at {frequency[k]:g} Hz")
     for role, labels in (("output", list(outputs)), ("input", list(inputs))):
         if twice := [label for label in dict.fromkeys(labels) if labels.count(label) > 1]:
-            raise FileError(f"{name}: {role} {twice[0]} is there twice")
+            raise FileError(f"{name}: {role} {twice[0]} occurs twice")
     if not (np.isfinite(frequency).all() and np.all(frequency >= 0)):
         raise FileError(f"{name}: a frequency is negative or not a number")
     if values.size == 0 or not values.any():
@@ -246,9 +246,9 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileError(f"no file {path}; beside it there are {named(beside_it(path))}")
+        raise FileError(f"no file {path}; the folder has {named(beside_it(path))}")
     if not zipfile.is_zipfile(path):
-        raise FileError(f"{path.name} cannot be read as NPZ: it is no archive of arrays")
+        raise FileError(f"{path.name} cannot be read as NPZ: it is not an archive of arrays")
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(held.file_size for held in archive.infolist())
@@ -287,7 +287,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     level = None
     if "level" in arrays:
         if (found := _numbers(path, arrays, "level")).size != 1:
-            raise FileError(f"{path.name}: level holds {found.size} values; it is one number")
+            raise FileError(f"{path.name}: level has {found.size} values; it must be one number")
         level = _amplitude(path.name, float(found.reshape(-1)[0]))
     article = _word(path, arrays, "article") if "article" in arrays else ""
     return Recording(path.name, frf, level=level, article=article)
@@ -296,7 +296,9 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
 def _amplitude(where: str, level: float) -> float:
     """The level, which is the amplitude of what was held."""
     if not 0 <= level < np.inf:
-        raise FileError(f"{where}: level is {level:g}; an amplitude is finite and not negative")
+        raise FileError(
+            f"{where}: level is {level:g}; an amplitude must be finite and not negative"
+        )
     return level
 
 
@@ -317,7 +319,7 @@ def _numbers(
     """An array of numbers of these kinds."""
     if arrays[name].dtype.kind not in kinds:
         kind = "records" if arrays[name].dtype.names else str(arrays[name].dtype)
-        raise FileError(f"{path.name}: {name} holds {kind}, not numbers")
+        raise FileError(f"{path.name}: {name} has {kind}, not numbers")
     return arrays[name]
 
 
@@ -326,7 +328,7 @@ def _words(path: Path, arrays: dict[str, np.ndarray], name: str) -> list[str]:
     found = np.atleast_1d(arrays[name])
     if found.ndim != 1 or found.dtype.names:
         kind = "records" if found.dtype.names else f"an array of {found.ndim} dimensions"
-        raise FileError(f"{path.name}: {name} holds {kind}, not a row of texts")
+        raise FileError(f"{path.name}: {name} has {kind}, not a row of texts")
     if found.dtype.kind == "S":
         found = np.char.decode(found, "utf-8", "replace")
     return [str(text) for text in found]
@@ -336,7 +338,7 @@ def _word(path: Path, arrays: dict[str, np.ndarray], name: str) -> str:
     """A single text, alone or as the only one of a row."""
     found = _words(path, arrays, name)
     if len(found) != 1:
-        raise FileError(f"{path.name}: {name} holds {len(found)} texts; it is one")
+        raise FileError(f"{path.name}: {name} has {len(found)} texts; it must be one")
     return found[0]
 
 
@@ -348,7 +350,7 @@ def read_poles(path: str | Path) -> PoleTable:
     for k in np.flatnonzero(~(frequency > 0)):
         raise FileError(
             f"{table.path.name}, line {table.line[k]}: a frequency of "
-            f"{table.columns['frequency_hz'][k]!r} Hz is no frequency of a mode"
+            f"{table.columns['frequency_hz'][k]!r} Hz is not a natural frequency"
         )
     unknown = np.full(n, np.nan)
     sd = table.numbers("frequency_sd_hz") if "frequency_sd_hz" in table else unknown

@@ -57,7 +57,7 @@ def read_layout(path: Path, driven: Sequence[Sensor] = ()) -> tuple[Sensor, ...]
         found = (*(s for s in found if s.role == "output"), *driven)
     for role in get_args(Role):
         if not any(s.role == role for s in found):
-            raise FileError(f"{path} names no {role}; a layout has sensors and what drives them")
+            raise FileError(f"{path} names no {role}; a layout needs outputs and inputs")
     return found
 
 
@@ -84,8 +84,8 @@ def with_input(path: Path, label: str) -> str:
     """
     if named_already := [s.label for s in read_sensors(path) if s.role == "input"]:
         raise FileError(
-            f"{path} names what drives ({', '.join(named_already)}); take that out of it, or leave "
-            f"out --input {label}"
+            f"{path} already names inputs ({', '.join(named_already)}); remove them, or leave out "
+            f"--input {label}"
         )
     held = read_table(path, ("label",), _OPTIONAL).columns
     columns = list(dict.fromkeys([*held, "role"]))
@@ -106,7 +106,7 @@ def _planned(path: Path) -> tuple[Sensor, ...]:
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise FileError(f"{path} is no plan.json of chladni plan ({error})") from error
+        raise FileError(f"{path} is not a plan.json of chladni plan ({error})") from error
 
 
 def _of_plan(at: dict[str, Any], role: Role) -> Sensor:
@@ -133,26 +133,28 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
     if np.isnan(xyz).any() and not np.isnan(xyz).all():
         raise FileError(f"{where}: a place needs x, y and z")
     if np.isfinite(grid) and np.isfinite(xyz).all():
-        raise FileError(f"{where}: both a grid and a place x, y, z; one of them decides")
+        raise FileError(f"{where}: both a grid and a place x, y, z; give only one of them")
     mass, sd = number("mass", 0.0), number("position_sd", 0.0)
     if mass < 0 or sd < 0:
         raise FileError(f"{where}: mass {mass:g} kg and position_sd {sd:g} m cannot be negative")
     gain = number("gain", 1.0)
     if gain == 0:
         raise FileError(
-            f"{where}: a gain of 0 leaves nothing; to leave a channel out write use = no"
+            f"{where}: a gain of 0 is not possible; to exclude a channel write use = no"
         )
     use = cell.get("use", "").lower() or "yes"
     if use not in ("yes", "no") or (use == "no" and role == "input"):
-        raise FileError(f"{where}: use {use!r} of an {role}; outputs are used: yes or no")
+        raise FileError(f"{where}: use {use!r} of an {role}; only outputs have use: yes or no")
     given = normal if np.isfinite(normal).any() else cell.get("direction", "")
     place = xyz if np.isfinite(xyz).all() else None
     if moved and (place is not None or mass > 0):
-        raise FileError(f"{where}: the base is all supports together; it has no place and no mass")
+        raise FileError(
+            f"{where}: the base is all supports together and has neither place nor mass"
+        )
     if np.isnan(grid) and place is None and not moved:
         grid = _node(label, where)
     if np.isfinite(grid) and grid != int(grid):
-        raise FileError(f"{where}: grid {grid:g} is no whole number")
+        raise FileError(f"{where}: grid {grid:g} is not a whole number")
     return Sensor(
         label=label,
         grid=int(grid) if np.isfinite(grid) else None,
@@ -184,7 +186,7 @@ def direction(text: str | np.ndarray, where: str) -> np.ndarray | None:
     if isinstance(text, np.ndarray):
         length = float(np.linalg.norm(text))
         if not np.isfinite(length) or length == 0:
-            raise FileError(f"{where}: nx, ny, nz = {named(text.tolist())} is no direction")
+            raise FileError(f"{where}: nx, ny, nz = {named(text.tolist())} is not a direction")
         return text / length
     way = text.rpartition(":")[2].strip().upper()
     if way == "N":

@@ -37,13 +37,14 @@ def read_wav(path: Path) -> Read:
     try:
         rate, x = wavfile.read(path)
     except DAMAGED as error:
-        why = "its header holds 0 channels" if isinstance(error, ZeroDivisionError) else error
+        why = "its header has 0 channels" if isinstance(error, ZeroDivisionError) else error
         raise FileError(f"{path.name} cannot be read as WAV: {why}") from error
     x = np.atleast_2d(x.T)
     if not described(path).is_file():
         raise FileError(
-            f"{path.name} holds {len(x)} channels without units; write {described(path).name} "
-            "beside it with the columns channel, label, unit and scale (units per full scale)"
+            f"{path.name} has {len(x)} channels without units; add the file "
+            f"{described(path).name} with the columns channel, label, unit and scale (units per "
+            "full scale)"
         )
     values = x.astype(float)
     if x.dtype.kind == "u":
@@ -71,8 +72,8 @@ def _refuse_cut(path: Path) -> None:
                 continue
             if left < length < _UNSTATED:
                 raise FileError(
-                    f"{path.name} says it holds {length} bytes of samples, but {left} are there: "
-                    "it is cut off or damaged"
+                    f"{path.name} states {length} bytes of samples, but has {left}: it is cut off "
+                    "or damaged"
                 )
             return
 
@@ -91,7 +92,10 @@ def read_mat(path: Path) -> Read:
     with path.open("rb") as file:
         head = file.read(128)
     if b"MATLAB 7.3" in head or head[:4] == b"\x89HDF":
-        raise FileError(f"{path.name} is of MATLAB 7.3 (HDF5), which is not read; save it with -v7")
+        raise FileError(
+            f"{path.name} has the format MATLAB 7.3 (HDF5), which is not supported; save it with "
+            "-v7"
+        )
     try:
         refuse_large(path, sum(8 * prod(shape) for _, shape, _ in whosmat(str(path))), "unpacks to")
         held = loadmat(str(path), squeeze_me=True, struct_as_record=False)
@@ -230,7 +234,7 @@ def _described(path: Path, raw: list[TimeChannel]) -> tuple[list[TimeChannel], l
             )
         at = called[word]
         if at in lines:
-            raise FileError(f"{where}: channel {word} is there twice, before in line {lines[at]}")
+            raise FileError(f"{where}: channel {word} occurs twice, first in line {lines[at]}")
         lines[at] = line
         role = table.columns["role"][k] if "role" in table else ""
         if role not in ("", "input", "output"):

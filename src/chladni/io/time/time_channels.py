@@ -59,8 +59,8 @@ def assembled(
         )
     motions = {q for _, q, _ in outputs}
     if len(motions) > 1:
-        raise FileError(f"{name}: its outputs are {' and '.join(sorted(map(str, motions)))}; "
-                        "one kind of motion a file")  # fmt: skip
+        raise FileError(f"{name}: its outputs are {' and '.join(sorted(map(str, motions)))}; a "
+                        "file must have one kind of motion")  # fmt: skip
     kind: Quantity = motions.pop() or "accelerance"
     bases = {q for _, q, _ in inputs}
     if inputs and bases != {None}:
@@ -94,8 +94,8 @@ def _meaning(name: str, channel: TimeChannel, k: int) -> tuple[str, Quantity | N
     if quantity is None:
         raise FileError(
             f"{name}: {called} is in {channel.unit or 'no unit'!r}; known are N, lbf, kgf for "
-            "forces, m, mm, in, m/s, mm/s, m/s^2, g, ... for motions, and Pa of a microphone that "
-            "hears a free decay"
+            "forces, m, mm, in, m/s, mm/s, m/s^2, g, ... for motions, and Pa of a microphone in "
+            "a free decay"
         )
     return channel.role or "output", quantity, factor  # type: ignore[return-value]
 
@@ -106,13 +106,13 @@ def _labels(name: str, inputs: Sequence[tuple], outputs: Sequence[tuple]) -> tup
     if all(held):
         for part in (held[: len(inputs)], held[len(inputs) :]):
             if twice := [x for x in dict.fromkeys(part) if part.count(x) > 1]:
-                raise FileError(f"{name}: channel {twice[0]} is there twice")
+                raise FileError(f"{name}: channel {twice[0]} occurs twice")
         return tuple(held), []
     made = tuple(f"{k + 1}:n" for k in range(len(held)))
     said = ", ".join(made[: len(inputs)]), ", ".join(made[len(inputs) :])
     note = (
-        f"{name} names no places: its inputs are called {said[0]}, its outputs {said[1]}; a table "
-        f"{name.rpartition('.')[0]}.channels.csv names them"
+        f"{name} names no places: its inputs are called {said[0]}, its outputs {said[1]}; name "
+        f"them in a table {name.rpartition('.')[0]}.channels.csv"
     )
     return made, [note]
 
@@ -138,7 +138,7 @@ def from_arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[TimeRecord, l
     else:
         channels, notes = _of_named(name, rest)
     if rest:
-        raise FileError(f"{name}: nothing is done with {', '.join(rest)} beside the others")
+        raise FileError(f"{name}: {', '.join(rest)} is not used with the others")
     record, more = assembled(name, rate, channels)
     return record, notes + more
 
@@ -176,7 +176,7 @@ def _rate(name: str, rest: dict[str, np.ndarray]) -> float:
         value = np.asarray(rest.pop(word), float).ravel()
         if word in (*_RATES, "dt", "ts"):
             if value.size != 1 or not (np.isfinite(value[0]) and value[0] > 0):
-                raise FileError(f"{name}: {word} is one number above zero")
+                raise FileError(f"{name}: {word} must be one number above zero")
             return float(value[0] if word in _RATES else 1 / value[0])
         return rate_of(name, value)
     raise FileError(f"{name}: no sampling rate; give rate (per second), dt or t")
@@ -191,7 +191,7 @@ def rate_of(name: str, t: np.ndarray) -> float:
         If it is not even to a thousandth of a step.
     """
     if len(t) < 2 or not np.isfinite(t).all():
-        raise FileError(f"{name}: its axis of time holds {len(t)} samples")
+        raise FileError(f"{name}: its time axis has {len(t)} samples")
     step = (t[-1] - t[0]) / (len(t) - 1)
     if step <= 0 or np.abs(t - t[0] - step * np.arange(len(t))).max() > max(
         0.01 * step, 1e-5 * abs(t[-1])
@@ -229,8 +229,8 @@ def _of_named(name: str, rest: dict[str, np.ndarray]) -> tuple[list[TimeChannel]
     motions = [w for w in found if BY_NAME[w] != "N"]
     if len(forces) > 1 or len(motions) != 1:
         raise FileError(
-            f"{name}: time data holds one array force and one of acceleration, velocity or "
-            f"displacement, or such a motion alone; there are {', '.join(found) or 'none'}"
+            f"{name}: time data need one array force and one of acceleration, velocity or "
+            f"displacement, or one such motion alone; there are {', '.join(found) or 'none'}"
         )
     Y = found[motions[0]]
     labels = [_texts(rest, "inputs"), _texts(rest, "outputs")]
@@ -265,9 +265,9 @@ def _cube(name: str, word: str, x: np.ndarray) -> np.ndarray:
     """(blocks, channels, samples); the longest axis is time."""
     x = np.asarray(x)
     if x.dtype.kind not in "biuf":
-        raise FileError(f"{name}: {word} holds {x.dtype}, not numbers")
+        raise FileError(f"{name}: {word} has {x.dtype}, not numbers")
     x = x.astype(float)
     if x.ndim == 0 or x.ndim > 3 or x.size == 0:
-        raise FileError(f"{name}: {word} is {x.shape}; it is (blocks, channels, samples)")
+        raise FileError(f"{name}: {word} is {x.shape}; it must be (blocks, channels, samples)")
     x = np.moveaxis(x, int(np.argmax(x.shape)), -1)
     return x.reshape((1,) * (3 - x.ndim) + x.shape)

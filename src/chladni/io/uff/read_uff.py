@@ -77,7 +77,7 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
     _name_unused(uff, frf is None and time is None)
     if frf is not None and averages:
         frf = with_variance(frf, averages)
-        uff.notes.append(f"{path.name}: its noise is that of {averages:g} averages, as it says")
+        uff.notes.append(f"{path.name}: its noise is that of the stated {averages:g} averages")
     return Recording(
         name=path.name,
         frf=frf,
@@ -187,7 +187,7 @@ def _take_function(uff: UffAccumulator, record: FunctionSet, quantity: str | Non
     elif kind in (6, 26):
         pair = output, input if kind == 6 else ""
         if pair in uff.coherence:
-            raise FileError(f"{where}: the coherence of {output} / {input} is there twice")
+            raise FileError(f"{where}: the coherence of {output} / {input} occurs twice")
         uff.coherence[pair] = np.real(record.y)
     else:
         called = _KINDS.get(kind, f"function type {kind}")
@@ -218,7 +218,7 @@ def _name_unused(uff: UffAccumulator, alone: bool) -> None:
     ]
     if left:
         uff.notes.append(
-            f"{uff.path.name}: {len(left)} records that are no FRFs are not used: {named(left)}"
+            f"{uff.path.name}: {len(left)} records are not FRFs and are not used: {named(left)}"
         )
 
 
@@ -226,12 +226,12 @@ def _complete(record: FunctionSet, where: str) -> FunctionSet:
     """The record with as many values as are due; every number there, every number finite."""
     x, y, due = record.x, record.y, record.due
     if due < 0:
-        raise FileError(f"{where}: it says it holds {due} values")
+        raise FileError(f"{where}: it states {due} values")
     if len(y) < due or len(x) < due:
-        raise FileError(f"{where}: {len(y)} of {due} values are there; the file is truncated")
+        raise FileError(f"{where}: {len(y)} of {due} values are present; the file is truncated")
     if np.any(y[due:] != 0):  # some writers fill up their last line
         raise FileError(
-            f"{where}: {len(y)} values are there, it says it holds {due}; a line is doubled, or "
+            f"{where}: {len(y)} values are present, but it states {due}; a line is doubled, or "
             "the number is wrong"
         )
     x, y = x[:due], y[:due]
@@ -245,11 +245,11 @@ def _complete(record: FunctionSet, where: str) -> FunctionSet:
 def _take_frf(uff: UffAccumulator, record: FunctionSet, dofs: Pair, quantity: str | None) -> None:
     where = uff.where(record)
     if not np.iscomplexobj(record.y):
-        raise FileError(f"{where}: a frequency response without phase (real values) is of no use")
+        raise FileError(f"{where}: a frequency response needs phase, but these values are real")
     if dofs in uff.frf:
         raise FileError(
-            f"{where}: repeats {dofs[0]} / {dofs[1]} of dataset {uff.frf[dofs].number}; "
-            "put each run into a file of its own"
+            f"{where}: repeats {dofs[0]} / {dofs[1]} of dataset {uff.frf[dofs].number}; put each "
+            "run into its own file"
         )
     check_calibrated(record, where)
     try:
@@ -260,11 +260,11 @@ def _take_frf(uff: UffAccumulator, record: FunctionSet, dofs: Pair, quantity: st
         said = Meaning(quantity, uff.units.length / uff.units.force)
         why = str(error).partition(";")[0]
         if not any(why.partition(": ")[2] in note for note in uff.notes):
-            uff.notes.append(f"{why}: read as {quantity} in the units of the file, as asked")
+            uff.notes.append(f"{why}: read as {quantity} in the units of the file, as requested")
     if quantity is None and said.quantity is None:
         raise FileError(
-            f"{where}: neither data type nor unit label says what was measured; "
-            "state quantity = receptance, mobility, accelerance or transmissibility"
+            f"{where}: neither data type nor unit label states the measured quantity; state "
+            "quantity = receptance, mobility, accelerance or transmissibility"
         )
     f = hertz(record, where)
     uff.title = uff.title or record.title
@@ -280,7 +280,7 @@ def _take_nodes(uff: UffAccumulator, one: NodeSet) -> None:
         other = uff.nodes.get(int(node), place)
         if np.abs(other - place).max() > apart:
             raise FileError(
-                f"{uff.where(one)}: node {node} is there twice, at {_at(other)} and {_at(place)} m"
+                f"{uff.where(one)}: node {node} occurs twice, at {_at(other)} and {_at(place)} m"
             )
         uff.nodes[int(node)] = place
         uff.turned[int(node)] = int(system)

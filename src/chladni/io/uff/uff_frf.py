@@ -72,8 +72,8 @@ def _rectangle(uff: UffAccumulator, pairs: list[Pair]) -> tuple[tuple[str, ...],
     outputs = tuple(i for i in everyone if all((i, j) in pairs for j in inputs))
     if not outputs:
         raise FileError(
-            f"{uff.path.name}: no output was measured for all of the inputs {named(inputs)}; "
-            "put each reference into a file of its own"
+            f"{uff.path.name}: no output was measured for all of the inputs {named(inputs)}; put "
+            "each reference into its own file"
         )
     if left := [i for i in everyone if i not in outputs]:
         uff.notes.append(
@@ -101,12 +101,14 @@ def _quantity(uff: UffAccumulator, kept: Mapping[Pair, Channel], quantity: str |
     """What all channels are."""
     if quantity is not None:
         if any(channel.quantity not in (None, quantity) for channel in kept.values()):
-            uff.notes.append(f"read as {quantity} as asked, whatever the file says")
+            uff.notes.append(
+                f"read as {quantity} as requested; the quantity in the file is ignored"
+            )
         return quantity
     said = {channel.quantity: channel.number for channel in kept.values()}
     if len(said) > 1:
         mixed = " and ".join(f"{q} (dataset {n})" for q, n in said.items())
-        raise FileError(f"{uff.path.name}: holds {mixed}; one quantity a file")
+        raise FileError(f"{uff.path.name}: has {mixed}; a file must have one quantity")
     return str(next(iter(said)))
 
 
@@ -126,7 +128,7 @@ def _coherence(
             i_said, j_said = spelt[output, input]
             found = uff.coherence.get((i_said, j_said), uff.coherence.get((i_said, "")))
             if found is None or len(found) != n_lines:
-                uff.notes.append(f"no coherence for {output} / {input}: none is used")
+                uff.notes.append(f"no coherence for {output} / {input}, so no coherence is used")
                 return None
             gamma[:, i, j] = found
     return gamma

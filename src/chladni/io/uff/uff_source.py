@@ -35,13 +35,15 @@ def readable(path: Path) -> Iterator[Path]:
     """
     if not path.is_file():
         near = sorted(p.name for p in path.parent.glob("*.u*") if p.is_file())[:6]
-        raise FileError(f"no file {path}; beside it there are {named(near)}")
+        raise FileError(f"no file {path}; the folder has {named(near)}")
     refuse_large(path)
     data = path.read_bytes()
     tidy = data if _BINARY.search(data) else _tidied(data)
     marks = len(_MARK.findall(tidy))
     if marks == 0:
-        raise FileError(f"{path.name} is no universal file: no line '    -1' in {len(data)} bytes")
+        raise FileError(
+            f"{path.name} is not a universal file: no line '    -1' in {len(data)} bytes"
+        )
     if marks % 2:
         raise FileError(f"{path.name} is truncated: dataset {marks // 2 + 1} has no closing '-1'")
     for number, part in enumerate(_MARK.split(tidy)[1::2], start=1):
@@ -87,13 +89,13 @@ def _refuse_other_binary(where: str, part: bytes) -> None:
             "is read: export the file in it, or as text (dataset 58)"
         )
     if head not in (0, _HEAD_LINES):
-        raise FileError(f"{where}: it says its head has {head} lines; a head has {_HEAD_LINES}")
+        raise FileError(f"{where}: it states {head} lines of its head; a head has {_HEAD_LINES}")
     held = b"".join(lines[1 + _HEAD_LINES :])  # one piece, or none
     extra = len(held) - count
     if count and not (0 <= extra <= 2 and not held[count:].strip(b"\r\n")):
         raise FileError(
-            f"{where}: it says it holds {count} bytes of numbers, {len(held)} are there; the file "
-            "is damaged, or was moved as text"
+            f"{where}: it states {count} bytes of numbers, but has {len(held)}; the file is "
+            "damaged, or was transferred as text"
         )
 
 

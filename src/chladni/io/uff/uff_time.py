@@ -40,7 +40,7 @@ def _record(uff: UffAccumulator, channels: list[list[TimeSignal]]) -> tuple[Time
     for signals in channels:
         sizes = {(len(s.function.values), len(channels[0])) for s in signals}
         if sizes != {(len(channels[0][0].function.values), len(signals))}:
-            raise FileError(f"{name}: {signals[0].label} was not recorded as long and as often as "
+            raise FileError(f"{name}: {signals[0].label} has not the length and rate of "
                             f"{channels[0][0].label}")  # fmt: skip
         rates += [rate_of(name, s.function.x) for s in signals]
         first = signals[0]

@@ -143,8 +143,8 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
         if _bare(unit) and not motion and _bare(unit) not in _FORCE:
             raise FileError(
                 f"{where}: the unit {unit!r} is not known; known are m, mm, in, g, N, lbf and "
-                "their like; if the numbers are in the units of the file's head (dataset 164; SI "
-                "where it has none), state the quantity in the case"
+                "similar units; if the numbers are in the units of the file's head (dataset 164; "
+                "SI where it has none), state the quantity in the case"
             )
     if said and typed and said not in (typed, "transmissibility"):
         raise FileError(
@@ -189,7 +189,7 @@ def check_calibrated(record: FunctionSet, where: str) -> None:
     for axis in (record.ordinate, record.denominator):
         if any(_ELECTRICAL.fullmatch(part) for part in _bare(axis.unit).split("/")):
             raise FileError(
-                f"{where}: its values are in {axis.unit!r} and the file holds no calibration; "
+                f"{where}: its values are in {axis.unit!r} and the file has no calibration; "
                 "export them in units of motion and force (m, mm/s, m/s^2 or g over N or lbf), or "
                 'give them as .npz with their quantity and state gain = "unknown" in the case'
             )

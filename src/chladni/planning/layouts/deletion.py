@@ -93,7 +93,7 @@ def start(c: Candidates, n_sensors: int, rules: Rules | None) -> tuple[np.ndarra
     """
     if not max(c.fewest, 1) <= n_sensors <= len(c):
         raise ShapeError(
-            f"{n_sensors} sensors cannot tell {c.unknowns} modes apart among {len(c)} candidates"
+            f"{n_sensors} sensors cannot distinguish {c.unknowns} modes among {len(c)} candidates"
         )
     checked = (rules or Rules()).checked(len(c), n_sensors)
     if checked.near is None:
@@ -152,7 +152,7 @@ def _delete(
         E = combined(course.E)
         may = course.live if free else rules.deletable(kept, n_sensors)[course.at]
         if not may.any():
-            raise ShapeError(f"the rules leave {left} sensors; {n_sensors} were asked for")
+            raise ShapeError(f"the rules leave {left} sensors, but {n_sensors} were requested")
         i = first_min(np.where(may, E, np.inf))
         order.append(course.at[i])
         kept[order[-1]] = False
@@ -237,7 +237,7 @@ def greedy(
     if found is None:  # ran into a corner: choose among places that all fit together
         found = _add(c, kept, n_sensors, checked, criterion)
     if found is None:
-        raise ShapeError(f"{n_sensors} sensors were asked for; the rules have no room for them")
+        raise ShapeError(f"{n_sensors} sensors were requested, but the rules have no room for them")
     return found
 
 

@@ -134,7 +134,7 @@ def _stacked(phi: np.ndarray) -> np.ndarray:
     if phi.ndim != 4 or 0 in phi.shape:
         raise ShapeError(f"shapes are {phi.shape}; give (candidates, modes), with draws in front")
     if not np.isfinite(phi).all():
-        raise ShapeError("the shapes hold values that are not finite")
+        raise ShapeError("the shapes contain values that are not finite")
     return phi
 
 
@@ -279,9 +279,9 @@ def _regular(F: np.ndarray) -> np.ndarray:
     eigenvalues = np.linalg.eigvalsh(F)
     if np.any(eigenvalues[..., 0] <= 1e-14 * eigenvalues[..., -1]):
         raise ShapeError(
-            f"the candidates cannot tell the {F.shape[-1]} modes apart: the information matrix is "
-            "singular (two modes look alike at them, or one is not seen at all); ask for fewer "
-            "modes, or give more places"
+            f"the candidates cannot distinguish the {F.shape[-1]} modes: the information matrix "
+            "is singular (two modes are equal there, or one is invisible); request fewer modes, "
+            "or give more places"
         )
     return F
 

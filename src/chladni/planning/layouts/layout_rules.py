@@ -64,7 +64,7 @@ class Rules:
             raise LabelError(f"candidates {named(np.flatnonzero(both), 3)} are fixed, forbidden")
         if not fixed.sum() <= n_sensors <= n - forbidden.sum():
             raise ShapeError(
-                f"{n_sensors} sensors were asked for; {fixed.sum()} are fixed and "
+                f"{n_sensors} sensors were requested; {fixed.sum()} are fixed and "
                 f"{n - forbidden.sum()} of the {n} candidates are allowed"
             )
         self._check_near(n, fixed)
@@ -102,8 +102,8 @@ class Rules:
             room += high
         if sum(self.least.values()) > n_sensors or room < n_sensors:
             raise ShapeError(
-                f"the regions ask for {sum(self.least.values())} sensors and have room for {room}; "
-                f"{n_sensors} were asked for"
+                f"the regions require {sum(self.least.values())} sensors and have room for "
+                f"{room}; {n_sensors} were requested"
             )
 
     @property
@@ -132,7 +132,7 @@ class Rules:
         kept = np.zeros(len(self.fixed), bool)
         kept[layout] = True
         if kept.sum() != len(layout):
-            raise ShapeError("the layout holds a candidate twice")
+            raise ShapeError("the layout contains a candidate twice")
         if np.any(wrong := (self.fixed & ~kept) | (self.forbidden & kept)):
             raise ShapeError(
                 f"the layout disagrees with the fixed and forbidden candidates at "
@@ -214,8 +214,8 @@ def thinned(rules: Rules, worth: np.ndarray, n_sensors: int) -> np.ndarray:
         if kept.sum() >= n_sensors and _regions_fit(rules, kept, n_sensors):
             return kept
     raise ShapeError(
-        f"{n_sensors} sensors do not fit at the least distance asked for: there is room for about "
-        f"{kept.sum()} under these rules"
+        f"{n_sensors} sensors do not fit at the requested minimum distance: there is room for "
+        f"about {kept.sum()} under these rules"
     )
 
 

@@ -81,7 +81,7 @@ def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
         x, y, z = arm
         T = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
         if not np.allclose(M, m * T.T @ T, rtol=1e-9, atol=1e-9 * m):
-            raise ModelError("a mass with inertia of its own was added; CONM2 here has none")
+            raise ModelError("a mass with inertia was added; CONM2 here has none")
         card = ["CONM2", first + k, int(after.ids[after.masses.node[k]]), 0, m / units.inertia]
         yield [*card, *(a / units.length for a in arm)] if np.abs(arm).max() > 1e-9 else card
 

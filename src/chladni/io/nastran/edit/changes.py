@@ -136,7 +136,7 @@ def _row(deck: Deck, kind: str, id: int, known: dict[int, int]) -> int:
         there = ", ".join(map(str, list(known)[:8])) or "none at all"
         raise LabelError(f"{deck.path} has no {kind} {id}; there are {there}")
     if row < 0:
-        raise LabelError(f"{deck.path} has several {kind} {id}; which one is meant is not clear")
+        raise LabelError(f"{deck.path} has several {kind} {id}, so the reference is ambiguous")
     return row
 
 

@@ -139,7 +139,7 @@ def _masses(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:
         if abs(f - 1) <= _SAME:
             continue
         if id not in known:
-            raise ModelError(f"{deck.path}: mass {id} is no CONM2 and cannot be changed")
+            raise ModelError(f"{deck.path}: mass {id} is not a CONM2 and cannot be changed")
         for field in (4, *range(9, 15)):
             value = float(known[id].reals(field, 0.0)[0])
             if value:
@@ -149,7 +149,5 @@ def _masses(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:
 def _common(name: str, factors: list[float]) -> float:
     """The one factor of all elements of a property."""
     if np.ptp(factors) > 1e-6:
-        raise ModelError(
-            f"elements of {name} changed differently; give them properties of their own"
-        )
+        raise ModelError(f"elements of {name} changed differently; give them separate properties")
     return factors[0]

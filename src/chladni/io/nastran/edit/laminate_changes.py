@@ -114,8 +114,8 @@ def _factors(deck: Deck, before: Assembly, after: Assembly, k: int) -> Factors:
 
 def _refusal(deck: Deck, part: Part) -> ModelError:
     return ModelError(
-        f"{deck.path}: laminate {part.name} ({part.id}) changed in a way its layers cannot take "
-        "on together; they hold a factor on all moduli, on all densities, on all thicknesses"
+        f"{deck.path}: laminate {part.name} ({part.id}) changed in a way that its layers cannot "
+        "represent; they accept one factor each on all moduli, all densities and all thicknesses"
     )
 
 

@@ -53,7 +53,7 @@ def changes(
     out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
     if cards := added_cards(before, after, units, free):
-        out.append(Add(cards, "put in by the diagnosis"))
+        out.append(Add(cards, "added by the diagnosis"))
     return [*out, *support_changes(deck, before, after)]
 
 
@@ -76,7 +76,9 @@ def _materials(
     users: dict[int, dict[Material, list[tuple[int, str]]]] = {}
     for k, name, material in _uses(deck, after):
         if (old := known.get((k, name))) is None:
-            raise ModelError(f"part {after.parts[k].name} has a {name} material the deck has not")
+            raise ModelError(
+                f"part {after.parts[k].name} has a {name} material that the deck lacks"
+            )
         kinds = users.setdefault(old.id, {})
         now = next((m for m in (old, *kinds) if _equal(m, material)), material)
         kinds.setdefault(now, []).append((k, name))
@@ -104,7 +106,7 @@ def _of_material(deck: Deck, part: Part, name: str, material: int, split: Split)
         return SetField(kind, part.id, "MID", material)
     raise ModelError(
         f"part {part.name} shares a material with others and none of {', '.join(PROPERTIES[1:])} "
-        "names it, so it cannot have one of its own"
+        "names it, so it cannot have its own"
     )
 
 

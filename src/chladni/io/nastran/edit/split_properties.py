@@ -146,7 +146,7 @@ def _card(deck: Deck, source: int, fields: dict[int, Value]) -> list[Value]:
     kind = property_kind(deck, source)
     if not kind:
         raise ModelError(f"{deck.path}: property {source} is none of {', '.join(PROPERTIES)}, so "
-                         "elements of it cannot have a copy of their own")  # fmt: skip
+                         "its elements cannot have their own copy")  # fmt: skip
     return copied(deck[kind], source, fields)
 
 

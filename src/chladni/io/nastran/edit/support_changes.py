@@ -47,7 +47,7 @@ def _permanent(deck: Deck, gone: set[tuple[int, int]]) -> Iterator[Change]:
         if left == (own or usual):
             continue
         if not own:
-            raise ModelError(f"GRDSET of {deck.path} holds grid {id}; give it an SPC1 of its own")
+            raise ModelError(f"GRDSET of {deck.path} holds grid {id}; give it its own SPC1")
         yield SetField("GRID", id, "PS", left or (0 if usual else None))
 
 
@@ -77,7 +77,7 @@ def _of_set(
         again[str(component)] = [int(after.ids[row])]
     if again:
         lines: list[list[Value]] = [["SPC1", sid, int(c), *ids] for c, ids in again.items()]
-        yield Add(lines, "what is held as it was")
+        yield Add(lines, "unchanged supports")
 
 
 def _held(cards: Cards, i: int, ids: np.ndarray) -> Iterator[tuple[int, str]]:
@@ -90,5 +90,7 @@ def _held(cards: Cards, i: int, ids: np.ndarray) -> Iterator[tuple[int, str]]:
     for k in (2, 5):
         if card.words(k)[0]:
             if float(card.reals(k + 2, 0.0)[0]):
-                raise ModelError(f"SPC {card.integers(1)[0]} prescribes a motion; it is left alone")
+                raise ModelError(
+                    f"SPC {card.integers(1)[0]} prescribes a motion and stays unchanged"
+                )
             yield int(card.integers(k)[0]), card.words(k + 1)[0].decode("latin-1")

@@ -25,7 +25,9 @@ def tie_changes(deck: Deck, before: Assembly, after: Assembly) -> Iterator[Chang
             continue
         kinds = [kind for kind in _KINDS for c in deck.present(kind) if now.id in c.integers(1)]
         if len(kinds) != 1:
-            raise ModelError(f"{deck.path}: rigid element {now.id} is no RBE2 and cannot be split")
+            raise ModelError(
+                f"{deck.path}: rigid element {now.id} is not an RBE2 and cannot be split"
+            )
         yield Replace(kinds[0], now.id, rbe2(after, now))
 
 

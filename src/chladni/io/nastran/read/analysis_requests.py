@@ -83,6 +83,6 @@ def _unheeded(deck: Deck) -> Iterator[str]:
     given = {w.decode("latin-1") for w in deck["PARAM"].words(1).tolist()}
     left = sorted((given | set(deck.case.parameters)) - _HEEDED - _OUTPUT)
     if left:
-        yield f"{deck.path}: PARAM {', '.join(left)}: not acted upon"
+        yield f"{deck.path}: PARAM {', '.join(left)}: ignored"
     if parameter(deck, "K6ROT") and any(deck.present("CQUADR", "CTRIAR")):
-        yield f"{deck.path}: PARAM K6ROT: not acted upon, as there are CQUADR or CTRIAR"
+        yield f"{deck.path}: PARAM K6ROT: ignored, because there are CQUADR or CTRIAR"

@@ -92,7 +92,7 @@ def _box1(b: float, h: float, top: float, bottom: float, left: float, right: flo
     """Bredt: J = 4 A_m² / ∮ ds/t."""
     bm, hm = b - (left + right) / 2, h - (top + bottom) / 2
     if not min(top, bottom, left, right) > 0:
-        raise ModelError("a box without one of its walls is no closed section; give it as CHAN")
+        raise ModelError("a box without one of its walls is not a closed section; give it as CHAN")
     J = 4 * (bm * hm) ** 2 / (bm / top + bm / bottom + hm / left + hm / right)
     inner = h - top - bottom
     if not min(inner, b - left - right) > 0:

@@ -75,8 +75,8 @@ def refuse_loose(model: Assembly, source: str) -> None:
         if number not in held:
             points = np.flatnonzero(label == number)
             raise ModelError(
-                f"{source}: {_names(model, points)} hangs on nothing: {len(points)} points, "
-                f"grid {model.ids[points[0]]} among them, are joined to neither "
+                f"{source}: {_names(model, points)} is not connected: {len(points)} points, "
+                f"including grid {model.ids[points[0]]}, are joined to neither "
                 f"{_names(model, np.flatnonzero(label == stiff[0]))} nor a support"
             )
 
@@ -92,8 +92,8 @@ def _refuse_loose_masses(model: Assembly, label: np.ndarray, source: str) -> Non
     for k in lone:
         if label[rows[k]] not in held:
             raise ModelError(
-                f"{source}: mass {model.masses.ids[k]} is on grid {model.ids[rows[k]]}, which "
-                "nothing joins to the rest; take it out or tie it"
+                f"{source}: mass {model.masses.ids[k]} is on grid {model.ids[rows[k]]}, which is "
+                "not connected to the rest; remove or tie it"
             )
 
 

@@ -102,10 +102,11 @@ def unlike_moduli(deck: Deck) -> Iterator[str]:
         unlike = np.flatnonzero(np.abs(G - due) > 0.01 * np.abs(G))
         if len(unlike):
             i, more = int(unlike[0]), len(unlike) - 1
-            others = f" (and {more} others so)" if more else ""
+            others = f" (and {more} others)" if more else ""
             yield (
-                f"{cards.where(i)}: MAT1 {cards.integers(1)[i]}: G {G[i]:g} is {G[i] / due[i]:.3g} "
-                f"times E/2(1+NU) = {due[i]:g}; E, G and NU are taken as they stand{others}"
+                f"{cards.where(i)}: MAT1 {cards.integers(1)[i]}: G {G[i]:g} is "
+                f"{G[i] / due[i]:.3g} times E/2(1+NU) = {due[i]:g}; E, G and NU are used "
+                f"unchanged{others}"
             )
 
 

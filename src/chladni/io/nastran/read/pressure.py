@@ -112,7 +112,7 @@ def _known(
     cards: Cards, i: int, id: int, elements: dict[int, tuple[str, np.ndarray]]
 ) -> tuple[str, np.ndarray]:
     if id not in elements:
-        raise cards.refuse(i, f"element {id} is no shell or solid of the deck")
+        raise cards.refuse(i, f"element {id} is not a shell or solid of the deck")
     return elements[id]
 
 

@@ -23,7 +23,7 @@ def read_op2_modes(path: Path | str) -> PunchModes:
     tables = (_read(path, "op2").get("mats") or {}).get("ougv1") or []
     modal = [t for t in tables if t is not None and "lambda" in t]
     if not modal:
-        raise FileError(f"{path} holds no eigenvectors (OUGV1)")
+        raise FileError(f"{path} has no eigenvectors (OUGV1)")
     dofs, phi = np.asarray(modal[0]["dof"], np.int64), np.asarray(modal[0]["ougv1"])
     ids, row = np.unique(dofs[:, 0], return_inverse=True)
     shapes = np.full((len(ids), 6, phi.shape[1]), np.nan)
@@ -69,4 +69,6 @@ def _read(path: Path | str, kind: str) -> dict[str, Any]:
             return dict(module.read(str(path), sparse=False))
         except (ValueError, KeyError, IndexError, RuntimeError, OSError, TypeError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise FileError(f"{path} is no {kind.upper()} file pyYeti can read: {first}") from error
+            raise FileError(
+                f"{path} cannot be read by pyYeti as {kind.upper()}: {first}"
+            ) from error

@@ -74,9 +74,7 @@ def read_punch_modes(path: Path | str) -> PunchModes:
             subcases.setdefault(block.subcase, []).extend(block.records)
     found = [r for records in subcases.values() for r in records]
     if not found:
-        raise FileError(
-            f"{path} holds no eigenvectors; ask for DISPLACEMENT(PUNCH) = ALL in SOL 103"
-        )
+        raise FileError(f"{path} has no eigenvectors; request DISPLACEMENT(PUNCH) = ALL in SOL 103")
     for subcase, records in subcases.items():
         _refuse_gaps(records, f"{path}: subcase {subcase}")
     values, ids, eigenvalue = _table(found)
@@ -97,7 +95,7 @@ def read_punch_responses(path: Path | str) -> tuple[PunchResponse, ...]:
         if block.complex and block.kind in ("displacement", "velocity", "acceleration"):
             groups.setdefault((block.kind, block.subcase), []).extend(block.records)
     if not groups:
-        raise FileError(f"{path} holds no frequency responses; ask for (PUNCH) in SOL 108 or 111")
+        raise FileError(f"{path} has no frequency responses; request (PUNCH) in SOL 108 or 111")
     out = []
     for (kind, subcase), records in groups.items():
         _refuse_gaps(records, f"{path}: {kind} of subcase {subcase}")
@@ -125,13 +123,13 @@ def _refuse_gaps(records: list[Record], where: str) -> None:
     points, abscissae = dict.fromkeys(r[0] for r in records), dict.fromkeys(r[1] for r in records)
     for point, x, _ in records:
         if (point, x) in seen:
-            raise FileError(f"{where}: point {point} is there twice {_at(x)}")
+            raise FileError(f"{where}: point {point} occurs twice {_at(x)}")
         seen.add((point, x))
     if len(seen) < (due := len(points) * len(abscissae)):
         point, x = next((p, x) for x in abscissae for p in points if (p, x) not in seen)
         raise FileError(
-            f"{where}: there is no point {point} {_at(x)}, where others have it "
-            f"({len(seen)} of {due} records); the file is cut off or damaged"
+            f"{where}: point {point} is missing {_at(x)}, where others have a value ({len(seen)} "
+            f"of {due} records); the file is cut off or damaged"
         )
 
 
@@ -187,7 +185,7 @@ def _value(line: str, path: Path, number: int) -> float:
     """The number behind the equals sign."""
     value = parse_real(line.partition("=")[2])
     if np.isnan(value):
-        raise FileError(f"{path}:{number}: {line.strip()!r} gives no number")
+        raise FileError(f"{path}:{number}: {line.strip()!r} is not a number")
     return value
 
 
@@ -203,12 +201,14 @@ def _filled(block: _PunchBlock, rows: list[tuple[int, str]], path: Path) -> _Pun
         head = first[:18].split()
         key = parse_real(head[0]) if head else float("nan")
         if np.isnan(key) or any(np.isnan(v) for v in values) or not values:
-            raise FileError(f"{path}:{number}: {first.strip()[:40]!r} is no record of a punch file")
+            raise FileError(
+                f"{path}:{number}: {first.strip()[:40]!r} is not a record of a punch file"
+            )
         due = 12 if block.complex else 6
         if head[1:2] == ["G"] and len(values) != due:
             raise FileError(
-                f"{path}:{number}: the record of grid {head[0]} holds {len(values)} values, {due} "
-                "are due; a line is lost or cut off"
+                f"{path}:{number}: the record of grid {head[0]} has {len(values)} values, but "
+                f"{due} are required; a line is lost or cut off"
             )
         point, x = (int(key), block.abscissa) if block.point is None else (block.point, key)
         block.records.append((point, (x, block.mode), _complex(block, np.array(values))))

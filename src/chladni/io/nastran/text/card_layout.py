@@ -187,8 +187,8 @@ def _checked(word: bytes, path: Path, number: int) -> str:
         raise FileError(f"{path}:{number + 1}: superelement sections are not supported")
     if " " in name:
         raise FileError(
-            f"{path}:{number + 1}: {name!r} is no card name; "
-            "fields stand in columns of 8 or 16, or are separated by commas"
+            f"{path}:{number + 1}: {name!r} is not a card name; fields have columns of 8 or 16, "
+            "or are separated by commas"
         )
     return name
 
@@ -241,7 +241,7 @@ def _free_fields(name: str, lines: _Lines, i: int) -> list[bytes]:
     if len(beyond) > 1 or (beyond and beyond[0][:1] not in (b"+", b"*")):
         word = beyond[0].decode("latin-1")
         raise FileError(
-            f"line {lines.number[i] + 1}: {name}: {word!r} stands beyond field {count + 1} "
-            "of a free-field line; continue on a line that begins with a comma"
+            f"line {lines.number[i] + 1}: {name}: {word!r} is beyond field {count + 1} of a "
+            "free-field line; continue on a line that begins with a comma"
         )
     return tokens[1 : count + 1]

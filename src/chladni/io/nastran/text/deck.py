@@ -60,7 +60,7 @@ def read_deck(path: Path | str, allow: Sequence[str] = ()) -> Deck:
     files = sources(path)
     cards = _cards(files)
     if not cards:
-        raise FileError(f"{path} holds no bulk data")
+        raise FileError(f"{path} has no bulk data")
     deck = Deck(path, files, cards, _case(files), _names(files), tuple(a.upper() for a in allow))
     _refuse_unknown(deck)
     _refuse_commands(deck)
@@ -138,7 +138,7 @@ def _refuse_commands(deck: Deck) -> None:
     if not deck.case.present:
         for cards in deck.present("TEMP", "TEMPD"):
             where = cards.where(0)
-            _refuse_followers(deck, f"{where}: no case control says whether {cards.name} sets")
+            _refuse_followers(deck, f"{where}: the case control does not select {cards.name} sets")
     for k, name, text in commands(text.split("$")[0] for _, text in control):
         where = control[k][0]
         if name in SELECTS:
@@ -148,7 +148,7 @@ def _refuse_commands(deck: Deck) -> None:
             _refuse_followers(deck, f"{where}: {text.strip()!r} chooses")
         elif not harmless(name) and name not in deck.allowed:
             near = nearest(name, sorted(SELECTS), 0.6)
-            meant = f"; is {near} meant?" if near else ""
+            meant = f"; did you mean {near}?" if near else ""
             raise FileError(
                 f"{where}: the command {name} of the case control is not understood "
                 f"and may change the structure{meant}{_allowing(name)}"

@@ -72,9 +72,9 @@ def refusal(name: str, count: int) -> str:
     """
     if name in FIELDS or name in HARMLESS or name in LEGACY or name in FOLLOWS_TEMPERATURE:
         return ""
-    what = f"{name} (of which there are {count})"
+    what = f"{name} ({count} cards)"
     near = nearest(name, FIELDS, 0.75)
-    meant = f"; is {near} meant?" if near and name not in CARRIERS else ""
+    meant = f"; did you mean {near}?" if near and name not in CARRIERS else ""
     if name in CARRIERS or (name[:1] == "C" and name.isalnum() and len(name) > 2):
         return f"{what} carries stiffness, mass or a tie and is not understood{meant}"
     return f"{what} is not understood and may change the structure{meant}"

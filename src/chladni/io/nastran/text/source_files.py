@@ -67,7 +67,7 @@ def _load(path: Path, above: tuple[Path, ...], found: list[Source | None], asked
     except (OSError, RuntimeError):  # links that lead round in a circle
         raise FileError(f"{asked}{path} cannot be read: too many links") from None
     if here in above:
-        raise FileError(f"{asked}{path} includes itself, by way of {above[-1].name}")
+        raise FileError(f"{asked}{path} includes itself through {above[-1].name}")
     if len(found) > 5000:
         raise FileError(f"{asked}more than 5000 included files")
     if len(above) > _DEEPEST:
