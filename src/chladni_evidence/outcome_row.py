@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from chladni.decision.reasons import Reason
+from chladni.updating.decision_in_words import REFUSED
+
 from .blind_diagnosis import Answer
 from .pair_kinds import AND, catalogued, members
 
@@ -34,10 +37,8 @@ KIN = (  # effects that change the same operator: the right family, if not the r
 NEAR_PLACE = {"tailgate": 0.150}  # largest distance of a right place [m]; else ``CLOSE``
 CLOSE = 0.060
 DRAWN_IN = 1.645 / 1.960  # intervals are written for 95 %, and scored for 90 %
-VETO = re.compile(
-    r"(\S+) gained .* in -2 ln evidence, but the (?:data|deck with it is worse on the data) "
-    r"that no fit saw"
-)
+_VETOES = "|".join(re.escape(REFUSED[why]) for why in (Reason.AGAINST, Reason.WORSE))
+VETO = re.compile(rf"(\S+) gained .* in -2 ln evidence, but (?:{_VETOES})")
 
 
 def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:

@@ -69,8 +69,8 @@ _TESTED = [
     "package with a stiff hem; its first fourteen modes have the mean damping of table 6, by "
     "rank. The rest follows the thesis. Three articles scatter as in tables 4 to 6. Two cords "
     "hold the upper bolt holes and resonate near 23 and 24.5 Hz. A shaker with its stinger "
-    "drives the planner's best place (the thesis' best and second best rattled). 30 "
-    "accelerometers of 5 g are at the planner's places and one is next to the shaker. Schedules, "
+    "drives the planner's best place (the thesis' best and second best rattled). There are 30 "
+    "accelerometers of 5 g at the planner's places and one next to the shaker. Schedules, "
     "spreads and readings from figures can therefore agree, but frequencies cannot.",
     "Frequencies and figures are measured: recorded on the bench, identified from 10 to 195 Hz "
     "without 23 to 27.5 Hz, as in section 5.1.",
@@ -109,10 +109,10 @@ def _schedule(found: ThesisFindings) -> list[Block]:
     ]  # fmt: skip
     return [
         Table(heads, rows, ("range [Hz]",), "Delay and measure in cycles, as printed and as run."),
-        Text(["The same: the table is what the bench runs. No lab can measure the last column: "
-              "the remaining transient of the lines before, for the worst channel, as the median "
-              "over the lines of the range. 20 to 50 Hz holds 264.4 lines at 200 an octave, so "
-              "264 are run. The thesis prints no force; ours falls to 0.7, 0.5 and 0.2 of the "
+        Text(["No difference: the bench runs this table. A lab cannot measure the last column: "
+              "the remaining transient of the lines before. It is the median over the lines of "
+              "the range, for the worst channel. 20 to 50 Hz holds 264.4 lines at 200 an octave, "
+              "so 264 are run. The thesis prints no force; ours falls to 0.7, 0.5 and 0.2 of the "
               "level above 50, 100 and 200 Hz."]),
     ]  # fmt: skip
 
@@ -223,10 +223,10 @@ def _circles(found: ThesisFindings) -> list[Block]:
     ]
     return [
         Table(READING, rows, READING, "Section 5.2, tailgate A."),
-        Text(["Mobility, which weights modes of low and high frequency equally. 200 lines an "
-              "octave put 2ζ/0.00347 lines between half-power points: 3.2 at 0.56 % damping, 7.3 "
-              "at 1.26 %, so that the thesis' counts are of the whole bandwidth; its mode 4 of "
-              "0.37 % has two, which the thesis' least of three leaves out."]),
+        Text(["Mobility, which weights modes of low and high frequency equally. With 200 lines "
+              "an octave 2ζ/0.00347 lines are between half-power points: 3.2 at 0.56 % damping, "
+              "7.3 at 1.26 %. The thesis therefore counts the whole bandwidth; its mode 4 of "
+              "0.37 % has two lines, below the thesis' minimum of three."]),
     ]  # fmt: skip
 
 
@@ -300,9 +300,9 @@ def _state_space(test: ThesisTest, found: ThesisFindings) -> list[Block]:
                                       "Hz; identified by chladni, which chooses the order by "
                                       "evidence."),
         Text([f"Our identification finds modes twice too ({doubles} poles in the three articles). "
-              "Here the reason is known: the noise is low, but with table 3 a part of the "
-              "transient of one line remains in the next, and a linear model of the article "
-              "cannot explain it. With a wait of 200 cycles at every line they disappear (tried: "
+              "Here the reason is known. The noise is low, but with table 3 a part of the "
+              "transient of one line remains in the next. A linear model of the article cannot "
+              "explain this part. With a wait of 200 cycles at every line they disappear (tried: "
               f"nine poles of A, then none). Cords resonate along their axis too, at {along} Hz "
               "in A; tapping across does not show this. Below 15 Hz weak channels are "
               "inaccurate: there the article moves on its cords, and the residual term L/s² is "

@@ -64,108 +64,109 @@ SCHEMA = (
     Key("model", "units", "word", "", "needed", "The deck's unit system.", '"mm-t-s"', COMMANDS,
         tuple(UNITS)),
     Key("model", "thickness", "file", "", "the deck's own",
-        "Thickness after forming: LS-DYNA keyword file, VTU or CSV, or a scan of both faces (STL, "
-        "PLY, OBJ). It is mapped onto the shells before anything is asked, and stands in every "
-        "deck that is written.", '"formed.k"', COMMANDS),
+        "Thickness after forming: LS-DYNA keyword file, VTU or CSV, or a scan of both faces "
+        "(STL, PLY, OBJ). It is mapped onto the shells first, and every written deck contains it.",
+        '"formed.k"', COMMANDS),
     Key("model", "thickness_units", "word", "", "the deck's", "The unit system of that file.",
         '"mm-t-s"', COMMANDS, tuple(UNITS)),
     Key("model", "thickness_place", "word", "", "as it lies",
-        "Whether its sheets lie on the deck's, or are brought onto them first, as a mirror image "
-        "if need be.", '"aligned"', COMMANDS, PLACES),
+        "Place of its sheets: on those of the deck, or moved onto them first, if necessary as a "
+        "mirror image.", '"aligned"', COMMANDS, PLACES),
     Key("model", "damping", "number, 0 to 0.5", "of critical", "0.01",
-        "Damping the model is given where its responses are drawn or scored.", "0.01", _FRF),
+        "Damping of the model for drawn or scored responses.", "0.01", _FRF),
     Key("model", "allow", "list of cards", "", "none",
-        "Cards and case control commands that are passed over although they are not understood.",
+        "Unknown cards and case control commands that are ignored.",
         '["CWELD"]', COMMANDS),
     Key("model", "outside", "true or false", "", "false",
-        "Whether files of the case may lie outside of its folder (`../`, or a whole path); of a "
-        "case from somebody else it stays false.", "true", COMMANDS),
+        "Allow files outside the folder of the case (`../`, or a whole path). Keep it false for "
+        "a case from somebody else.", "true", COMMANDS),
     Key("test", "recordings", "list of files", "", "none",
-        "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data, whose FRFs are "
-        "estimated as `chladni test` does. One file may hold several articles or levels. The "
-        "first is compared with the model (or the one `use` names). Recordings of one article, "
-        "level and state that were driven at other places are stacked with it; the rest is held "
-        "out and scored. `identify` reads all.",
+        "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data. FRFs of time data "
+        "are estimated as in `chladni test`. One file may have several articles or levels. The "
+        "first (or the one `use` names) is compared with the model. Recordings of the same "
+        "article, level and state with other drive points are stacked with it; the others are "
+        "held out and scored. `identify` reads all.",
         '["article_A.uff", "article_B.uff"]', (*_READ, "bench")),
     Key("test", "use", "text", "", "the first",
-        "Which recording is compared: the name of its file, its article, its level or its state.",
+        "Recording that is compared: the name of its file, its article, its level or its state.",
         '"article_B.uff"', _READ),
-    Key("test", "quantity", "word", "", "what the file says", "What the FRFs are.",
+    Key("test", "quantity", "word", "", "as in the file", "Quantity of the FRFs.",
         '"accelerance"', _READ, get_args(Quantity)),
     Key("test", "gain", "word", "", "known",
         "Unknown: one real factor common to all channels is free.", '"unknown"', _SCORE,
         ("known", "unknown")),
     Key("test", "factor", "number, not 0", "", "1",
-        "What the FRFs are multiplied by: 9.80665 where g were taken for m/s².", "9.80665", _READ),
+        "Factor on all FRFs: 9.80665 where g were read as m/s².", "9.80665", _READ),
     Key("test", "delay", "number", "s", "0",
-        "By how much all responses lag the forces; it is taken off. At most 1 / Δf of the lines.",
+        "Delay of all responses after the forces, which is removed. At most 1 / Δf of the lines.",
         "0.0005", _READ),
     Key("test", "frequency_unit", "word", "", "Hz",
         "Unit of frequency in the recordings; all other frequencies of a case are in Hz.",
         '"rad/s"', _READ, tuple(HERTZ)),
     Key("test", "conjugated", "true or false", "", "false",
-        "True: the FRFs were computed with exp(-iωt), their phases turn the wrong way.",
+        "True: the FRFs were computed with exp(-iωt), so their phase has the wrong sign.",
         "true", _READ),
     Key("test", "sensors", "file", "",
-        "labels name grids of the deck, unless their coordinates lie elsewhere or they just count "
-        "1, 2, 3",
-        "Where sensors and shakers sit, which channels are left out or of a wrong gain: the table "
-        "below.", '"sensors.csv"', (*_READ, "bench")),
+        "labels name grids of the deck, unless their coordinates are elsewhere or they only "
+        "count 1, 2, 3",
+        "Places of sensors and shakers, excluded channels and gains: the table below.",
+        '"sensors.csv"', (*_READ, "bench")),
     Key("test", "mass", "number", "kg", "not weighed",
-        "Weighed mass of the article, its sensors taken off.", "10.508", _TEST),
+        "Weighed mass of the article without sensors.", "10.508", _TEST),
     Key("test", "mass_sd", "number above 0, up to the mass", "kg", "0.2 % of the mass",
         "Standard deviation of the weighing.", "0.005", _FIT),
     Key("test", "gain_sd", "number, 0 to 1", "", "0.01",
         "Standard deviation of the gain of each sensor and force gauge, relative.", "0.005", _FIT),
     Key("test", "direction_sd", "number, 0 to 90", "deg", "1",
-        "Standard deviation of the direction of each, either way.", "0.5", _FIT),
+        "Standard deviation of the direction of each, about each transverse axis.", "0.5", _FIT),
     Key("test", "position_sd", "number, 0 to the size of the structure", "m", "0.0015",
-        "Standard deviation of the place of each, either way along the sheet, where the table of "
-        "sensors gives none.", "0.003", _FIT),
+        "Standard deviation of the place of each, in each direction of the sheet, if the table "
+        "of sensors gives none.", "0.003", _FIT),
     Key("test", "hangers", "list of grids", "", "none",
-        "Where cords hold the article: the springs of `suspension` sit there.", "[101, 102]",
+        "Grids of the cords: places of the springs of `suspension`.", "[101, 102]",
         ("diagnose", "bench")),
     Key("recording", "file", "file", "", "needed",
-        "One more recording, or one of `recordings` of which more is to be said.",
+        "A further recording, or one of `recordings` with further words.",
         '"article_B.uff"', _READ),
-    Key("recording", "article", "text", "", "what the file says",
-        "Which of several nominally equal objects it is. Repeats and articles give the spread that "
-        "no fit is asked to go below.", '"B"', _READ),
-    Key("recording", "level", "number", "N or m/s²", "what the file says",
-        "Amplitude that was held: of the force, of the base, or of the response as `control` says. "
-        "`identify` and `diagnose` hold frequency and damping against it.", "2.0", _READ),
+    Key("recording", "article", "text", "", "as in the file",
+        "Name of the article among several nominally equal ones. Repeats and articles give the "
+        "measured spread; a fit need not be closer than that.", '"B"', _READ),
+    Key("recording", "level", "number", "N or m/s²", "as in the file",
+        "Controlled amplitude of the force, the base or the response, as `control` states. "
+        "`identify` and `diagnose` show frequency and damping over it.", "2.0", _READ),
     Key("recording", "control", "word", "", "force",
-        "What was held at `level` from line to line: the force (or the motion of the base), or the "
-        "response of the drive point (else of the first output) in the unit of the recording.",
+        "Quantity kept at `level` on every line: the force (or the motion of the base), or the "
+        "response. The response is that of the drive point, else of the first output, in the "
+        "unit of the recording.",
         '"response"', _READ, get_args(Control)),
     Key("recording", "state", "text", "", "one state",
-        "What was done to the object before this was measured. `calibrate` and `diagnose` take "
-        "every state (or the one `use` names): E, rho, t are shared, an effect is a state's own. "
-        "The deck and `mass` are those of the first, or of the one used.",
+        "Change of the article before this measurement. `calibrate` and `diagnose` use every "
+        "state (or the one `use` names). States share E, rho and t; an effect belongs to one "
+        "state. The deck and `mass` are those of the first state, or of the one used.",
         '"with the bracket"', _READ),
     Key("recording", "mass", "number", "kg", "not weighed in this state",
         "Weighed mass in this state.", "1.95", _FIT),
-    Key("band", "fit", "[low, high]", "Hz", "all the recording holds",
+    Key("band", "fit", "[low, high]", "Hz", "the whole recording",
         "Band that is identified, scored and fitted.", "[26.0, 195.0]",
         ("identify", *_SCORE, "bench")),
     Key("band", "exclude", "list of [low, high]", "Hz", "none",
-        "Bands within it that are left out.", "[[23.0, 27.5]]", ("identify", *_SCORE)),
+        "Excluded bands within it.", "[[23.0, 27.5]]", ("identify", *_SCORE)),
     Key("held_out", "sensors", "number, or list of labels", "", "a fifth of the outputs",
-        "Outputs no fit may see.", '["412:+Z"]', _FIT),
+        "Held-out outputs.", '["412:+Z"]', _FIT),
     Key("held_out", "band", "[low, high]", "Hz", "the upper fifth of the band",
-        "Band no fit may see.", "[200.0, 300.0]", (*_FIT, "bench")),
-    Key("parameter", "name", "text", "", "the field", "What the page calls it.", '"E steel"',
+        "Held-out band.", "[200.0, 300.0]", (*_FIT, "bench")),
+    Key("parameter", "name", "text", "", "the field", "Name on the page.", '"E steel"',
         _VARIED),
     Key("parameter", "parts", "list of parts", "", "all that have the field",
         "Names or property ids of parts; of joints and masses the card: `PBUSH 7`, `PELAS 3`, "
         "`CELAS2 12`, `CONM2 5`.", '["inner", "outer upper"]', _VARIED),
     Key("parameter", "field", "word", "", "needed",
-        "The number that is free, one factor for all its parts; or an effect's name, where it "
-        "acts being known.", '"E"', _VARIED, FREEABLE),
+        "The free number, one factor for all its parts; or an effect with a known place.",
+        '"E"', _VARIED, FREEABLE),
     Key("parameter", "sd", "number, 0.001 to 2", "of the deck's value",
         "0.06 (E, rho), 0.05 (t, wall), 0.1 (nu), 0.3 (others)",
-        "Tolerance: standard deviation of the prior of ln(value / deck's value). `study` goes two "
-        "of them far where `low` or `high` is missing.", "0.03", _VARIED),
+        "Tolerance: standard deviation of the prior of ln(value / deck's value). `study` uses "
+        "two of them where `low` or `high` is missing.", "0.03", _VARIED),
     Key("parameter", "low", "number below 1", "of the deck's value", "none",
         "Bound: the value stays above low times the deck's.", "0.8", _VARIED),
     Key("parameter", "high", "number above 1", "of the deck's value", "none",
@@ -176,26 +177,26 @@ COLUMNS = (
     Key("sensors.csv", "label", "text", "", "needed",
         "The output or input of the recording, as `412:+Z` or `412:n`.", "412:+Z", _PLACED),
     Key("sensors.csv", "grid", "whole number, or base", "", "the node of the label",
-        "Grid of the deck it sits at; `base`: it measures the motion of all supports together, "
-        "the input of a transmissibility.", "412", _PLACED),
+        "Grid of the deck; `base`: it measures the motion of all supports together, the input of "
+        "a transmissibility.", "412", _PLACED),
     Key("sensors.csv", "x", "number", "m", "", "Place, basic frame, in place of a grid.", "0.25",
         _PLACED),
     Key("sensors.csv", "y", "number", "m", "", "Place.", "0.1", _PLACED),
     Key("sensors.csv", "z", "number", "m", "", "Place.", "0.0", _PLACED),
     Key("sensors.csv", "direction", "+X -X +Y -Y +Z -Z n", "", "the direction of the label",
-        "Which way it points, basic frame; `n` is the normal of the surface.", "+Z", _PLACED),
+        "Direction of the sensor, basic frame; `n` is the normal of the surface.", "+Z", _PLACED),
     Key("sensors.csv", "nx", "number", "", "", "Direction as three numbers.", "0.0", _PLACED),
     Key("sensors.csv", "ny", "number", "", "", "Direction.", "0.6", _PLACED),
     Key("sensors.csv", "nz", "number", "", "", "Direction.", "0.8", _PLACED),
-    Key("sensors.csv", "role", "word", "", "output", "What it does.", "input", _PLACED,
+    Key("sensors.csv", "role", "word", "", "output", "Role of the channel.", "input", _PLACED,
         ("output", "input")),
     Key("sensors.csv", "mass", "number", "kg", "0",
-        "Mass on the article while it is measured. It is in the model before anything is asked and "
-        "in no deck that is written. Rows of one place and role are one device.", "0.005", _PLACED),
+        "Mass on the article during the measurement. The model contains it from the start, but "
+        "written decks do not. Rows of one place and role are one device.", "0.005", _PLACED),
     Key("sensors.csv", "gain", "number, not 0", "", "1",
-        "The recording shows this many times what was there; the channel is divided by it.", "0.5",
+        "Ratio of recorded to true motion; the channel is divided by it.", "0.5",
         _READ),
-    Key("sensors.csv", "use", "word", "", "yes", "Whether the output is used.", "no", _READ,
+    Key("sensors.csv", "use", "word", "", "yes", "Use of the output.", "no", _READ,
         ("yes", "no")),
     Key("sensors.csv", "position_sd", "number", "m", "0",
         "Uncertainty of the place. Above 5 mm natural frequencies are compared, not FRFs.",

@@ -221,8 +221,8 @@ def _pairs(pairs: Sequence[PairClearance]) -> Table:
 
 
 _PAIRS = (
-    "Clearance [mm] between the sheets' faces at the nodes of the first part, its uncertainty "
-    "from flat shells (h² κ/8 of both), and the number of nodes below 0.5 mm away from joints."
+    "Clearance [mm] between the sheets' faces at the nodes of the first part. Uncertainty: from "
+    "flat shells, h² κ/8 of both. Below 0.5 mm: number of nodes away from joints."
 )
 
 
@@ -252,6 +252,6 @@ def _rattle(model: Model, modal: ModalModel, chosen: list[int], found: Sequence[
 
 
 _RATTLE = (
-    "Force amplitude at resonance, at the point that moves most and with 1 % damping, until two "
-    "separate sheets touch; places within 18 mm of a joint are left out."
+    "Force amplitude at resonance at which two separate sheets touch. The force acts at the "
+    "point that moves most, damping is 1 %. Places within 18 mm of a joint are left out."
 )

@@ -16,7 +16,7 @@ class Ask(Enum):
     """Quantities of one row that a decision may request."""
 
     TEST = "the test of fit"
-    VOTES = "what data that no fit saw say of it against calibration"
+    VOTES = "evidence of held-out data for it compared with calibration"
     LEFT = "Q with it as a deck can hold it"
     RENEWAL = "the same fitted again on a model that bears it"
     AFTER = "whether its damping follows what the leader changes"

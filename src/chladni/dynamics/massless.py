@@ -47,8 +47,7 @@ def static_solver(
         if np.any(extra > _DRIVEN * work):
             raise ModelError(
                 "a load drives a motion that has neither stiffness nor mass, for example the "
-                "rotation of a bar without inertia about its axis; hold it, give it inertia, or "
-                "drive another dof"
+                "rotation of a bar without inertia about its axis; hold it or give it inertia"
             )
         return X
 

@@ -13,12 +13,12 @@ from .words import number, quantity, rounded
 
 _HEADS = ("what", "at the best place", "at half of the places", "at the worst", "nowhere found")
 _CAPTION = (
-    "Predicted from the model alone: the smallest mass at one place that a diagnosis would name, "
-    "and the smallest softening (share of E) and thinning (share of t) over a tenth of the "
-    "sheet's size. E, rho and t of the parts are free, the form error is 1 % and the noise "
-    "{noise:.2g} % of |H|. A finding must lower -2 ln p by {due:.0f}: the threshold of a "
-    "diagnosis and the places tried. Nowhere found: share of the places where 30 % of the mass, "
-    "or 90 % of E or t, would not be enough."
+    "Predicted from the model alone. Smallest mass at one place that a diagnosis would name. "
+    "Smallest softening (share of E) and thinning (share of t) over a tenth of the sheet's size. "
+    "E, rho and t of the parts are free, the form error is 1 % and the noise {noise:.2g} % of "
+    "|H|. A finding must lower -2 ln p by {due:.0f}: the threshold of a diagnosis and the places "
+    "tried. Nowhere found: share of the places where 30 % of the mass, or 90 % of E or t, would "
+    "not be enough."
 )
 
 

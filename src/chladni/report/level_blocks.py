@@ -15,8 +15,8 @@ from .words import interval, number
 
 SHOWN = 6  # modes that are drawn
 _WHAT = (
-    "Measured; 'element': from the first of the elements below, fitted to all levels; "
-    "'predicted': from one that was chosen and fitted without these levels; 'linear': the mean "
+    "Measured values and three models. 'element': the first of the elements below, fitted to all "
+    "levels. 'predicted': an element chosen and fitted without these levels. 'linear': the mean "
     "of the fitted levels. The amplitude is the displacement of the output at which the mode was "
     "seen."
 )

@@ -15,8 +15,8 @@ from .words import number
 _HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
           "was [kg]", "error of t [%]")  # fmt: skip
 _CAPTION = (
-    "Covered: share of the area with a matching sheet; 95 % within: distance of that sheet; "
-    "error of t: thickness mapped onto the deck and back, compared with the file, rms. Shells "
+    "Covered: share of the area with a matching sheet. 95 % within: distance of that sheet. "
+    "Error of t: thickness mapped onto the deck and back, compared with the file, rms. Shells "
     "without a match keep the deck's thickness."
 )
 _GUESS = (

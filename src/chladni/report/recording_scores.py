@@ -6,7 +6,7 @@ from .words import number
 
 _WHAT = (
     "Q of the decks on the recordings that were not fitted, over all lines and channels. 'Apart' "
-    "is the Q between these and the fitted recording: no deck can be expected to come closer."
+    "is the Q of the fitted recording on them: no deck can be expected to come closer."
 )
 
 

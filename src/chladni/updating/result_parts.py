@@ -109,9 +109,9 @@ def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> 
         return ()
     off = weighed / deck - 1
     return (
-        f"the article weighs {abs(off):.1%} {'more' if off > 0 else 'less'} than the deck, and "
-        "calibration changes density and thickness to match; trim, mastic or a liner on a whole "
-        "sheet has the same effect: the drawing, or one part weighed alone, distinguishes them",
+        f"the article weighs {abs(off):.1%} {'more' if off > 0 else 'less'} than the deck, so "
+        "calibration changes density and thickness; trim or mastic on a whole sheet has the same "
+        "effect: the drawing, or one part weighed alone, distinguishes them",
     )
 
 

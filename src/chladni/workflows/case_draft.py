@@ -164,9 +164,8 @@ def _missing(
     if lost:
         more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
         out.append(
-            f"places of {', '.join(lost[:_NAMED])}{more}: no grid of the deck and no node of the "
-            "recording is there; add a row for each to sensors.csv, with a grid or x, y, z in "
-            "metres"
+            f"places of {', '.join(lost[:_NAMED])}{more}: neither deck nor recording defines "
+            "them; add a row for each to sensors.csv, with a grid or x, y, z in metres"
         )
     if not read:
         out.append("a recording: [test] recordings, a universal file, .npz or .csv")

@@ -97,7 +97,7 @@ class WorkingModel(Model):
     def write(self, path: Path | str) -> Path:
         """Write its deck: the cards that changed are edited, every other line stays as it was."""
         if self.deck is None:
-            raise ModelError("this model was not read from a deck, so there is none to edit")
+            raise ModelError("this model was not read from a deck, so no deck can be edited")
         before = assembly(self.deck, self.units)
         return write_deck(self.deck, path, changes(self.deck, before, self.assembly, self.units))
 

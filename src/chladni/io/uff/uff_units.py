@@ -143,8 +143,8 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
         if _bare(unit) and not motion and _bare(unit) not in _FORCE:
             raise FileError(
                 f"{where}: the unit {unit!r} is not known; known are m, mm, in, g, N, lbf and "
-                "similar units; if the numbers are in the units of the file's head (dataset 164; "
-                "SI where it has none), state the quantity in the case"
+                "similar units; state the quantity in the case if the numbers have the units of "
+                "the file's head (dataset 164, else SI)"
             )
     if said and typed and said not in (typed, "transmissibility"):
         raise FileError(
