@@ -100,9 +100,7 @@ class Case:
         out = [*self.notes, *unread(self.given, command)]
         if self.sensor_masses and command in key("sensors.csv", "mass").used:
             said = weight(self.assembly, self.outputs, self.inputs, "sensors.csv")
-            out.append(
-                f"{said}, at {len(self.sensor_masses)} grids; the weighed mass excludes them."
-            )
+            out.append(f"{said}, at {len(self.sensor_masses)} grids; weighed mass excludes them.")
         return out
 
     def lines(self, frequency: np.ndarray) -> np.ndarray:
@@ -284,9 +282,7 @@ def _setup(test: TomlSection, made: Assembly, outside: bool) -> TestSetup:
     mass = test.number("mass", low=1e-9)
     mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0), high=mass or 1e300)
     if mass is None and mass_sd is not None:
-        raise FileError(
-            f"{test.at('mass_sd')} gives the standard deviation of a mass, but there is no mass"
-        )
+        raise FileError(f"{test.at('mass_sd')} needs a mass, but [test] has none")
     hangers = test.list("hangers", int) or []
     for grid in hangers:
         grid_row(made, grid, test.at("hangers"))
@@ -364,9 +360,7 @@ def _inside(
                 f"covers {f[0]:g} to {f[-1]:g} Hz ({lines} lines in common)"
             )
         if (low, high) != band and max(low - band[0], band[1] - high) > 0.02 * (high - low):
-            notes.append(
-                f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, the range of {r.name}"
-            )
+            notes.append(f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, as in {r.name}")
         band = (low, high)
     return band
 
@@ -393,9 +387,7 @@ def _held(
                     f"{section.at('sensors')}: no output {label!r}; there are {named(outputs, 8)}"
                 )
         if set(labels) >= set(outputs):
-            raise FileError(
-                f"{section.at('sensors')} names every output, so no output is left to fit"
-            )
+            raise FileError(f"{section.at('sensors')} names every output, so none is left to fit")
         return tuple(labels), band
     count = section.number("sensors", low=0, high=max(len(outputs) - 1, 0)) or 0.0
     if count != int(count):

@@ -91,7 +91,7 @@ def run(
 ) -> None:
     """Test a structure on the virtual bench: articles, shaker, sensors, front end, recordings.
 
-    It leaves a case (--out/case) that every other command takes, and the sealed truth beside it.
+    It writes a case (--out/case) that every other command accepts, and next to it the sealed truth.
     """
     settings = BenchSettings(
         excitation=cast(Kind, excitation),

@@ -50,8 +50,7 @@ def thickness_of_scan(assembly: Assembly, points: np.ndarray, cells: np.ndarray)
     if area[seen].sum() < LEAST_COVERED * area.sum():
         raise ModelError(
             f"{100 * area[seen].sum() / area.sum():.1f} % of the shells lie between two faces of "
-            "the scan; a thickness needs a scan of both faces, aligned with the deck and in its "
-            "unit of length"
+            "the scan; scan both faces, align the scan with the deck and use its unit of length"
         )
     t = np.where(seen[:, None], corner, shells.thickness)
     after = replace(assembly, shells=replace(shells, thickness=t))

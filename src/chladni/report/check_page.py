@@ -30,9 +30,7 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
     path = folder / "sensors.png"
     ends = markers(case.outputs), markers(case.inputs)
     scene.sensors(path, surface(case.assembly), *ends, cords=cords(case))
-    looks = [
-        f"{'Fault: ' if f.fault else ''}{f.text}. What to do: {f.remedy}" for f in found.findings
-    ]
+    looks = [f"{'Fault: ' if f.fault else ''}{f.text}. Remedy: {f.remedy}" for f in found.findings]
     blocks: list[Block] = [Picture(path, "Sensors, shakers and cords; arrows: their directions.")]
     if found.dofs:
         blocks.append(_table(found.dofs))

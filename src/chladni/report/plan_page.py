@@ -304,7 +304,7 @@ def _test(t: Durations) -> str:
     return (
         f"Stepped sine from {number(low)} to {number(high)} Hz needs {t.lines} lines "
         f"({number(t.lines_per_octave, 3)} per octave, {PER_BANDWIDTH} in every half-bandwidth) "
-        f"and {number(t.stepped_sine_s / 60, 3)} minutes a sweep, with a wait of up to "
+        f"and {number(t.stepped_sine_s / 60, 3)} minutes a sweep. This includes a wait of up to "
         f"{t.longest_wait_cycles:.0f} cycles until a transient falls to 1 %. Burst random with "
         f"{AVERAGES} averages of {number(t.burst_random_resolution_hz, 3)} Hz needs "
         f"{number(t.burst_random_s / 60, 3)} minutes."

@@ -5,8 +5,8 @@ from .blocks import Block, Table
 from .words import number
 
 _WHAT = (
-    "Q of the decks on the recordings that were not fitted, over all lines and channels. 'Apart' "
-    "is the Q of the fitted recording on them: no deck can be expected to come closer."
+    "Q of the decks on the held-out recordings, over all lines and channels. 'Apart' is the Q of "
+    "the fitted recording on them: no deck can be expected to come closer."
 )
 
 

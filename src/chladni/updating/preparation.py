@@ -355,9 +355,9 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
     found = [e for e in placed(where) if not names or set(e.parts) <= names]
     if not found:
         raise FileError(
-            f"{p.field} cannot be freed: deck and test do not define where it acts (all parts of "
-            "a material for orthotropic-material, [test] hangers for suspension, sensors on the "
-            "structure for sensor-mass, drive points, three at most, for shaker-restraint)"
+            f"{p.field} cannot be freed: deck and test do not define its place; "
+            "orthotropic-material needs all parts of a material, suspension [test] hangers, "
+            "sensor-mass sensors on the structure, shaker-restraint one to three drive points"
         )
     return freed_effect(found[0], p.name)
 

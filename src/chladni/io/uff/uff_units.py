@@ -190,6 +190,6 @@ def check_calibrated(record: FunctionSet, where: str) -> None:
         if any(_ELECTRICAL.fullmatch(part) for part in _bare(axis.unit).split("/")):
             raise FileError(
                 f"{where}: its values are in {axis.unit!r} and the file has no calibration; "
-                "export them in units of motion and force (m, mm/s, m/s^2 or g over N or lbf), or "
-                'give them as .npz with their quantity and state gain = "unknown" in the case'
+                "export units of motion and force (m, mm/s, m/s^2 or g over N or lbf); "
+                'or use .npz with the quantity, and gain = "unknown" in the case'
             )
