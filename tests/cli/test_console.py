@@ -117,7 +117,7 @@ def test_words_that_no_command_takes_are_one_sentence(words, said, more):
     assert (done.exit_code, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"chladni: {said}")
-    assert line.endswith(f"`{' '.join(['chladni', more]).strip()} --help` says more")
+    assert line.endswith(f"; see `{' '.join(['chladni', more]).strip()} --help`")
 
 
 @pytest.mark.parametrize("words", [[], ["blind"], ["--help"], ["modes", "--help"]])
