@@ -5,14 +5,14 @@ The names a script starts from; everything else is one import further down.
 A model alone: ``load(deck, units)`` has ``.modes(count)``, ``.frf(output, input, frequency)``,
 ``.show(mode)``, ``.variant(t=0.8e-3)`` and ``.write(path)``.
 
-A model and a recording: ``load_case(folder)`` goes into ``check``, ``correlate``, ``calibrate``,
+A model and a recording: pass ``load_case(folder)`` to ``check``, ``correlate``, ``calibrate``,
 ``diagnose``, ``plan``, ``frf``, ``modes`` and ``study``, one function for each command.
 ``identify`` and ``evaluate_recordings`` need a recording alone (``load_recordings``).
 
 Data: ``Assembly`` (the structure), ``ModalModel``, ``FRF``; all in SI, frequencies in Hz, labels
 as ``412:+Z`` or ``412:n``. Decks come in by ``read_deck`` and go out changed by ``write_deck``,
 an ``FRF`` to and from xarray by ``to_xarray`` and ``from_xarray``.
-What is wrong with an input is told by a ``chladni.errors.ChladniError`` in one sentence.
+A ``chladni.errors.ChladniError`` states in one sentence the error in an input.
 """
 
 from . import address_space as address_space  # first: NumPy does not start below its limit

@@ -40,6 +40,6 @@ def drawn_gains(kind: AccelerometerType, n: int, rng: np.random.Generator) -> np
 
 
 def shown(kind: AccelerometerType, s: np.ndarray) -> np.ndarray:
-    """What it shows over what it feels, ω_0² / (s² + 2ζω_0 s + ω_0²) at s [rad/s]."""
+    """Ratio of shown to true acceleration, ω_0² / (s² + 2ζω_0 s + ω_0²) at s [rad/s]."""
     w = 2 * np.pi * kind.resonance
     return w**2 / (s**2 + 2 * kind.damping * w * s + w**2)

@@ -93,8 +93,8 @@ def scattered_article(
 ) -> BenchArticle:
     """Another article: K̂ = Ω (I + G) Ω, G symmetric and random, and damping of its own.
 
-    Its diagonal scatters frequencies as the tables do, the rest of it turns shapes into each other,
-    the more the nearer their frequencies are (Soize 2000, Probabilistic Engineering Mechanics 15).
+    The diagonal of G scatters frequencies as in the tables. Its other entries mix shapes, most of
+    all shapes of close frequencies (Soize 2000, Probabilistic Engineering Mechanics 15).
 
     Parameters
     ----------

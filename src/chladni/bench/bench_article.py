@@ -1,4 +1,4 @@
-"""What stands on the bench: an article by its modes, seen where something is fixed to it."""
+"""Test article on the bench, given by its modes at the points where devices are attached."""
 
 from dataclasses import dataclass, field, replace
 from typing import Self
@@ -74,7 +74,7 @@ class BenchArticle:
 
     @property
     def on_table(self) -> bool:
-        """Whether its supports are moved, in place of a force."""
+        """True if a shaker table moves its supports instead of a force."""
         return len(self.base) > 0
 
     @property

@@ -52,7 +52,7 @@ class BenchTest:
 
 @dataclass(frozen=True, eq=False)
 class BenchRecording:
-    """What comes out of a test.
+    """Result of a test.
 
     Attributes
     ----------
@@ -111,8 +111,8 @@ def channels_of(rig: BenchRig, rng: np.random.Generator) -> Channels:
 def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> float:
     """The level [N] at which the strongest channel takes about a quarter of its range.
 
-    Of pink noise by the rms of the response while it lasts, of a sine by its largest amplitude, of
-    a blow by the sum of the modes' amplitudes.
+    Pink noise counts by the rms of the response during the burst, a sine by its largest amplitude,
+    a blow by the sum of the modal amplitudes.
     """
     kind, front = rig.setup.accelerometer, rig.setup.front_end
     f = np.geomspace(band[0], band[1], 4000)

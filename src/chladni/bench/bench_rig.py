@@ -21,11 +21,11 @@ NARROW = 0.04  # relative distance between the swinging frequencies: no pole is 
 
 @dataclass(frozen=True)
 class BenchSetup:
-    """What the article is tested with.
+    """Equipment of a test.
 
-    ``cords`` None: as many as there are hangers, tuned as the thesis' were, with rubber at their
-    ends or not; ``shaker`` None: it is hit by a hammer. ``room`` is what sound and floor move the
-    median accelerometer by while nothing else does, rms over the band of the test [m/s²].
+    With ``cords`` None there is one cord per hanger, tuned as in the thesis, with or without rubber
+    at its end. With ``shaker`` None a hammer excites the article. ``room`` is the motion of the
+    median accelerometer from sound and floor alone, rms over the band of the test [m/s²].
     """
 
     accelerometer: AccelerometerType = field(default_factory=AccelerometerType)
@@ -37,7 +37,7 @@ class BenchSetup:
 
     @property
     def gauge(self) -> ForceGauge:
-        """What feels the force; a hammer has one of the same kind at its tip."""
+        """Gauge of the force; a hammer has one of the same kind at its tip."""
         return ForceGauge() if self.shaker is None else self.shaker.gauge
 
 
@@ -61,7 +61,7 @@ class BenchRig:
 
     @property
     def reference(self) -> ForceGauge:
-        """What feels the drive: a force gauge, or an accelerometer on the table."""
+        """Reference channel: a force gauge, or an accelerometer on the table."""
         kind = self.setup.accelerometer
         if self.article.on_table:
             return ForceGauge(0.0, 0.0, kind.sensitivity, kind.noise)
@@ -77,7 +77,7 @@ class BenchRig:
         return self.measured.inputs(slice(1, 1 + SOURCES))
 
     def room_density(self, band: tuple[float, float]) -> float:
-        """Of every source [N/√Hz]; 0 where the room is silent."""
+        """Force density of every source [N/√Hz]; 0 in a silent room."""
         return room_density(self.of_room, self.setup.room, band) if self.setup.room else 0.0
 
     @property
@@ -211,7 +211,7 @@ def _shake(m: _Matrices, drive: np.ndarray, shaker: Shaker) -> list[np.ndarray]:
 def _through_sensors(model: PoleModel, setup: BenchSetup, n_out: int) -> PoleModel:
     """The accelerations as the accelerometers show them: their own resonance, without its ringing.
 
-    What they ring with by themselves at 18 kHz is over in less than a sample.
+    Their free decay at 18 kHz is shorter than a sample.
     """
     c = model.c.copy()
     c[1 : 1 + n_out] *= shown(setup.accelerometer, model.poles)

@@ -1,7 +1,7 @@
 """The cords an article hangs on: springs with a mass and resonances of their own.
 
-Echaniz Granado (2015), section 4.2.4.1: tapped, the left cord rang at 23 Hz, the right one at
-24.5 Hz, and both were seen in the responses nearest to them.
+Echaniz Granado (2015), section 4.2.4.1: after a tap the left cord resonated at 23 Hz, the
+right one at 24.5 Hz. Both appeared in the responses of the nearest sensors.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ THESIS = (23.0, 24.5)  # [Hz]
 BOUNCE = 2.5  # of the article on its cords [Hz]: the highest rigid motion stays below 5 Hz
 LENGTH = 1.0  # [m]
 RUBBER = 0.5  # damping of a cord with soft rubber taped to its end: its peak is gone
-INNER = 1  # resonances of a cord that are modelled, each way: no higher one is told of
+INNER = 1  # modelled resonances of a cord in each direction; higher ones are not reported
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def cords_for(weight: float, number: int, rubber: bool = False) -> tuple[Cord, .
 
 @dataclass(frozen=True, eq=False)
 class CordMatrices:
-    """Of one cord and one direction, over (its end, its inner modes): M, C, K (1 + n, 1 + n)."""
+    """M, C, K (1 + n, 1 + n) of a cord in one direction, over (its end, its inner modes)."""
 
     M: np.ndarray
     C: np.ndarray
@@ -70,8 +70,9 @@ class CordMatrices:
 def cord_matrices(one: Cord, along: bool, inner: int = INNER) -> CordMatrices:
     """A line held at the top: its straight shape s/L and sin(nπs/L) (Craig and Bampton 1968).
 
-    Across it is a string (k = T/L), along it a bar (k its stiffness); then M is m/3 of the end,
-    m/2 of a mode and m (-1)ⁿ⁺¹/(nπ) between them, K is k of the end and k (nπ)²/2 of a mode.
+    Across its axis it is a string (k = T/L), along its axis a bar (k its stiffness). M is m/3 for
+    the end, m/2 for a mode and m (-1)ⁿ⁺¹/(nπ) between them. K is k for the end and k (nπ)²/2 for a
+    mode.
     """
     k = one.stiffness if along else one.tension / one.length
     n = np.arange(1, inner + 1)

@@ -1,7 +1,7 @@
-"""What drives a test: pink bursts, odd multisines, blows of a hammer, as samples of a block.
+"""Excitation signals of a block: pink bursts, odd multisines, blows of a hammer.
 
-Signals are sums of lines of the block's own resolution, so that they are exact on any finer grid of
-time (no images, no aliasing).
+Signals are sums of the block's spectral lines, so they are exact on any finer time grid (no images,
+no aliasing).
 """
 
 from typing import Literal
@@ -61,7 +61,7 @@ def multisine(
 ) -> np.ndarray:
     """A period of odd lines with random phases and 1/√f amplitudes, rms 1 (n · finer,).
 
-    What then appears at even lines is even distortion (Pintelon and Schoukens 2012, section 3.2).
+    The response at even lines is then even distortion (Pintelon and Schoukens 2012, section 3.2).
     """
     odd = np.arange(n // 2 + 1) % 2 == 1
     phases = np.exp(2j * np.pi * rng.uniform(size=n // 2 + 1))

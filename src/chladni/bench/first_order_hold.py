@@ -17,8 +17,8 @@ STRIDE = 64  # samples from state to state where outputs are seen at all: produc
 class HeldStep:
     """q(t + h) = E q + G_0 b u(t) + G_1 b u(t + h): E = e^z, G_1 = h φ_2, G_0 = h (φ_1 - φ_2).
 
-    z = p h, φ_1 = (e^z - 1)/z, φ_2 = (φ_1 - 1)/z (Franklin, Powell and Workman 1998, Digital
-    Control of Dynamic Systems, section 4.3; Hochbruck and Ostermann 2010, Acta Numerica 19).
+    z = p h, φ_1 = (e^z - 1)/z, φ_2 = (φ_1 - 1)/z. Franklin, Powell and Workman 1998, Digital
+    Control of Dynamic Systems, section 4.3; Hochbruck and Ostermann 2010, Acta Numerica 19.
     """
 
     E: np.ndarray

@@ -1,4 +1,4 @@
-"""What a front end makes of voltages: anti-aliasing, noise, the converter's range and steps."""
+"""Front end for voltages: anti-aliasing filter, noise, range and steps of the converter."""
 
 from dataclasses import dataclass
 

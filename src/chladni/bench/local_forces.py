@@ -1,8 +1,8 @@
 """Local forces that are not linear: a gap that closes, a spring that hardens, a joint that slips.
 
-Each answers x = a + S f with f = -law(x): a is where it would be without a force at the end of a
-step, S > 0 what a unit of force moves it in that step. All three are solved in closed form or to
-rounding, so that no step depends on an iteration's tolerance.
+Each solves x = a + S f with f = -law(x). Here a is the position without a force at the end of a
+step, and S > 0 the displacement per unit force in that step. All three have a closed form or are
+solved to rounding, so no step depends on the tolerance of an iteration.
 
 A law of straight pieces names the one it is on, f = F - k x. Many steps on it are taken at once.
 """
@@ -105,7 +105,7 @@ class CubicSpring:
 
 @dataclass(frozen=True)
 class JenkinsSlider:
-    """A spring k in series with a slider that gives way at ``limit``: f = -k (x - s), |f| ≤ limit.
+    """A spring k in series with a slider that slips at ``limit``: f = -k (x - s), |f| ≤ limit.
 
     Jenkins 1962; Gaul and Nitsche 2001, Applied Mechanics Reviews 54, 93-106. The memory is the
     place s of the slider.

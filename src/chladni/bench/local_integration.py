@@ -1,8 +1,8 @@
 """A linear system with local forces in time: the linear part exact, the forces implicit.
 
-The openings answer to inputs and to local forces by superposition. Both are straight between
-samples, so the only error is that of the local force's line between two samples, O(h²) (exponential
-integrators: Hochbruck and Ostermann 2010, Acta Numerica 19, 209-286).
+The motions of the local sites are superposed from inputs and local forces. Both are linear between
+samples. The only error is that of the local force between two samples, O(h²). Exponential
+integrators: Hochbruck and Ostermann 2010, Acta Numerica 19, 209-286.
 """
 
 from collections.abc import Sequence
@@ -46,8 +46,8 @@ class LocalRun:
     def on(self, u: np.ndarray) -> np.ndarray:
         """Forces (sites, n) at every sample of the driving inputs u (n_in, n).
 
-        With r = E q + G_0 b f, what the sites would do without a force at the next sample, the
-        recursion is r ← E r + (E G_1 + G_0) b f.
+        Let r = E q + G_0 b f be the state without a local force at the next sample. The recursion
+        is r ← E r + (E G_1 + G_0) b f.
         """
         free = self.free.on(u)
         if len(self.laws) == 1 and self.laws[0].piece(float(self.force[0]), self.memory[0]):

@@ -70,9 +70,9 @@ def by_poles(
 ) -> PoleModel:
     """M z'' + C z' + K z = F u, y = P_d z + P_v z' + P_a z'' + D_0 u, by its complex modes.
 
-    In the real modes of M and K the state (Ω η, η') has the generator [[0, Ω], [-Ω, -ΦᵀCΦ]], which
-    is normal but for the damping, so that its eigenvectors are well conditioned (Ewins 2000,
-    section 2.7).
+    In the real modes of M and K the state (Ω η, η') has the generator [[0, Ω], [-Ω, -ΦᵀCΦ]]. It is
+    normal except for the damping, so its eigenvectors are well conditioned (Ewins 2000, section
+    2.7).
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def filtered(model: PoleModel, low_pass: PoleFilter) -> PoleModel:
     """G(s) H(s): every output behind the same filter, by partial fractions.
 
     The poles of the model keep their inputs and are seen through G(p); each input brings the poles
-    of the filter, seen through H(a). What passed straight through is gone, for G falls to nothing.
+    of the filter, seen through H(a). The direct feedthrough vanishes, because G falls to zero.
     """
     n_in, a = model.d.shape[1], low_pass.poles
     H = model.response(a)  # (n_a, n_out, n_in)

@@ -1,8 +1,8 @@
-"""The room a test stands in: sound and floor push on the article while it is recorded.
+"""The room of a test: sound and floor excite the article during the recording.
 
-A few independent sources press on all of it at once, so that what they do is coherent from channel
-to channel and rises at resonances, as noise of sensors and converters never does; the gauge feels
-it, too (Bendat and Piersol 2010, section 9.2: noise that passes through the system).
+A few independent sources act on the whole article at once. Their response is coherent from channel
+to channel and rises at resonances, unlike noise of sensors and converters. The gauge measures it
+too (Bendat and Piersol 2010, section 9.2: noise that passes through the system).
 """
 
 import numpy as np

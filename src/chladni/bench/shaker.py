@@ -28,8 +28,8 @@ class ForceGauge:
 class Stinger:
     """A slender rod from the armature to the gauge.
 
-    It pushes along its axis and holds across it, as a beam clamped at the armature:
-    k = 12EI/L³ across, 4EI/L against turning, 6EI/L² between the two; EA/L along.
+    It pushes along its axis and restrains across it, as a beam clamped at the armature.
+    k = EA/L along, 12EI/L³ across, 4EI/L in rotation and 6EI/L² between these two.
     """
 
     length: float = 0.10  # [m]
@@ -48,7 +48,7 @@ class Stinger:
         return float(self.rho * np.pi * self.diameter**2 / 4 * self.length)
 
     def restraint(self) -> np.ndarray:
-        """What holds (a way across, the slope that way) at its end (2, 2) [N/m, N, N m]."""
+        """Stiffness at its end for (transverse motion, slope) (2, 2) [N/m, N, N m]."""
         EI, L = self.E * np.pi * self.diameter**4 / 64, self.length
         return EI / L**3 * np.array([[12, -6 * L], [-6 * L, 4 * L**2]])
 
@@ -57,8 +57,8 @@ class Stinger:
 class Shaker:
     """An electrodynamic exciter on a voltage amplifier (of the size of an LDS V406).
 
-    Its input is the force of the blocked coil [N]; the voltage the moving coil induces brakes it,
-    which is why the force drops at resonances (Varoto and de Oliveira 2002, Journal of Sound and
+    Its input is the force of the blocked coil [N]. The voltage induced by the moving coil brakes
+    it, so the force drops at resonances (Varoto and de Oliveira 2002, Journal of Sound and
     Vibration 257, 1-18).
     """
 

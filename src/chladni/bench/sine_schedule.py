@@ -76,10 +76,10 @@ def dwells_of(
 def stages_for(low: float, high: float, delay: float = 0.0) -> tuple[Stage, ...]:
     """Table 3 on another band: its ranges below 400 Hz, above them the last one octave by octave.
 
-    ``delay`` cycles are waited at least: the table is that of a tailgate whose damping is 1 % in
-    its lowest modes, and e^(-2πζN) of a transient is left after N cycles.
+    The minimum wait is ``delay`` cycles. The table belongs to a tailgate with a damping of 1 % in
+    its lowest modes, and e^(-2πζN) of a transient remains after N cycles.
 
-    The lines begin at ``low`` and end at ``high`` [Hz]; below 10 Hz the first range is as it is at
+    The lines begin at ``low`` and end at ``high`` [Hz]; below 10 Hz the first range is that of
     10 Hz.
     """
     stages: list[Stage] = []

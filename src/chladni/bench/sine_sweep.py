@@ -1,8 +1,8 @@
 """A stepped sine on the bench: state carried from line to line, the force controlled.
 
-A linear article answers a line in closed form: q = γ e^{pt} + α e^{iωt} + β e^{-iωt}, γ what is
-left of the line before; the transient's share of what is measured is an integral of exponentials,
-so a sweep of an hour is exact and takes no steps in time. With local forces it runs in time.
+The response of a linear article to a line has a closed form: q = γ e^{pt} + α e^{iωt} + β e^{-iωt},
+γ from the line before. The transient's share of a measured value is an integral of exponentials.
+A sweep of an hour is therefore exact without steps in time. With local forces it runs in time.
 """
 
 from collections.abc import Sequence
@@ -155,7 +155,7 @@ class _ExactSweep:
         return (volts + sd * (e[0] + 1j * e[1])) / self.channels.stated, over
 
     def loud(self, line: SineLine, rng: np.random.Generator) -> np.ndarray | float:
-        """What the room adds to every channel (channels,), correlated over T as noise is."""
+        """Contribution of the room to every channel (channels,), correlated over T like noise."""
         if not self.density:
             return 0.0
         H = self.room.response(np.array([2j * np.pi * line.frequency]))[0]
@@ -163,7 +163,7 @@ class _ExactSweep:
         return H @ (e[0] + 1j * e[1])
 
     def response(self, line: SineLine, drive: float) -> tuple[np.ndarray, np.ndarray]:
-        """What is measured of the steady answer and of the transient (channels,), phase of sin."""
+        """Measured parts of steady response and transient (channels,), in the phase of sin."""
         m, w = self.model, 2 * np.pi * line.frequency
         U, b = -1j * drive, self.model.b[:, 0]  # a sine: it begins at zero
         p, c = m.poles, m.c

@@ -14,7 +14,7 @@ _FILES = [(k.section, k.name) for k in SCHEMA if k.kind in ("file", "list of fil
 
 
 def files_of(source: Path) -> tuple[Path, ...]:
-    """As many of them as can be told; what is wrong with one is for its reader to say."""
+    """The files of a source that are known without reading them; readers report their errors."""
     case = source / "case.toml" if source.is_dir() else source
     if case.suffix == ".toml":
         return (case, *_of_case(case))

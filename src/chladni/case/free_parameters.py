@@ -241,7 +241,7 @@ def _serves(section: TomlSection, part: Part, field: str) -> None:
 
 
 def _value(part: Part, field: str) -> float:
-    """The number itself; 1 where it is none of its own (E of a laminate)."""
+    """Nominal value; 1 for a pure factor (E of a laminate)."""
     section = part.section
     if field == "t" and isinstance(section, ShellSection):
         return section.thickness
@@ -251,7 +251,7 @@ def _value(part: Part, field: str) -> float:
 
 
 def fields_of(part: Part) -> tuple[str, ...]:
-    """What of a part can be freed."""
+    """Fields of a part that can be freed."""
     section = part.section
     if isinstance(section, BeamSection):
         return ("E", "rho", "wall") if section.tube else ("E", "rho")

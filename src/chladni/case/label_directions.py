@@ -1,4 +1,4 @@
-"""What labels say of directions, held against what the table of sensors says."""
+"""Directions in labels, compared with the table of sensors."""
 
 import re
 from collections.abc import Iterable
@@ -44,7 +44,7 @@ def ways_said(made: Assembly, found: MeasuredDofs, tabled: Iterable[str]) -> lis
 
 
 def _apart(own: np.ndarray | None, given: np.ndarray, normal: np.ndarray) -> bool:
-    """Whether a label says another direction; None is the normal, either side of it."""
+    """True if a label has another direction; None is the normal, on either side."""
     if own is None:
         return bool(normal.any() and np.abs(normal @ given) < _SAME)
     return bool(own @ given < _SAME)

@@ -1,7 +1,7 @@
 """A case: one ``case.toml`` that names the deck, the recordings and what to do with them.
 
 Everything is resolved here once: files are read, labels become grids or places on the nearest
-shell, bands are compared with the data. What does not fit is refused in one sentence.
+shell, bands are compared with the data. Contradictions are refused in one sentence.
 """
 
 import os
@@ -40,7 +40,7 @@ _MASS_SD = 0.002  # of the mass, where the user gives none
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What the user asked for, resolved.
+    """The resolved request of the user.
 
     Attributes
     ----------
@@ -368,7 +368,7 @@ def _inside(
 def _held(
     keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
 ) -> tuple[int | tuple[str, ...] | None, tuple[float, float] | None]:
-    """Sensors (how many, or which) and band that no fit may see."""
+    """Held-out sensors (a number, or their labels) and band."""
     section = keys.section("held_out", known("held_out"))
     band = section.band("band")
     if band is not None:

@@ -30,7 +30,7 @@ class FormedThickness:
     notes: tuple[str, ...] = ()
 
     def said(self) -> list[str]:
-        """What was mapped, in sentences."""
+        """Sentences on the mapped thickness."""
         parts, fit = self.mapped.parts, self.alignment
         worst = min(parts, key=lambda p: p.coverage)
         out = [
@@ -103,7 +103,7 @@ def _refuse_elsewhere(path: Path, mapped: Mapped, place: str) -> None:
 
 
 def _holds_thickness(path: Path) -> bool:
-    """Whether a PLY carries a thickness, so that it is no bare scan."""
+    """True if a PLY has a thickness, so it is not a plain scan."""
     with path.open("rb") as file:
         head = file.read(4096).split(b"end_header")[0].lower()
     return path.suffix.lower() == ".ply" and any(

@@ -1,8 +1,8 @@
-"""What a case says of its recordings: time data estimated, factor, delay, gains, channels left out.
+"""Corrections of recordings by a case: factor, delay, gains, excluded channels, FRFs of time data.
 
-Their frequencies may be in another unit than Hz, their FRFs conjugated.
+Their frequencies may be in another unit than Hz, and their FRFs conjugated.
 
-Nothing is mended that the case does not say, and every mending is noted.
+Only corrections stated in the case are made, and each is noted.
 """
 
 from collections.abc import Sequence

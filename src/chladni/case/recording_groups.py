@@ -67,7 +67,7 @@ def _held(section: TomlSection, r: Recording) -> Recording:
 
 
 def relation(first: Recording, other: Recording) -> Relation:
-    """What another recording is beside the one that is compared; a level not told is the same."""
+    """Relation of another recording to the compared one; a missing level counts as equal."""
     if first.state != other.state:
         return "state"
     if first.article != other.article:

@@ -118,7 +118,7 @@ def _every_state(among: Sequence[str]) -> str:
 
 
 def _other(first: Recording, r: Recording) -> str:
-    """Name, what it is beside the first, and how far from it."""
+    """Name, relation to the first recording, and difference from it."""
     assert first.frf is not None
     assert r.frf is not None
     away = deviation(first.frf, r.frf)
@@ -144,7 +144,7 @@ def deviation(a: FRF, b: FRF) -> float | None:
 
 
 def _poles(r: Recording, alone: bool) -> list[str]:
-    """What of a table of poles is left."""
+    """Unused parts of a table of poles."""
     assert r.poles is not None
     out = []
     states = r.poles.states
@@ -162,7 +162,7 @@ def _poles(r: Recording, alone: bool) -> list[str]:
 
 
 def _idle(r: Recording) -> list[str]:
-    """What a file holds beside FRFs and poles."""
+    """Contents of a file other than FRFs and poles."""
     out = []
     if r.frf is None and r.poles is None and (used := responses(r.functions)):
         out.append(

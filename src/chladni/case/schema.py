@@ -1,7 +1,7 @@
 """Every word a case may hold, in one table: what reads it, its unit, its default, an example.
 
-The reader takes its known words and choices from here, ``docs/case.md`` is written from here and a
-test goes over it: a word that nobody reads cannot be added without being noticed.
+The reader takes its known words and choices from here, and ``docs/case.md`` is written from here.
+A test checks the table, so an unused word cannot be added unnoticed.
 """
 
 from collections.abc import Sequence

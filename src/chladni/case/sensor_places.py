@@ -79,11 +79,11 @@ def _spoken(
     axes: Mapping[int, np.ndarray],
     elsewhere: bool,
 ) -> Sensor:
-    """What a label and the recording's geometry say of a dof, the direction in the basic frame.
+    """Place and direction of a dof in the basic frame, from its label and the recording's nodes.
 
-    Its +X, +Y, +Z are the axes the recording gives the node, else those the deck counts the grid's
-    displacements in. A node that is no grid, or whose number is that of another grid
-    (``elsewhere``), sits where the recording says it does.
+    Its +X, +Y, +Z are the axes of the node in the recording, else the displacement axes of the grid
+    in the deck. A node that is not a grid, or has the number of another grid (``elsewhere``), is at
+    its place in the recording.
     """
     where = test.at("recordings")
     node = label.partition(":")[0].strip()

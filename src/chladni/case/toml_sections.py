@@ -14,10 +14,10 @@ _QUOTED = r"""(['"])((?:(?!\1)[^\\]|\\.)*)\1"""
 
 
 def _why(said: str) -> str:
-    """What tomllib says, its tuples of names as a user writes them.
+    """Message of tomllib, with its tuples of names in the notation of TOML.
 
     >>> _why("Cannot declare ('model',) twice (at line 2, column 7)")
-    '[model] is there twice (at line 2, column 7)'
+    '[model] occurs twice (at line 2, column 7)'
     """
     if "digits)" in said:
         return "a number has thousands of digits"

@@ -76,7 +76,7 @@ class OneSentenceGroup(TyperGroup):
 
 
 def _misused(error: Any) -> int:
-    """What is wrong with the words of a command line, and where it says what there is."""
+    """Report an error in a command line, and the command that lists the valid words."""
     text, at = error.format_message(), error.ctx
     if at is None or text == at.get_help():  # asked for nothing: the help itself
         error.show()

@@ -176,7 +176,7 @@ def _case(
         raise FileError(f"no file {sensors}{similar_names(sensors)}")
     elif driven:
         write_text(table, with_input(sensors, driven))
-    else:  # as it is: what is wrong in it is told where it is read
+    else:  # unchanged: its reader reports errors
         table = sensors.resolve()
     write_text(
         scratch / "case.toml",

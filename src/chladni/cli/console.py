@@ -1,4 +1,4 @@
-"""What a command says, to the terminal and if asked to a log; a reader may leave at any time."""
+"""Output of a command to the terminal and, on request, to a log; its reader may close early."""
 
 import os
 import shlex
@@ -30,7 +30,7 @@ _CELL, _LAST = 56, 110  # characters of a cell's line, and of a sentence's at th
 
 @dataclass
 class Console:
-    """Where lines go beside standard output.
+    """Further targets of lines in addition to standard output.
 
     Attributes
     ----------

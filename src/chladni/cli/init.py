@@ -53,7 +53,7 @@ def _sentences(made: CaseDraft) -> list[str]:
 
 
 def _next(place: Path) -> str:
-    """Whether the case can be read as it stands."""
+    """State if the case is complete, else the missing words."""
     try:
         load_case(place)
     except ChladniError as error:

@@ -1,4 +1,4 @@
-"""What every command shares: the folder of a run, its progress bar, its options, its page."""
+"""Parts that all commands share: the folder of a run, its progress bar, its options, its page."""
 
 import shlex
 import sys
@@ -89,7 +89,7 @@ class Run:
     drawings: Drawings = field(default_factory=Drawings)
 
     def json(self, name: str, data: Any, what: str = "the result for other programs") -> Path:
-        """Write ``name`` beside the page and list it there."""
+        """Write ``name`` next to the page and list it there."""
         self.files.append((name, what))
         return write_json(self.folder / name, data)
 

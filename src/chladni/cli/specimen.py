@@ -203,7 +203,7 @@ def _affordable(area: float, h: float) -> None:
 
 
 def _plate(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
-    """500 x 400 x 1.2 mm unless told."""
+    """Plate of 500 x 400 x 1.2 mm by default."""
     given = {"length": 0.5, "width": 0.4, "t": 1.2e-3, **values}
     h = 0.025 if size is None else 1e-3 * size
     if size is not None:

@@ -102,7 +102,7 @@ def _source(source: Path, units: str | None, allow: list[str]) -> Case | DeckMod
 
 
 def _written(source: Path, place: Path, found: ParameterStudy) -> None:
-    """The page, the tables and study.json beside the samples."""
+    """Write the page, the tables and study.json next to the samples."""
     from ..report.study_page import study_page
     from ..studies.study_tables import write_csv, write_netcdf
 

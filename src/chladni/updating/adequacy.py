@@ -1,14 +1,13 @@
 """Does the best explanation fit at all: a test of the model against its own predictions.
 
 Under the model the residual is r = -J (x - x̂) + δ W g + e with x, ln δ, g and e drawn from their
-priors.  The same fit is made of each draw as of the recording, and the same statistics taken; the
-p value is the rank of the recording's least likely statistic among those of the draws (Gelman, Meng
-and Stern 1996, Statistica Sinica 6, 733-807, with the prior in place of the posterior, so that p is
-uniform where the model is true).
+priors.  Each draw is fitted as the recording, and gives equal statistics.  The p value is the rank
+of the recording's least likely statistic among those of the draws (Gelman, Meng and Stern 1996,
+Statistica Sinica 6, 733-807). The prior replaces the posterior, so p is uniform for a true model.
 
-A residual smaller than known errors leave is said and refuses nothing: errors were overstated.
-A model that fits only with an error of form far beyond what formulations differ by does not fit.
-Nor does one whose modes would have to be damped more unevenly than those of one structure are.
+A residual below that of the known errors is reported but refuses nothing: errors were overstated.
+A model does not fit if its form error is far beyond the differences between formulations.
+It does not fit either if its modal damping would scatter more than that of one structure.
 """
 
 from dataclasses import dataclass, replace
@@ -36,7 +35,7 @@ BELOW = 0.7  # of the first flexible mode: what rings lower swings on its suspen
 
 @dataclass(frozen=True)
 class FitTest:
-    """Whether an explanation fits: p, and what stands out where if it does not."""
+    """Test of fit of an explanation: p, and the place of the largest residual if it fails."""
 
     passes: bool
     p: float
@@ -48,7 +47,7 @@ class FitTest:
 
 @dataclass(frozen=True, eq=False)
 class _Linear:
-    """A fit, linearised: residuals of data and of all that is known beside them."""
+    """A linearised fit: residuals of the data and of the prior information."""
 
     error: Discrepancy
     known: Whitening | None
@@ -65,7 +64,7 @@ class _Linear:
     def noise(self, rng: np.random.Generator) -> np.ndarray:
         """Noise of unit variance (n,): white in the space of the data.
 
-        Without one it is alike on neighbouring lines, for it came through the same modes.
+        Without a span it is similar on neighbouring lines, because it passed through the modes.
         """
         if self.span is not None:
             return self.span.projected(rng.normal(size=len(self.J)))
@@ -76,8 +75,8 @@ class _Linear:
     def misfit(self, error: Discrepancy, z: np.ndarray) -> float:
         """Mean square of the whitened residual z.
 
-        Within a span it is rᵀ C⁻¹ V Vᵀ C⁻¹ r = rᵀ C⁻¹ r - |C⁻¹ r|² of C = I + V Vᵀ: directions
-        in which known errors are smaller than the unexplained rest I do not count.
+        Within a span it is rᵀ C⁻¹ V Vᵀ C⁻¹ r = rᵀ C⁻¹ r - |C⁻¹ r|² with C = I + V Vᵀ.
+        Directions with known errors below the unexplained rest I do not count.
         """
         if self.known is None or self.span is None:
             return float(z @ z) / len(z)
@@ -187,11 +186,11 @@ def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
 
 
 def of_poles(data: Poles, state: State) -> FitTest:
-    """Whether natural frequencies are met, as closely and as often as models of this kind do.
+    """Test of natural frequencies: their error, and the number of poles without a partner.
 
-    p is the smaller of two chances: of a spread of ln f at least as large as the one that was
-    learned, and of at least as many poles without a partner among the modes of ``state``, each
-    being spurious with the chance it has.
+    p is the smaller of two probabilities: of a spread of ln f at least as large as the fitted one,
+    and of at least as many poles without a partner among the modes of ``state``. Each pole is
+    spurious with its own probability.
     """
     closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
@@ -222,7 +221,7 @@ def at_least(count: int, chance: np.ndarray) -> float:
 
 
 def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator) -> np.ndarray:
-    """Statistics of a recording drawn from the model: x at its prior mean, the truth beside it."""
+    """Statistics of a recording drawn from the model: x at its prior mean, the truth drawn."""
     dx = sd * rng.normal(size=len(sd))
     error = model.error
     delta = error.prior.drawn(rng)
@@ -238,9 +237,9 @@ def ranked(
 ) -> tuple[float, int, bool]:
     """P of the least likely statistic of ``seen`` (k,) among ``drawn`` (n, k), and which it is.
 
-    Last, whether it is smaller than the draws have it. Each statistic is ranked (large = unlikely;
-    of those that are ``two_sided`` small as well); the smallest rank is ranked again among those
-    that the draws have, so that p is uniform however the statistics depend on each other.
+    The last value is true if it is smaller than in the draws. Each statistic is ranked (large =
+    unlikely; ``two_sided`` ones also if small). The smallest rank is ranked again among those of
+    the draws, so p is uniform for any dependence between the statistics.
     """
     every = np.vstack([seen, drawn])
     share = (every[None] >= every[:, None]).mean(axis=1)
@@ -252,7 +251,7 @@ def ranked(
     return float(np.mean(share.min(axis=1) <= share[0, least])), least, better
 
 
-WORST = 3  # lines whose nearest modes are told
+WORST = 3  # lines whose nearest modes are reported
 
 
 def _where(data: Responses, square: np.ndarray, labels: tuple[str, ...]) -> tuple[str, np.ndarray]:

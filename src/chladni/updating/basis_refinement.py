@@ -55,7 +55,7 @@ def refined(
 
     Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
     computed again where the effect changes that structure. Otherwise the basis is extended by its
-    missing vectors until its error is at most ``LIMIT``. The same parameters are then fitted from
+    missing vectors until its error is at most ``LIMIT``. All parameters are then fitted again from
     their last values, or ``held`` at them.
     """
     problem = prepared.problem

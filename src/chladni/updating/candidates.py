@@ -53,18 +53,18 @@ def candidates(
 
 
 def already_there(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
-    """Whether an effect at x is in every fit already: freed by the user, or found before."""
+    """True if an effect at x is in every fit already: freed by the user, or found before."""
     found = [e for e, _ in problem.found]
     free = {e.text for e in problem.base if e not in found}
     return effect.text in free or repeats(problem, effect, x)
 
 
 def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
-    """Whether an effect at x is one that was found already, or stands where one was found.
+    """True if an effect at x was found already, or acts at the place of a found effect.
 
-    What is local and alters one place in two ways is one thing that the catalogue does not hold: a
-    patch with sharp edges was a thinning, a crack and a mass, each of which paid. Nor are there two
-    of what in numbers fits anything: a rotor was two lumps on springs.
+    Two local effects at one place are one effect outside the catalogue. A patch with sharp edges,
+    for example, was named as a thinning, a crack and a mass, and each improved the fit. Several
+    flexible effects of one kind are excluded too: a rotor was named as two masses on springs.
     """
     if effect.lone and any(other.name == effect.name for other, _ in problem.found):
         return True
@@ -83,7 +83,7 @@ def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
 
 
 def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> list[Candidate]:
-    """Those that score best where they begin, each paying for the places that were tried."""
+    """Candidates with the best scores at their start, less the price of the places tried."""
     price = [2 * float(np.log(c.effect.trials_factor)) for c in every]
     score = [
         float(context.scores(c.effect, [c.start]).min()) + _prior(c.effect, c.start) + p
@@ -93,7 +93,7 @@ def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> l
 
 
 def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
-    """What a structure of beams is not asked for, and why; nothing of one that has shells."""
+    """Effects not searched on a structure of beams, and why; empty if it has shells."""
     if problem.where.groups.sheet.any():
         return ()
     names = ", ".join(family.name for family in families() if family.on_sheets)
@@ -153,7 +153,7 @@ class UpdatingContext:
 
     @property
     def weighs_more(self) -> float:
-        """What the scales tell beyond the nominal model [kg]; 0 where nothing was weighed."""
+        """Weighed mass minus nominal mass [kg]; 0 if nothing was weighed."""
         weighed = self.problem.mass_measurement
         if weighed is None or self.scan is None:
             return 0.0
@@ -172,11 +172,11 @@ class UpdatingContext:
 
     @cached_property
     def loosened_rows(self) -> tuple[LoosenedRow, ...]:
-        """The same by the lines in which they stand."""
+        """Loosened joints, grouped by their lines."""
         return loosened_rows(self.problem.reduced)
 
     def ready(self) -> Self:
-        """The same, with what most families ask for made before they ask side by side."""
+        """A copy with the data of most families computed, before families are tried in parallel."""
         if self.scan is not None:
             _ = self.baselines, self.scan.flexibility, self.loosened
         return self

@@ -199,7 +199,7 @@ def chain_faults(
 def without_modes(frf: FRF, lines: np.ndarray) -> float:
     """Q of the recording against a power of frequency, another one for each channel.
 
-    Below all modes a structure is rigid, and no reading can be told from another.
+    Below all modes a structure is rigid, and interpretations cannot be distinguished.
     """
     k = lines & (frf.frequency > 0)
     H, f = frf.values[k].reshape(k.sum(), -1), frf.frequency[k]

@@ -40,9 +40,9 @@ def against_model(
     inputs: MeasuredDofs,
     gain_known: bool = True,
 ) -> Screening:
-    """The same, with what the model says of level, quantity and every channel.
+    """Screening of level, quantity and every channel, extended by the model.
 
-    First the chain as a whole: all else that looks wrong may follow from a fault of it.
+    First the chain as a whole: one fault of it may explain all other signs.
     Then the shapes, and modal constants by their order of magnitude: frequencies may be off, and
     physics may be missing.
 

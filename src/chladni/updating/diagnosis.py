@@ -1,11 +1,11 @@
-"""From a recording to the name of what the model left out.
+"""From a recording to the name of the missing physics.
 
-1. null: calibration parameters and scatter alone, from several starts;
-2. scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0;
-3. fits: the best places of every family, jointly with the calibration parameters and the scatter;
-4. evidence: Laplace, with 2 ln of the number of places tried; leaders restart the null;
-5. verdict;
-6. where an effect is named, or nothing fits: sets of several effects (``several``).
+1. Null: calibration parameters and scatter alone, from several starts.
+2. Scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0.
+3. Fits: the best places of every family, jointly with the calibration parameters and the scatter.
+4. Evidence: Laplace, with 2 ln of the number of places tried. Leaders restart the null.
+5. Verdict.
+6. Sets of several effects (``several``), if an effect is named or nothing fits.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -102,7 +102,7 @@ class Diagnosis:
 
     @property
     def unexplained(self) -> bool:
-        """Whether neither what is answered nor calibration alone explains the recording."""
+        """True if neither the answer nor calibration alone explains the recording."""
         return self.adequacy is not None and not self.adequacy.passes
 
     @property
@@ -112,13 +112,13 @@ class Diagnosis:
         return self.due_of(first)
 
     def due_of(self, hypothesis: HypothesisFit) -> float:
-        """The same of any of them."""
+        """Required gain of a hypothesis."""
         due = threshold(self.null.data, len(self.hypotheses))
         return min(due, RULES.expected_due) if hypothesis.effect.expected else due
 
     @property
     def as_the_null(self) -> bool:
-        """Whether the calibration has its numbers as the null found them."""
+        """True if the calibration keeps the numbers of the null."""
         plain, null = self.plain.fit, self.null.fit
         shared = [e for e in plain.effects if e in null.effects]
         return all(np.array_equal(plain.of(e), null.of(e)) for e in shared)
@@ -256,7 +256,7 @@ def threshold(data: object, tried: int | None = None) -> float:
 def best_base_fit(
     problem: UpdatingProblem, effects: Sequence[Effect], starts: list[np.ndarray]
 ) -> HypothesisFit:
-    """Best fit of these effects alone over several starts; one that is no structure is none."""
+    """Best fit of these effects alone over several starts; invalid structures do not count."""
     model, fits = problem.reduced.model, []
     for k, x in enumerate(starts):
         try:

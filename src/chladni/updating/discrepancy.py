@@ -1,6 +1,6 @@
 """Model-form error as a part of the model: modal stiffness and mass are random about their values.
 
-K = Λ^½ (I + G) Λ^½ and M = I + G' in the modes of a state, G and G' symmetric with independent
+K = Λ^½ (I + G) Λ^½ and M = I + G' in the modes of a state.  G and G' are symmetric with independent
 entries of mean zero and variance δ² (1 + [i=j])/2 (Soize 2000, Prob. Eng. Mech. 15, 277-294, to
 first order).  The responses depend on G linearly, log10 H = log10 H_0 + J vec(G), so the whitened
 residual has the covariance C = I + δ² W Wᵀ.  One decomposition W Wᵀ = U diag(s) Uᵀ serves every δ:
@@ -125,7 +125,7 @@ class Form:
         return replace(model, K0=model.K0 + dK, M0=model.M0 + dM)
 
     def with_values(self, g: np.ndarray) -> Self:
-        """The same modes, entries g (2 pairs,) in units of their deviation at δ = 1."""
+        """A copy with the entries g (2 pairs,), in units of their standard deviation at δ = 1."""
         i, j = self.pairs.T
         G = np.zeros_like(self.G)
         for q, values in enumerate(g.reshape(2, -1)):
@@ -164,7 +164,7 @@ class Discrepancy:
     prior: FormPrior = FORMULATIONS
 
     def with_delta(self, delta: float) -> Self:
-        """The same shapes of error, larger or smaller."""
+        """A copy with the error scaled to ``delta``."""
         return replace(self, delta=delta)
 
     def whitened(self, r: np.ndarray) -> np.ndarray:
@@ -206,9 +206,9 @@ def _decomposed(W: np.ndarray) -> Discrepancy:
 def curvature(data: Lines, state: State, delta: float = USUAL) -> np.ndarray:
     """Standard deviation of log10 H beyond what is linear in G (n_f, n_out, n_in).
 
-    For H = H_0 (1 + z), z of variance σ², ln(1 + z) = z - z²/2: near a zero of H, where σ is no
-    longer small, the logarithm is bent, and beyond σ = 0.4 its phase may wrap. What is left of the
-    exact response to G is alike along lines and counts ``BENT`` times.
+    For H = H_0 (1 + z) with z of variance σ², ln(1 + z) = z - z²/2. Near a zero of H, where σ is
+    large, the logarithm is curved, and beyond σ = 0.4 its phase may wrap. The remaining part of the
+    exact response to G is similar along lines and counts ``BENT`` times.
     """
     every = data.only(np.ones(data.use.shape, bool))
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)

@@ -1,14 +1,14 @@
-"""Every weld loosened or taken out, by exact re-analysis.
+"""Every weld loosened or removed, by exact re-analysis.
 
-With w = bᵀ b in K for the rows b of a joint and G the receptance of the structure, what is left of
-the joint being the share f, the receptance becomes (Woodbury)
+A joint adds bᵀ b to K, with its rows b. G is the receptance of the structure, and f the remaining
+share of the joint. The receptance becomes (Woodbury)
 
     G' = G + (1 - f) G_ob (f + (1 - f) R)⁻¹ G_bi,   R = 1 - G_bb.
 
-A weld is far stiffer than its sheets, so that R is the small difference of ones: of the order of
-10^-3 to 10^-6, and what its loss does goes with 1/R.  Modes alone are blind to it.  R is therefore
-taken from static responses P⁻¹ bᵀ of the whole structure, P = K + σM, and followed along the lines
-by the modes, of all others to first order:
+A weld is far stiffer than its sheets, so R is a small difference, of the order of 10^-3 to 10^-6.
+The effect of its loss grows with 1/R, and modes alone are blind to it.  R therefore comes from
+static responses P⁻¹ bᵀ of the whole structure, P = K + σM. The modes give its change along the
+lines, all other modes to first order:
 
     R(s) = R_0 + (s² - σ) N_0 - Σ_r b φ_r φ_rᵀ bᵀ (d_r(s) - d_r(σ) + (s² - σ) d_r(σ)²),
 

@@ -1,4 +1,4 @@
-"""Frequencies of the test beside those of every deck, by full models."""
+"""Frequencies of the test and of every deck, by full models."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,7 +24,7 @@ def frequency_rows(
     stages: Sequence[tuple[str, Modelled]],
     real: np.ndarray | None = None,
 ) -> tuple[FrequencyRow, ...]:
-    """Identified frequencies beside those of every stage ("before", "calibrated", "after")."""
+    """Identified frequencies and those of every stage ("before", "calibrated", "after")."""
     if not len(test.frequency):
         return ()
     none = [None] * len(test.frequency)

@@ -4,10 +4,10 @@ Two tests compare an effect with calibration alone.  Both sides include the lear
 
 - the data held out: p(held | fitted) = p(held, fitted) / p(fitted), a ratio of evidences about the
   existing fit;
-- folds of the fitted data, one sensor or one block of lines at a time, predicted from the rest. For
-  residuals r of covariance C, r_b given all others has the precision P = (C⁻¹)_bb and the mean
-  r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12).  The parameters
-  are linear about their fit.
+- folds of the fitted data, one sensor or one block of lines at a time, predicted from the rest. Let
+  residuals r have the covariance C.  Given all others, r_b has the precision P = (C⁻¹)_bb and the
+  mean r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12).  The
+  parameters are linear about their fit.
 
 Data that are insensitive to the effect have equal predictions with and without it, so they do not
 count.

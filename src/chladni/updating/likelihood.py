@@ -245,8 +245,8 @@ class Responses:
     def _slopes(self, state: State) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
-        dK and dM are multiplied in the basis, with Φ D φ_i on their right, so that none is
-        projected on the modes as a whole. dφ_i is that of a moving base. dφ_o and dφ_i also occur
+        dK and dM are multiplied in the basis with Φ D φ_i on their right, which avoids a full
+        projection on the modes. dφ_i is that of a moving base. dφ_o and dφ_i also occur
         if shapes change where they are measured.
         """
         phi_o, phi_i, d = self.modal(state)

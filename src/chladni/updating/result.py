@@ -35,7 +35,7 @@ class Alternative:
 class Scores:
     """Q, mean |log10(H_model/H_test)|² over channels and lines, of one set of samples.
 
-    The first three are of decks as they are written, with nothing hidden beside them.
+    The first three belong to decks as they are written, without hidden terms.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Scores:
 
     @property
     def after(self) -> float | None:
-        """Of the updated deck; where nothing was sought, of the calibrated one."""
+        """Q of the updated deck; without a search, of the calibrated deck."""
         return self.calibrated if self.with_effect is None else self.with_effect
 
 
@@ -104,7 +104,7 @@ class Agreement:
 
 @dataclass(frozen=True)
 class CalibratedParameter:
-    """A calibration parameter that was fitted, beside the values of the decks.
+    """A fitted calibration parameter, and its values in the decks.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class CalibratedParameter:
 
 @dataclass(frozen=True)
 class MassComparison:
-    """What the scales say and what the updated deck weighs [kg]."""
+    """Weighed mass and mass of the updated deck [kg]."""
 
     weighed_kg: float | None = None
     model_kg: float | None = None
@@ -155,7 +155,7 @@ class FrequencyError:
 
 @dataclass(frozen=True)
 class Remainder:
-    """Whether what calibration leaves is structured or noise."""
+    """Kind of the residual after calibration: structured, or noise."""
 
     structured: bool
     left: float

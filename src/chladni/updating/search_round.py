@@ -1,7 +1,7 @@
-"""One round of a search: candidates fitted, the best of every family followed to where it rests.
+"""One round of a search: candidates are fitted, and the best of every family is followed.
 
-The base of the round holds what was found before it, so that a later round asks what an effect
-explains beside the others.
+The base of the round contains the effects found before it. A later round therefore finds the gain
+of an effect in addition to the others.
 """
 
 from collections.abc import Callable, Sequence
@@ -74,7 +74,7 @@ def _in_the_running(hypotheses: Sequence[HypothesisFit]) -> int:
 
 
 def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: float) -> bool:
-    """Whether the best gains so much over the null."""
+    """True if the best hypothesis gains at least this much over the null."""
     best = min((t.neg2_log_evidence for t in hypotheses), default=np.inf)
     return bool(null.neg2_log_evidence - best > least)
 
@@ -86,10 +86,10 @@ def _tried(
     start: np.ndarray,
     base: np.ndarray,
 ) -> list[HypothesisFit]:
-    """Rough fits; the second begins at the null, where the first has not even come as far as that.
+    """Rough fits; a second one begins at the null if the first remains worse than the null.
 
-    With the effect idle a hypothesis is the null: one that stays behind it by more than its price
-    has only stopped on the way. A start that is no structure at all (negative stiffness) is none.
+    With the effect idle a hypothesis is the null. A fit that is worse by more than its price has
+    stopped too early. A start with negative stiffness is not a structure and is left out.
     """
     out: list[HypothesisFit] = []
     for x in (base, null.fit.x):
@@ -182,10 +182,10 @@ def _closer(
 def _of_the_same_lump(
     problem: UpdatingProblem, hypotheses: Sequence[HypothesisFit]
 ) -> list[HypothesisFit]:
-    """Where a mass at a place leads, all that may be one, begun at that place with that mass.
+    """All hypotheses that may be the leading mass, begun at its place with its mass.
 
-    A point mass at the edge of a tailgate (tuning 561) had come to rest 16 mm beside its place,
-    where it gained 113; a resonator led with 222. Begun where that was, the mass gains 226.
+    A point mass at the edge of a tailgate (tuning 561) had converged 16 mm from its place with a
+    gain of 113, and a resonator led with 222. Begun at the resonator's place, the mass gains 226.
     """
     lead = hypotheses[0] if hypotheses else None
     lump = None if lead is None else lead.effect.lump(lead.fit.of(lead.effect))
@@ -213,9 +213,9 @@ def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -
 
 
 def taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:
-    """Base parameters at their prior mean, those of these kinds as the leader has them.
+    """Base parameters at their prior mean, those of these kinds with the leader's values.
 
-    What was found before stands as the leader has it too.
+    Effects found before have the leader's values too.
     """
     x, at = problem.mean(), 0
     for e in problem.base:

@@ -1,7 +1,7 @@
 """Whitening of residuals whose errors lie along known columns, in the space of the data.
 
-An identified response is made of few numbers: its samples move along the columns that its poles and
-the linear unknowns of its channels span, and along no others. Residuals are projected on that span.
+An identified response has few parameters: its samples vary only in the span of the columns of its
+poles and of the linear unknowns of its channels. Residuals are projected on that span.
 With the covariance I + V Vᵀ and V in the span, the columns of one output are taken out first, then
 the columns that all outputs share.
 """
