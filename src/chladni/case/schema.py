@@ -70,7 +70,7 @@ SCHEMA = (
     Key("model", "thickness_units", "word", "", "the deck's", "The unit system of that file.",
         '"mm-t-s"', COMMANDS, tuple(UNITS)),
     Key("model", "thickness_place", "word", "", "as it lies",
-        "Place of its sheets: on those of the deck, or moved onto them first, if necessary as a "
+        "Place of its sheets: on the deck's, brought onto them first, or brought onto them as a "
         "mirror image.", '"aligned"', COMMANDS, PLACES),
     Key("model", "damping", "number, 0 to 0.5", "of critical", "0.01",
         "Damping of the model for drawn or scored responses.", "0.01", _FRF),
@@ -78,8 +78,8 @@ SCHEMA = (
         "Unknown cards and case control commands that are ignored.",
         '["CWELD"]', COMMANDS),
     Key("model", "outside", "true or false", "", "false",
-        "Allow files outside the folder of the case (`../`, or a whole path). Keep it false for "
-        "a case from somebody else.", "true", COMMANDS),
+        "True: files of the case may lie outside of its folder (`../`, or a whole path). Leave it "
+        "false in a case from somebody else.", "true", COMMANDS),
     Key("test", "recordings", "list of files", "", "none",
         "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data. FRFs of time data "
         "are estimated as in `chladni test`. One file may have several articles or levels. The "
@@ -128,9 +128,9 @@ SCHEMA = (
     Key("recording", "file", "file", "", "needed",
         "A further recording, or one of `recordings` with further words.",
         '"article_B.uff"', _READ),
-    Key("recording", "article", "text", "", "as in the file",
-        "Name of the article among several nominally equal ones. Repeats and articles give the "
-        "measured spread; a fit need not be closer than that.", '"B"', _READ),
+    Key("recording", "article", "text", "", "what the file says",
+        "Which of several nominally equal objects it is. Repeats and articles give the spread "
+        "below which no fit has to go.", '"B"', _READ),
     Key("recording", "level", "number", "N or m/s²", "as in the file",
         "Controlled amplitude of the force, the base or the response, as `control` states. "
         "`identify` and `diagnose` show frequency and damping over it.", "2.0", _READ),
