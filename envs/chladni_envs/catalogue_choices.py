@@ -96,8 +96,8 @@ class CatalogueChoices:
     def beyond_price(self, hypothesis: HypothesisFit) -> float:
         """Gain of a hypothesis over the null, less the price of each of its effects."""
         due = threshold(self.null.data, len({c.effect.name for c in self.candidates}))
-        asked = sum(price(due, size) for size in range(1, len(hypothesis.effects) + 1))
-        return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence - asked
+        prices = sum(price(due, size) for size in range(1, len(hypothesis.effects) + 1))
+        return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence - prices
 
     def _fitted(self, chosen: frozenset[int]) -> HypothesisFit:
         if chosen not in self.fits:

@@ -4,7 +4,7 @@ import gymnasium as gym
 from gymnasium.error import ResetNeeded
 
 
-def refuse_before_reset(env: gym.Env, state: str, asked: str) -> None:
+def refuse_before_reset(env: gym.Env, state: str, call: str) -> None:
     """Raise while the environment has no ``state`` yet.
 
     Raises
@@ -13,4 +13,4 @@ def refuse_before_reset(env: gym.Env, state: str, asked: str) -> None:
         It names the request and the call that is needed first.
     """
     if not hasattr(env, state):
-        raise ResetNeeded(f"{asked}: call reset() first; there is no state before")
+        raise ResetNeeded(f"{call}: call reset() first; there is no state before")

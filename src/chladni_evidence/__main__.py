@@ -28,70 +28,70 @@ from .thesis import regenerate
 
 def main(words: list[str] | None = None) -> int:
     """Entry point; 0 (done), 1 (an injured input ended wrongly), 2 (bad input: one sentence)."""
-    asked = _parser().parse_args(words)
+    options = _parser().parse_args(words)
     try:
-        return COMMANDS[asked.command](asked)
+        return COMMANDS[options.command](options)
     except ChladniError as error:
         sys.stderr.write(f"chladni_evidence: {error}\n")
         return 2
 
 
-def _run(asked: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> int:
     """Make, diagnose and score cases: the three steps of ``chladni blind``."""
-    seeds = seed_range(asked.seeds)
-    kinds, structures = (t.split(",") if t else [] for t in (asked.kinds, asked.structures))
+    seeds = seed_range(options.seeds)
+    kinds, structures = (t.split(",") if t else [] for t in (options.kinds, options.structures))
     orders = [
-        replace(o, recorder=asked.recorder) for o in chosen(asked.set, seeds, kinds, structures)
+        replace(o, recorder=options.recorder) for o in chosen(options.set, seeds, kinds, structures)
     ]
-    make(orders, asked.out, purpose(seeds), asked.set, asked.workers, _say)
-    run(asked.out, asked.workers, _say, asked.limit)
-    score([asked.out], _say)
+    make(orders, options.out, purpose(seeds), options.set, options.workers, _say)
+    run(options.out, options.workers, _say, options.limit)
+    score([options.out], _say)
     return 0
 
 
-def _screened(asked: argparse.Namespace) -> int:
+def _screened(options: argparse.Namespace) -> int:
     """Print the table of the screening: outcomes by fault."""
-    kinds = [k for k in FAULTS if not asked.faults or k in asked.faults.split(",")]
-    for name, count in tally(_seeds(asked), kinds, _say, asked.long).items():
+    kinds = [k for k in FAULTS if not options.faults or k in options.faults.split(",")]
+    for name, count in tally(_seeds(options), kinds, _say, options.long).items():
         _say(f"{name:24} " + ", ".join(f"{said} {n}" for said, n in sorted(count.items())))
     return 0
 
 
-def _fuzzed(asked: argparse.Namespace) -> int:
+def _fuzzed(options: argparse.Namespace) -> int:
     """Run injured inputs; return 1 where any ended wrongly."""
-    kinds = asked.kinds.split(",") if asked.kinds else KINDS
+    kinds = options.kinds.split(",") if options.kinds else KINDS
     if unknown := [k for k in kinds if k not in KINDS]:
         raise LabelError(f"no kind {unknown[0]}; there are {', '.join(KINDS)}")
-    inputs = fuzz_inputs(asked.inputs, asked.seed, kinds, asked.decks)
-    found = fuzz(until(inputs, asked.minutes), asked.out, _say)
+    inputs = fuzz_inputs(options.inputs, options.seed, kinds, options.decks)
+    found = fuzz(until(inputs, options.minutes), options.out, _say)
     return int(any(name not in DUE for count in found.values() for name in count))
 
 
-def _identified(asked: argparse.Namespace) -> int:
+def _identified(options: argparse.Namespace) -> int:
     """Print errors, coverage and invented poles of identification, by kind of noise."""
-    table(_seeds(asked), asked.noise.split(";") if asked.noise else list(NOISES), _say)
+    table(_seeds(options), options.noise.split(";") if options.noise else list(NOISES), _say)
     return 0
 
 
-def _thesis(asked: argparse.Namespace) -> int:
+def _thesis(options: argparse.Namespace) -> int:
     """Write tables and figures of the thesis' test."""
-    regenerate(asked.out, asked.seed, _say)
+    regenerate(options.out, options.seed, _say)
     return 0
 
 
-def _recorded(asked: argparse.Namespace) -> int:
+def _recorded(options: argparse.Namespace) -> int:
     """Diagnose cases once, and keep the rows of their decisions."""
-    record(asked.case, asked.out, _say)
+    record(options.case, options.out, _say)
     return 0
 
 
-def _replayed(asked: argparse.Namespace) -> int:
+def _replayed(options: argparse.Namespace) -> int:
     """Decide recorded cases again, with all rules and without each of them."""
-    cases = [read_case(path) for path in asked.file]
-    told = [*case_lines(cases), "", *rule_lines(cases)]
-    if asked.noise != 1.0 or asked.floor is not None:
-        told = likelihood_lines(cases, narrower(asked.noise, asked.floor))
-    for text in told:
+    cases = [read_case(path) for path in options.file]
+    lines = [*case_lines(cases), "", *rule_lines(cases)]
+    if options.noise != 1.0 or options.floor is not None:
+        lines = likelihood_lines(cases, narrower(options.noise, options.floor))
+    for text in lines:
         _say(text)
     return 0
 
@@ -110,9 +110,9 @@ COMMANDS = {
 }  # fmt: skip
 
 
-def _seeds(asked: argparse.Namespace) -> range:
+def _seeds(options: argparse.Namespace) -> range:
     """The seeds; their purpose is printed on the terminal."""
-    seeds = seed_range(asked.seeds)
+    seeds = seed_range(options.seeds)
     _say(MEANT[purpose(seeds)])
     return seeds
 

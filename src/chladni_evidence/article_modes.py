@@ -72,14 +72,14 @@ def article_modes(
 
 
 def _kept(
-    asked: tuple[Assembly, np.ndarray, np.ndarray, float, bool], cache: Path | None
+    job: tuple[Assembly, np.ndarray, np.ndarray, float, bool], cache: Path | None
 ) -> ArticleModes:
     """Modes by our elements, from the cache if it holds them."""
-    kept = None if cache is None else cache / f"{fingerprint((asked, _KEPT))}.npz"
+    kept = None if cache is None else cache / f"{fingerprint((job, _KEPT))}.npz"
     if kept is not None and kept.exists():
         with np.load(kept, allow_pickle=False) as held:
             return ArticleModes(*(held[f.name] for f in fields(ArticleModes)))
-    assembly, rows, loaded, f_max, bending = asked
+    assembly, rows, loaded, f_max, bending = job
     found = _ours(structure(assembly, residual_bending=bending), rows, loaded, f_max)
     if kept is not None:
         write_npz(kept, **{f.name: getattr(found, f.name) for f in fields(ArticleModes)})

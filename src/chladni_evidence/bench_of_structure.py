@@ -210,20 +210,20 @@ def tailgate_bench() -> Bench:
 def glue_candidates(deck: Assembly) -> Spots:
     """Grids where a sensor can be glued: flat on a sheet, or on a tube across it."""
     n = point_normals(deck.points, deck.shells.nodes)
-    part, way = np.full(len(deck.points), -1), n.copy()
+    part, direction_at = np.full(len(deck.points), -1), n.copy()
     if len(deck.shells):
         part[deck.shells.nodes.ravel()] = np.repeat(deck.shells.part, 4)
         part[_mean_normal(deck) < FLAT] = -1
     else:
         along = deck.points[deck.beams.nodes[:, 1]] - deck.points[deck.beams.nodes[:, 0]]
         part[deck.beams.nodes[:, 0]] = deck.beams.part
-        way[deck.beams.nodes[:, 0]] = np.eye(3)[np.abs(along).argmin(axis=1)]
+        direction_at[deck.beams.nodes[:, 0]] = np.eye(3)[np.abs(along).argmin(axis=1)]
     at = np.flatnonzero(part >= 0)
     return Spots(
-        tuple(_label(int(i), d) for i, d in zip(deck.ids[at], way[at], strict=True)),
+        tuple(_label(int(i), d) for i, d in zip(deck.ids[at], direction_at[at], strict=True)),
         deck.ids[at],
         deck.points[at],
-        way[at],
+        direction_at[at],
         tuple(deck.parts[p].name for p in part[at]),
     )
 

@@ -101,9 +101,9 @@ def _article(
     r, n = len(modes.frequency), len(bench.outputs)
     d = bench.drive.directions[0]
     u, _ = tangents(d)
-    way = np.stack([d, u, np.cross(d, u)])
+    axes = np.stack([d, u, np.cross(d, u)])
     moved = np.stack([_along(modes, out, e) for e in np.eye(3)], axis=1)
-    pushed = np.concatenate([_along(modes, drive, e) for e in way])
+    pushed = np.concatenate([_along(modes, drive, e) for e in axes])
     return BenchArticle(
         name="A", weight=mass_properties(a)[0] - hidden.unweighed, frequency=modes.frequency,
         damping=zeta[np.minimum(np.arange(r), len(zeta) - 1)],
@@ -113,9 +113,9 @@ def _article(
     )  # fmt: skip
 
 
-def _along(modes: ArticleModes, foot: MeshTransfer, way: np.ndarray) -> np.ndarray:
+def _along(modes: ArticleModes, foot: MeshTransfer, axes: np.ndarray) -> np.ndarray:
     """Shapes (k, r) of places along one direction."""
-    return seen(modes, foot, np.tile(way, (len(foot.rows), 1)))
+    return seen(modes, foot, np.tile(axes, (len(foot.rows), 1)))
 
 
 def true_places(spots: Spots, kind: AccelerometerType, rng: np.random.Generator) -> Spots:

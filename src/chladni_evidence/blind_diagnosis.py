@@ -51,10 +51,10 @@ def answered(
     """
     out.parent.mkdir(parents=True, exist_ok=True)
     log, start = out.with_name(f"{out.name}.log"), time.monotonic()
-    asked = [command, str(case), "--out", str(out)]
+    arguments = [command, str(case), "--out", str(out)]
     with log.open("wb") as words:
         process = subprocess.Popen(
-            [sys.executable, "-m", "chladni_evidence.leash", *asked],
+            [sys.executable, "-m", "chladni_evidence.leash", *arguments],
             stdin=subprocess.PIPE, stdout=words, stderr=subprocess.STDOUT,
             env={**os.environ, **_ONE_THREAD},
         )  # fmt: skip

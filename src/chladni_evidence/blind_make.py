@@ -59,8 +59,8 @@ def make(
 
 def _begun(place: BlindFolder, chosen: Sequence[Order]) -> dict[str, Order]:
     """Orders by name; names are drawn, so that they do not reveal the hidden effect."""
-    told = json.dumps([vars(o) for o in chosen])
-    mark = hashlib.sha256(told.encode())
+    text = json.dumps([vars(o) for o in chosen])
+    mark = hashlib.sha256(text.encode())
     begun = place.out / "blind.json"
     if begun.exists():
         if read_json(begun, "").get("orders") != mark.hexdigest():

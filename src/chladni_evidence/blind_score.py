@@ -38,8 +38,12 @@ def score(outs: Sequence[Path], say: Say) -> list[Row]:
     """
     every = [(BlindFolder(out), published(BlindFolder(out))) for out in outs]
     if len({seals.purpose for _, seals in every}) > 1:
-        told = ", ".join(f"{place.out} has the purpose {seals.purpose}" for place, seals in every)
-        raise LabelError(f"{told}; cases that tune and cases that report are never scored together")
+        purposes = ", ".join(
+            f"{place.out} has the purpose {seals.purpose}" for place, seals in every
+        )
+        raise LabelError(
+            f"{purposes}; cases that tune and cases that report are never scored together"
+        )
     sealed = Counter(h for _, seals in every for h in seals.truths.values())
     if sealed and max(sealed.values()) > 1:
         raise LabelError("some cases are in two of the folders and would count twice")
@@ -100,12 +104,12 @@ def _rows(place: BlindFolder, seals: Seals) -> list[Row]:
         answer, plain = _answers(read_json(path, ""), path)
         truth = opened_truth(place, seals, name)
         try:
-            judged = row(answer, truth, plain)
+            scored = row(answer, truth, plain)
         except KeyError as error:
             raise FileError(
                 f"{place.truth(name)} holds no {error}; it was made by chladni {seals.version}"
             ) from error
-        found.append({"case": name, "purpose": seals.purpose, **judged})
+        found.append({"case": name, "purpose": seals.purpose, **scored})
     return found
 
 

@@ -124,12 +124,12 @@ def _shells(
     options = "" if even else ", NODAL THICKNESS"
     if offset := float(a.shells.offset[at[0]]):
         options += f", OFFSET={offset / float(t.mean()):.9e}"
-    for name, mine, way in _by_grain(a, p, at):
+    for name, mine, orientation in _by_grain(a, p, at):
         tri = a.shells.triangle[at[mine]]
         yield from _listed("S8R", name, whole[mine][~tri], numbers)
         yield from _listed("S6", name, whole[mine][tri][:, [0, 1, 2, 4, 5, 6]], numbers)
-        yield from way
-        own = f", ORIENTATION=O{name}" if way else ""
+        yield from orientation
+        own = f", ORIENTATION=O{name}" if orientation else ""
         yield f"*SHELL SECTION, ELSET={name}, MATERIAL=M{p}{own}{options}"
         yield f"{t.mean():.9e}"
     if not even:

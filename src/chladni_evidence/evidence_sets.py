@@ -125,8 +125,8 @@ def chosen(
     whole = orders(name, seeds)
     hidden = tuple(dict.fromkeys([*KINDS, *(o.kind for o in whole)]))
     every = ("tailgate", *SPECIMENS, *CLAMPED, *FORMS)
-    for what, asked, known in (("kind", kinds, hidden), ("structure", structures, every)):
-        for word in asked:
+    for what, chosen_words, known in (("kind", kinds, hidden), ("structure", structures, every)):
+        for word in chosen_words:
             if word not in known:
                 raise LabelError(
                     f"no {what} {word!r}; {did_you_mean(word, known)}there are {', '.join(known)}"

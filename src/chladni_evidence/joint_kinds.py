@@ -61,10 +61,10 @@ def adhesive(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     soft = [p.name for p in a.parts if 0 < _modulus(p.section) < SOFTEST]
     if not soft:
         raise ModelError("the article has no adhesive")
-    name, way = str(rng.choice(soft)), float(rng.choice([-1, 1]))
+    name, sign = str(rng.choice(soft)), float(rng.choice([-1, 1]))
     section = a.parts[a.part(name)].section
-    way = -1.0 if _modulus(section) > 1e9 else way  # a stiffer epoxy layer would change little
-    factor = float(np.exp(way * rng.uniform(3.0, 4.0) * size))
+    sign = -1.0 if _modulus(section) > 1e9 else sign  # a stiffer epoxy layer would change little
+    factor = float(np.exp(sign * rng.uniform(3.0, 4.0) * size))
     made = scaled(a, {name: {"E": factor}})
     return Hidden(made, {"value": _modulus(section) * factor, "part": name})
 

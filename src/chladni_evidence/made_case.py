@@ -148,8 +148,8 @@ def made_case(
         return _sized(rig, site, name, own_seed, own, scatter, band)
 
     if len(members(kind)) > 1:
-        hidden, told, effect = together(site, kind, seed, sized)
-        known: dict[str, Any] = {"effects": told}
+        hidden, truths, effect = together(site, kind, seed, sized)
+        known: dict[str, Any] = {"effects": truths}
     else:
         hidden, effect, size = sized(kind, [seed, *kind.encode()])
         known = {**hidden.truth, "size": size}
@@ -302,8 +302,8 @@ def _sensor(spots: Spots, k: int, role: str) -> str:
     grid, place = str(spots.grids[k]), ",,"
     if spots.grids[k] == 0:
         grid, place = "", ",".join(f"{x:.7g}" for x in spots.points[k])
-    way = ",".join(f"{x:.9g}" for x in spots.directions[k])
-    return f"{spots.labels[k]},{grid},{place},{way},{role}"
+    direction_text = ",".join(f"{x:.9g}" for x in spots.directions[k])
+    return f"{spots.labels[k]},{grid},{place},{direction_text},{role}"
 
 
 def _toml(case: MadeCase) -> str:

@@ -60,8 +60,8 @@ def mesh_transfer(assembly: Assembly, spots: Spots) -> MeshTransfer:
         mine = np.array([p == name for p in spots.parts])
         p = assembly.part(name)
         if (assembly.shells.part == p).any():
-            feet = ShellSurface.of(assembly, name).closest_points(spots.points[mine])
-            rows[mine], weights[mine] = feet.nodes, feet.weight
+            closest = ShellSurface.of(assembly, name).closest_points(spots.points[mine])
+            rows[mine], weights[mine] = closest.nodes, closest.weight
         else:
             rows[mine] = nearest_rows(assembly, p, spots.points[mine])[:, None]
             weights[mine] = [1.0, 0.0, 0.0]

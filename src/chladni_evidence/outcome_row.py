@@ -164,8 +164,8 @@ def _gain(d: Row) -> float | None:
     before, after = held.get("Q_calibrated"), held.get("Q_with_effect")
     if before is None or after is None or not d.get("effects"):
         return None
-    way = before - (held.get("Q_floor") or 0.0)
-    return float((before - after) / way) if way > 0 else None
+    possible = before - (held.get("Q_floor") or 0.0)
+    return float((before - after) / possible) if possible > 0 else None
 
 
 def _covered(d: Row, truth: Row) -> dict[str, list[int]]:

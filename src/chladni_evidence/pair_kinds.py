@@ -65,22 +65,22 @@ def together(
     ModelError
         If two of them find no separate places.
     """
-    made, told, least = Hidden(site.article, {}), list[dict[str, Any]](), np.inf
+    made, truths, least = Hidden(site.article, {}), list[dict[str, Any]](), np.inf
     for k, name in enumerate(members(kind)):
         for draw in range(DRAWS):
             own = [seed, k, draw, *name.encode()]
             alone, moved, size = sized(name, own)
-            if _apart(site, alone.truth, told):
+            if _apart(site, alone.truth, truths):
                 break
         else:
             raise ModelError(f"no place for {name} apart from the others of {kind}")
         there = replace(site, article=made.article)
         made = _both(made, HIDDEN[name](there, np.random.default_rng(own), size))
-        told.append(
+        truths.append(
             {"effect": catalogued(name), **alone.truth, "size": size, "moved_decades": moved}
         )
         least = min(least, moved)
-    return made, told, least
+    return made, truths, least
 
 
 def _apart(site: Site, truth: dict[str, Any], others: list[dict[str, Any]]) -> bool:

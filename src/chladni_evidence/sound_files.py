@@ -286,16 +286,16 @@ def _write_scans(folder: Path) -> None:
     packed["at"] = corners[faces]
     head = b"plate".ljust(80) + (12).to_bytes(4, "little")
     (folder / "packed.stl").write_bytes(head + packed.tobytes())
-    told = [*("element vertex 8", "property float x", "property float y", "property float z")]
-    told += ["element face 12", "property list uchar int vertex_indices", "end_header", ""]
+    header = [*("element vertex 8", "property float x", "property float y", "property float z")]
+    header += ["element face 12", "property list uchar int vertex_indices", "end_header", ""]
     rows = [*vertices, *(f"3 {a} {b} {c}" for a, b, c in faces), ""]
-    plain = "\n".join(["ply", "format ascii 1.0", *told]) + "\n".join(rows)
+    plain = "\n".join(["ply", "format ascii 1.0", *header]) + "\n".join(rows)
     (folder / "scan.ply").write_text(plain)
     counted = np.zeros(12, np.dtype([("n", "u1"), ("face", "<i4", 3)]))
     counted["n"], counted["face"] = 3, faces
     raw = corners.astype("<f4").tobytes() + counted.tobytes()
-    told = ["ply", "format binary_little_endian 1.0", *told]
-    (folder / "packed.ply").write_bytes("\n".join(told).encode() + raw)
+    header = ["ply", "format binary_little_endian 1.0", *header]
+    (folder / "packed.ply").write_bytes("\n".join(header).encode() + raw)
     named = [f"v {v}" for v in vertices] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
     (folder / "scan.obj").write_text("\n".join([*named, ""]))
 

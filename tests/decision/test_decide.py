@@ -260,7 +260,7 @@ def test_an_effect_that_pays_a_part_is_perhaps_there_as_well():
     other = replace(together("set 0", PART, TWO)[0], members=("crack", "suspension"))
     sets = [(other, (FOR, FOR), together("set 0", PART, TWO)[2]), together("set 1", PAID, TWO)]
     steps = decision(table(*SINGLES, sets=sets)).steps
-    assert [(s.key, s.member) for s in steps if s.reason is R.PERHAPS_BESIDE] == [("set 0", 1)]
+    assert [(s.key, s.member) for s in steps if s.reason is R.PERHAPS_PRESENT] == [("set 0", 1)]
 
 
 @pytest.mark.parametrize(

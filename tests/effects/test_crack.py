@@ -65,7 +65,7 @@ def test_lines_beside_one_are_moved_turned_and_stretched():
     moved = lines.moved(line)
 
     def ends(some):
-        half = 0.5 * 0.25 * 0.4 * some.times * some.way
+        half = 0.5 * 0.25 * 0.4 * some.times * some.direction
         return np.sort([lines.middle[some.through] @ TOWARDS + s * half @ TOWARDS for s in (-1, 1)])
 
     longer = [m for m in moved if m.times > line.times]
@@ -74,8 +74,8 @@ def test_lines_beside_one_are_moved_turned_and_stretched():
     assert (np.abs(shift).min(axis=1) <= 0.005 + 1e-9).sum() == 2  # one end stays
     assert (np.abs(shift).max(axis=1) > 0.01).all()
     assert any(m.times < line.times for m in moved)
-    assert any(np.abs(m.way @ TOWARDS) < 0.99 for m in moved)
-    beside = [m for m in moved if m.times == line.times and m.way @ TOWARDS > 1 - 1e-12]
+    assert any(np.abs(m.direction @ TOWARDS) < 0.99 for m in moved)
+    beside = [m for m in moved if m.times == line.times and m.direction @ TOWARDS > 1 - 1e-12]
     away = [np.linalg.norm(lines.middle[m.through] - lines.middle[line.through]) for m in beside]
     assert len(away) >= 4
     assert max(away) < 0.02

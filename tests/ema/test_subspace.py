@@ -10,7 +10,7 @@ from chladni.ema.identification import evaluate, identify, kept_lines, pole_data
 from chladni.ema.mode_indicators import cmif, mif
 from chladni.ema.out_of_band_poles import outside
 from chladni.ema.pole_fitting import polish
-from chladni.ema.pole_search import with_those_beside
+from chladni.ema.pole_search import with_outer_poles_if_close
 from chladni.ema.pole_selection import Rule
 from chladni.ema.stabilisation import ghosts, prominence, stabilisation
 from chladni.errors import LabelError
@@ -126,5 +126,5 @@ def test_poles_beside_the_band_take_none_away_that_was_picked() -> None:
     own = found.poles[found.inside] / omega_max
     idle = 0.5 * (np.abs(own[4]) + np.abs(own[5])) * (-0.01 + 1j)
     alone = polish(data, np.append(own, idle), 0.1, iterations=0)
-    fit, _ = with_those_beside(data, alone, Rule(data.y.shape[1], len(data.s)))
+    fit, _ = with_outer_poles_if_close(data, alone, Rule(data.y.shape[1], len(data.s)))
     assert (~outside(data, fit.p)).sum() == len(own) + 1

@@ -12,7 +12,7 @@ from chladni.effects.extra_support import ExtraSupport
 from chladni.updating.adequacy import LEAST_P, FitTest
 from chladni.updating.damping_scatter import LOG_SD, SCATTER, ModalDamping
 from chladni.updating.hypothesis_fit import HypothesisFit
-from chladni.updating.local_damping_test import heard_of_damping, shifted
+from chladni.updating.local_damping_test import damping_test_along_effect, shifted
 from chladni.updating.reduced_model import evaluate
 
 FLEXIBLE = 20.0  # Hz, below all modes of the plate that bend it
@@ -68,7 +68,7 @@ def test_modes_damped_as_much_as_they_give_are_said(deep):
     frequency, fall = shifted(deep, FLEXIBLE)
     n = int((frequency < 400).sum())
     lossy = damping(frequency[:n], 0.005 + 0.5 * 0.6 * fall[:n])
-    found = heard_of_damping(FITS, deep, lossy)
+    found = damping_test_along_effect(FITS, deep, lossy)
     assert not found.passes
     assert "crack" in found.what
     assert "another level" in found.what
@@ -86,11 +86,13 @@ def test_what_holds_and_dissipates_is_no_spring(supported):
     share = -shift[kept]
     assert (share > -1e-9).all()  # Rayleigh: without a spring no mode has more energy than with it
     assert 0.05 < share.max() <= 1
-    found = heard_of_damping(FITS, supported, damping(frequency[kept], 0.005 + 0.5 * 0.8 * share))
+    found = damping_test_along_effect(
+        FITS, supported, damping(frequency[kept], 0.005 + 0.5 * 0.8 * share)
+    )
     assert not found.passes
     assert "extra-support" in found.what
     assert "foam or rubber" in found.what
-    assert heard_of_damping(
+    assert damping_test_along_effect(
         FITS, supported, damping(frequency[kept], np.full(len(kept), 0.005))
     ).passes
 
@@ -100,9 +102,9 @@ def test_evenly_or_elsewhere_damped_modes_are_not(deep):
     n = int((frequency < 400).sum())
     rng = np.random.default_rng(5)
     scattered = 0.005 * np.exp(SCATTER * rng.normal(size=n))
-    assert heard_of_damping(FITS, deep, damping(frequency[:n], scattered)).passes
+    assert damping_test_along_effect(FITS, deep, damping(frequency[:n], scattered)).passes
     elsewhere = 0.005 + 0.3 * (fall[:n].max() - fall[:n])
-    assert heard_of_damping(FITS, deep, damping(frequency[:n], elsewhere)).passes
+    assert damping_test_along_effect(FITS, deep, damping(frequency[:n], elsewhere)).passes
 
 
 def test_low_modes_are_heard_however_far_a_basis_reaches(deep):
@@ -115,8 +117,8 @@ def test_low_modes_are_heard_however_far_a_basis_reaches(deep):
 
 def test_damping_of_foreign_poles_and_of_few_is_not_heard(deep):
     foreign = damping(np.linspace(1e4, 2e4, 8), np.geomspace(0.001, 0.2, 8))
-    assert heard_of_damping(FITS, deep, foreign) is FITS
-    assert heard_of_damping(FITS, deep, None) is FITS
+    assert damping_test_along_effect(FITS, deep, foreign) is FITS
+    assert damping_test_along_effect(FITS, deep, None) is FITS
 
 
 def test_p_is_uniform_where_damping_scatters_as_believed():

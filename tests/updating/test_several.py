@@ -318,5 +318,5 @@ def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monk
     monkeypatch.setattr(diagnosing, "adequacy", lambda *given, **more: fits)
     quiet = Diagnosis(null, null, null, (lead,), "nothing missing")
     problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
-    found = diagnosing._searched_beside(problem, quiet, lambda text, share: None)
+    found = diagnosing._with_sets_of_effects(problem, quiet, lambda text, share: None)
     assert (found.verdict, found.sets) == ("nothing missing", ())

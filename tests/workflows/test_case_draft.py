@@ -81,7 +81,7 @@ def test_units_that_no_material_bears_out_are_told(deck):
 
 
 def ways(made):
-    return {d.label: d.way for d in made.dofs}
+    return {d.label: d.matched_by for d in made.dofs}
 
 
 def test_by_number_where_the_file_has_no_places(deck, frf, tmp_path):

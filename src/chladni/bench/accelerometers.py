@@ -18,7 +18,7 @@ class AccelerometerType:
     gain_sd, gain_most : of the sensitivity, relative; "less than 3 %", section 4.2.2.3
     tilt_sd : from the direction it should have [rad]
     place_sd : from the place it should have, each way in the sheet [m]
-    beside : how far from the gauge the one at the driving point is glued [m], section 4.2.3.3
+    drive_offset : distance of the one at the drive point from the gauge [m], section 4.2.3.3
     """
 
     mass: float = 0.005
@@ -30,7 +30,7 @@ class AccelerometerType:
     gain_most: float = 0.03
     tilt_sd: float = 0.0175
     place_sd: float = 0.0015
-    beside: float = 0.015
+    drive_offset: float = 0.015
 
 
 def drawn_gains(kind: AccelerometerType, n: int, rng: np.random.Generator) -> np.ndarray:

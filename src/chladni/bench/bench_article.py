@@ -32,7 +32,7 @@ class BenchArticle:
     output_labels, input_label  as 412:+Z
     base : (r,)                 on a shaker table: load of a unit acceleration of the supports on
                                 the modes [√kg]; none elsewhere
-    carried, mounts_carried : (n_out,), (n_out, 3)  what outputs and mounts do when nothing deforms
+    with_base, mounts_with_base : (n_out,), (n_out, 3)  rigid motion of outputs and mounts
     """
 
     name: str
@@ -51,8 +51,8 @@ class BenchArticle:
     channels: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gains: np.ndarray = field(default_factory=lambda: np.zeros(0))
     base: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    carried: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    mounts_carried: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    with_base: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    mounts_with_base: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         r, n = len(self.frequency), len(self.output_labels)

@@ -137,8 +137,8 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
     load, P, through = np.zeros((n, 1)), [np.zeros((1, n)) for _ in range(3)], np.ones((1, 1))
     if article.on_table:
         load = over(article.base[None]).T
-        carried = np.repeat(each, 3) * article.mounts_carried.ravel()
-        load -= (carried @ mounts)[:, None]
+        with_base = np.repeat(each, 3) * article.mounts_with_base.ravel()
+        load -= (with_base @ mounts)[:, None]
     elif setup.shaker is not None:
         load[-1], through = 1.0, np.zeros((1, 1))
         P = _shake(m, over(article.drive), setup.shaker)
@@ -156,7 +156,7 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
     whole = np.zeros((len(at), push.shape[1]))
     whole[0, 0] = through[0, 0]
     if article.on_table:
-        whole[1 : 1 + len(felt), 0] = article.carried
+        whole[1 : 1 + len(felt), 0] = article.with_base
     model = by_poles((m.M, m.C, m.K), push, (at, speed, force), whole)
     return BenchRig(article, setup, _through_sensors(model, setup, len(article.outputs)))
 

@@ -11,7 +11,7 @@ from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
 
-_WAY = re.compile(r"[+-]?[XYZ]|N", re.IGNORECASE)  # of a label, behind its last colon
+_DIRECTION = re.compile(r"[+-]?[XYZ]|N", re.IGNORECASE)  # of a label, behind its last colon
 _SAME = 0.7  # cosine: directions farther apart are two
 
 
@@ -27,12 +27,14 @@ def ways_said(made: Assembly, found: MeasuredDofs, tabled: Iterable[str]) -> lis
     own = {
         k: direction(label, label)
         for k, label in enumerate(found.labels)
-        if label in known and ":" in label and _WAY.fullmatch(label.rpartition(":")[2].strip())
+        if label in known
+        and ":" in label
+        and _DIRECTION.fullmatch(label.rpartition(":")[2].strip())
     }
-    across = any(way is None for way in own.values())
+    across = any(axis is None for axis in own.values())
     normal = surface_normals(made, found) if across else np.zeros_like(found.directions)
     other = [
-        found.labels[k] for k, way in own.items() if _apart(way, found.directions[k], normal[k])
+        found.labels[k] for k, axis in own.items() if _apart(axis, found.directions[k], normal[k])
     ]
     if not other:
         return []

@@ -187,8 +187,8 @@ def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
     if "\0" in name:
         raise FileError(f"{section.at(key)} = {name[:60]!r} is not a file name")
     path = section.file.parent / name
-    way = Path(os.path.normpath(name))
-    if not outside and (way.is_absolute() or ".." in way.parts):
+    normal_path = Path(os.path.normpath(name))
+    if not outside and (normal_path.is_absolute() or ".." in normal_path.parts):
         raise FileError(
             f"{section.at(key)} = {name!r} leads out of the folder of the case; copy the file "
             "into it, or write outside = true under [model]"

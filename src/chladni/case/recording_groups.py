@@ -37,10 +37,10 @@ def described(
         raise FileError(f"{found[1].at('file')} = {file!r} is described twice")
     if not found:
         return list(read)
-    return [_told(found[0], r) for r in read]
+    return [_with_stated_words(found[0], r) for r in read]
 
 
-def _told(section: TomlSection, r: Recording) -> Recording:
+def _with_stated_words(section: TomlSection, r: Recording) -> Recording:
     article, state = section.text("article") or r.article, section.text("state") or r.state
     level = section.number("level", low=0.0)
     for word, said, own in (("article", article, r.article), ("level", level, r.level)):

@@ -89,18 +89,18 @@ def _spoken(
     node = label.partition(":")[0].strip()
     if node != "base" and not (node.isdecimal() and node.isascii()):
         raise LabelError(f"{where}: {label!r} names no grid; give its place in sensors.csv")
-    way = direction(label, f"{where}: label {label!r}")
+    vector = direction(label, f"{where}: label {label!r}")
     if node == "base":
-        return Sensor(label, None, direction=way)
+        return Sensor(label, None, direction=vector)
     id = int(node)
     at = np.flatnonzero((made.ids == id) & (not elsewhere or id not in nodes))
-    if way is not None and id in axes:
-        way = way @ axes[id]
-    elif way is not None and len(at) and made.axes is not None:
-        way = way @ made.axes[at[0]]
+    if vector is not None and id in axes:
+        vector = vector @ axes[id]
+    elif vector is not None and len(at) and made.axes is not None:
+        vector = vector @ made.axes[at[0]]
     if not len(at) and id in nodes:
-        return Sensor(label, None, nodes[id], way)
-    return Sensor(label, id, direction=way)
+        return Sensor(label, None, nodes[id], vector)
+    return Sensor(label, id, direction=vector)
 
 
 def _off_said(made: Assembly, role: Role, given: list[np.ndarray]) -> list[str]:
@@ -202,8 +202,8 @@ def _place(
     if sensor.grid is None:
         return _free(made, sensor, where)
     row = grid_row(made, sensor.grid, where)
-    way = _normal(made, row, where) if sensor.direction is None else sensor.direction
-    return sensor.grid, made.points[row], way, sensor
+    vector = _normal(made, row, where) if sensor.direction is None else sensor.direction
+    return sensor.grid, made.points[row], vector, sensor
 
 
 def _base(made: Assembly, sensor: Sensor, where: str) -> np.ndarray:
@@ -233,12 +233,12 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
             f"{where}: its place ({named(place.tolist())}) m is {away:.3g} m from the structure, "
             f"which is {size:.3g} m across; places are in metres, basic frame"
         )
-    way = sensor.direction if sensor.direction is not None else normal
-    if way is None:
+    vector = sensor.direction if sensor.direction is not None else normal
+    if vector is None:
         raise LabelError(
             f"{where}: it has no shell and so no normal; give +X, +Y, +Z or nx, ny, nz"
         )
-    return grid, place if grid == 0 else made.points[row], way, sensor
+    return grid, place if grid == 0 else made.points[row], vector, sensor
 
 
 def _normal(made: Assembly, row: int, where: str) -> np.ndarray:

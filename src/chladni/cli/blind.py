@@ -63,10 +63,10 @@ def make(
     from chladni_evidence.evidence_sets import PURPOSES, chosen, of_sizes, seed_range
 
     by, why = _one_of("--recorder", recorder, RECORDERS), _one_of("--purpose", purpose, PURPOSES)
-    asked = chosen(set_name, seed_range(seeds), _names(kinds), _names(structures))
-    asked = of_sizes(asked, _sizes(sizes))
+    orders = chosen(set_name, seed_range(seeds), _names(kinds), _names(structures))
+    orders = of_sizes(orders, _sizes(sizes))
     with _kept():
-        make([replace(o, recorder=by) for o in asked], out, why, set_name, workers, say)
+        make([replace(o, recorder=by) for o in orders], out, why, set_name, workers, say)
 
 
 def run(

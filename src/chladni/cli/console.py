@@ -199,7 +199,7 @@ def watched() -> Iterator[Progress]:
     stage = [("at work", 0.0)]
     one, done = console(), threading.Event()
 
-    def told(what: str, fraction: float) -> None:
+    def report_progress(what: str, fraction: float) -> None:
         if what != stage[0][0]:
             one.aside(what)
         stage[0] = (what, fraction)
@@ -216,6 +216,6 @@ def watched() -> Iterator[Progress]:
         if not sys.stderr.isatty() and not one.verbose:
             threading.Thread(target=speak, daemon=True).start()
         try:
-            yield told
+            yield report_progress
         finally:
             done.set()

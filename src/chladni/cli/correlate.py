@@ -34,7 +34,7 @@ def run(
     """
     with started("correlate", source, out) as job:
         if modes is not None:
-            _beside(job, source, modes, units, allow or [])
+            _with_other_modes(job, source, modes, units, allow or [])
             return
         if units is not None or allow:
             raise FileError("--units and --allow apply to a bare deck, which needs --modes")
@@ -56,7 +56,9 @@ def _with_test(job: Run, source: Path) -> None:
     job.show(correlation_page(job.folder, case, found))
 
 
-def _beside(job: Run, source: Path, modes: Path, units: str | None, allow: list[str]) -> None:
+def _with_other_modes(
+    job: Run, source: Path, modes: Path, units: str | None, allow: list[str]
+) -> None:
     from ..report.other_modes_page import other_modes_page
 
     model = load_model(source, units, allow, command="correlate")

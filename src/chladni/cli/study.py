@@ -122,18 +122,18 @@ def _written(source: Path, place: Path, found: ParameterStudy) -> None:
 
 
 def _both(one: Progress, other: Progress) -> Progress:
-    def told(what: str, share: float) -> None:
+    def report_progress(what: str, share: float) -> None:
         one(what, share)
         other(what, share)
 
-    return told
+    return report_progress
 
 
 def _tenths() -> Progress:
     """A line per tenth of the samples, and one of a wait, where there is no terminal for a bar."""
     said = {-1}
 
-    def told(what: str, share: float) -> None:
+    def report_progress(what: str, share: float) -> None:
         tenth = int(10 * share)
         if what == NO_WORKER:
             say(what)
@@ -141,4 +141,4 @@ def _tenths() -> Progress:
             said.add(tenth)
             say(what)
 
-    return told
+    return report_progress

@@ -50,7 +50,7 @@ def _named(case: JudgedTable) -> Decision:
     decision = _first(case)
     if not case.table.enough and case.rules.enough_data:
         return _too_few(case, decision)
-    alone = _borne_by_all_data(case, decision)
+    alone = _supported_by_all_data(case, decision)
     sets = case.table.sets if case.rules.sets else ()
     found, refusals = largest_named(case, alone, [s for s in sets if s.pays])
     if found is not None:
@@ -59,7 +59,7 @@ def _named(case: JudgedTable) -> Decision:
     if decision.named:
         decision = _with_lead_refined(case, alone, decision, [s for s in sets if not s.pays])
     if decision.refused and decision.whole is None and case.rules.alternatives:
-        decision = _rivals_heard(case, decision)
+        decision = _alternatives_tested(case, decision)
     return decision
 
 
@@ -85,7 +85,7 @@ def _too_few(case: JudgedTable, decision: Decision) -> Decision:
     )  # fmt: skip
 
 
-def _borne_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
+def _supported_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
     """Name the leader if all data together support it, held-out data included.
 
     A fifth of a dozen natural frequencies is a large part of the information. Held-out sensors and
@@ -103,8 +103,8 @@ def _borne_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
     if not case.evidence_suffices(gain, lead.held_out_votes(), decision.due, poles):
         return decision
     done = tuple(s for s in decision.steps if s.key != NULL)  # without the steps on calibration
-    borne = replace(decision, steps=(*done, Step(Reason.BORNE_BY_ALL, lead.key)))
-    return tested(case, borne, lead)
+    supported = replace(decision, steps=(*done, Step(Reason.SUPPORTED_BY_ALL, lead.key)))
+    return tested(case, supported, lead)
 
 
 def _with_lead_refined(
@@ -142,7 +142,7 @@ def _with_lead_refined(
     return replace(usual, steps=steps(usual, Step(Reason.USUAL_LEFT, lead.key), *refusals))
 
 
-def _rivals_heard(case: JudgedTable, refused: Decision) -> Decision:
+def _alternatives_tested(case: JudgedTable, refused: Decision) -> Decision:
     """Name the first rival that passes every test, after the leader was refused.
 
     The evidence of the fitted data orders the explanations. Held-out data, the residual and the
@@ -157,15 +157,15 @@ def _rivals_heard(case: JudgedTable, refused: Decision) -> Decision:
         gain = table.gain(alternative)
         if gain <= refused.due or ahead - gain > case.rules.running * refused.due:
             break
-        asked = _asked_next(case, refused, alternative, over)
-        why = _against(case, refused, asked) if asked.named else asked.reason
+        following = _decided_next(case, refused, alternative, over)
+        why = _against(case, refused, following) if following.named else following.reason
         if why is None:
-            return asked
+            return following
         over = (*over, (alternative.name, why))
     return replace(refused, passed_over=over)
 
 
-def _asked_next(
+def _decided_next(
     case: JudgedTable, refused: Decision, alternative: Row, over: tuple[tuple[str, Reason], ...]
 ) -> Decision:
     """Test a rival, placed in front of the explanations that were passed over."""
@@ -185,15 +185,15 @@ def _asked_next(
     return apply_held_out(case, led, case.rules.most_left) if led.named else led
 
 
-def _against(case: JudgedTable, refused: Decision, asked: Decision) -> Reason | None:
+def _against(case: JudgedTable, refused: Decision, following: Decision) -> Reason | None:
     """Return the reason that refutes a rival which passed its own tests, or None.
 
     The leader refutes it by the required gain on fitted and held-out data, as it refutes
     calibration alone. Modal damping that follows the leader's change refutes a lossless rival.
     """
     table, rules = case.table, case.rules
-    (lead, *_), (alternative, *_) = case.rows(refused.order), case.rows(asked.order)
-    news = [0.0 if d.votes is None else d.votes.news for d in (refused, asked)]
+    (lead, *_), (alternative, *_) = case.rows(refused.order), case.rows(following.order)
+    news = [0.0 if d.votes is None else d.votes.news for d in (refused, following)]
     if table.gain(lead) + news[0] - table.gain(alternative) - news[1] > rules.refuted * refused.due:
         return Reason.REFUTED
     return Reason.DAMPING if table.after(alternative, lead) < rules.fits_damping else None

@@ -83,21 +83,21 @@ def apply_held_out(case: JudgedTable, decision: Decision, most_left: float) -> D
     decision = replace(decision, votes=votes)
     voted = case.evidence_suffices(gain, votes, due, table.poles)
     calibrated, held_out = left.held_out
-    borne = voted and not held_out > rules.harm * calibrated
+    supported = voted and not held_out > rules.harm * calibrated
     faint = gain < rules.faint * due and held_out > calibrated
-    if borne and not (faint or _leaves_more(row, most_left)):
+    if supported and not (faint or _leaves_more(row, most_left)):
         return replace(
             decision, verdict=row.verdict, reason=Reason.NAMED, named=True,
             steps=steps(decision, Step(Reason.HELD_OUT, row.key)),
         )  # fmt: skip
     why = Reason.AGAINST if any(g < 0 for g in votes.given) else Reason.TOO_LITTLE
     if voted:
-        why = Reason.WORSE if faint or not borne else Reason.LEAVES_MORE
+        why = Reason.WORSE if faint or not supported else Reason.LEAVES_MORE
     refused = replace(
         decision, reason=why, named=False, steps=steps(decision, Step(why, row.key)), one_of=()
     )
     together = gain + votes.news
-    if together > rules.all_data * due and not borne:
+    if together > rules.all_data * due and not supported:
         by, gain = Reason.ALL_DATA, together
     elif gain > rules.conflict * due:
         by = Reason.WHAT_WAS_FITTED
@@ -119,5 +119,5 @@ def _leaves_more(row: Row, most: float) -> bool:
     if not (row.physics or row.channels):
         return False
     left = row.leaves()
-    asked = (left.held_out,) if row.channels else (left.fitted, left.held_out)
-    return all(with_it > most * calibrated for calibrated, with_it in asked)
+    compared = (left.held_out,) if row.channels else (left.fitted, left.held_out)
+    return all(with_it > most * calibrated for calibrated, with_it in compared)

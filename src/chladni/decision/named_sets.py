@@ -40,7 +40,7 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
         if not case.evidence_suffices(
             gain - lost, table.rows[whole.member(k)].held_out_votes(), whole.due
         ):
-            return Step(Reason.SET_REFUSED, whole.key, Reason.NOT_BORNE, k)
+            return Step(Reason.SET_REFUSED, whole.key, Reason.NOT_SUPPORTED, k)
         done.append(Step(Reason.HELD_OUT_OF_SET, whole.key, member=k))
     begun = replace(
         alone, order=(row.key, *alone.order), due=case.due(row, 1), steps=tuple(done), whole=whole
@@ -71,5 +71,5 @@ def _perhaps_of_set(case: JudgedTable, named: SetRow) -> tuple[Step, ...]:
     for other in case.table.sets:
         for k, (name, gain) in enumerate(zip(other.members, other.gains, strict=True)):
             if gain <= other.due and name not in named.members:
-                part[name] = Step(Reason.PERHAPS_BESIDE, other.key, member=k, names=named.members)
+                part[name] = Step(Reason.PERHAPS_PRESENT, other.key, member=k, names=named.members)
     return tuple(part.values())

@@ -26,17 +26,17 @@ class Reason(Enum):
     NOT_FITTED = auto()  # the second fit, on a refined basis, failed
     REFUTED = auto()  # by a leader that is refused itself
     DAMPING = auto()  # follows the change by the leader
-    NOT_BORNE = auto()  # a member of a set is not supported by held-out data
+    NOT_SUPPORTED = auto()  # a member of a set is not supported by held-out data
     BARELY_FITS = auto()  # a set, where one effect alone does not fit
     # intermediate steps
     TESTED = auto()  # against its own predictions
     RENEWED = auto()  # the fit was repeated on a refined basis
-    BORNE_BY_ALL = auto()  # all data together support the name
+    SUPPORTED_BY_ALL = auto()  # all data together support the name
     HELD_OUT = auto()  # held-out data do not refuse the name
     FOUND_TOGETHER = auto()
     HELD_OUT_OF_SET = auto()  # held-out data do not refuse a member of a set
     SET_REFUSED = auto()
-    PERHAPS_BESIDE = auto()  # an effect that reaches a part of its required gain
+    PERHAPS_PRESENT = auto()  # an effect that reaches a part of its required gain
     RIVAL_OF_MEMBER = auto()
     ALL_DATA = auto()  # refute calibration alone
     WHAT_WAS_FITTED = auto()  # refutes calibration alone

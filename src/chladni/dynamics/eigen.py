@@ -27,7 +27,7 @@ _ORTHONORMAL = 1e-8
 _RESIDUAL = 1e-5
 _LOOSE = 1e-6  # largest Ritz error of a returned mode (the error of frequencies is its square)
 _SHARP_SHARE = 1e-6  # of -1/σ: θ that one shift gives to ten digits
-_TOLD = 1e-13  # of it: θ below this are rounding
+_ROUNDING_OF_THETA = 1e-13  # of it: θ below this are rounding
 _FIRM = 1e-6  # of the median K_ii/M_ii: first shift of small systems
 _ROUNDING = 1e-12  # of the largest K_ii/M_ii: λ of a rigid motion due to rounding of K
 _EXTREME = 1e-2  # of the median K_ii/M_ii: upper limit of λ that counts as rounding
@@ -236,7 +236,7 @@ def _by_shifts(K: np.ndarray, M: np.ndarray, sigma: float, count: int, limit: fl
         sharp = int(np.sum(theta > _SHARP_SHARE))
         phi = _orthonormal(np.hstack([phi, X[:, :sharp] / np.sqrt(theta[:sharp])]), M)
         lam = np.r_[lam, sigma - sigma / theta[:sharp]]
-        sigma *= 1e-3 / max([_TOLD, *theta[sharp : sharp + 1]])
+        sigma *= 1e-3 / max([_ROUNDING_OF_THETA, *theta[sharp : sharp + 1]])
     return lam, phi
 
 

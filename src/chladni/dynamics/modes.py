@@ -63,12 +63,12 @@ class ModalModel:
         LabelError
             If a label has no row; the message names it and some existing ones.
         """
-        asked = np.array([parse(text) for text in labels], dtype=np.int64).reshape(-1, 3)
-        found = rows(asked[:, :2], self.dofs)
+        wanted = np.array([parse(text) for text in labels], dtype=np.int64).reshape(-1, 3)
+        found = rows(wanted[:, :2], self.dofs)
         if missing := [text for text, k in zip(labels, found, strict=True) if k < 0]:
             some = [f"{p}:{c}" for p, c in self.dofs[:6]]
             raise LabelError(f"no degree of freedom {missing}; there are (point:component) {some}")
-        return asked[:, 2:] * self.shapes[found]
+        return wanted[:, 2:] * self.shapes[found]
 
 
 def rigid_modes(modal: ModalModel) -> np.ndarray:

@@ -33,9 +33,9 @@ def with_residual_vectors(
     R = solve(load - M @ (phi @ (phi.T @ load)))
     R = R - phi @ (phi.T @ (M @ R))
     lam = (2 * np.pi * modal.frequency) ** 2
-    carried = ((phi.T @ load) ** 2 / (lam + _NEAR_STATIC * top)[:, None]).sum(axis=0)
+    represented = ((phi.T @ load) ** 2 / (lam + _NEAR_STATIC * top)[:, None]).sum(axis=0)
     energy = np.einsum("nk,nk->k", R, K @ R)
-    lam, R = _ritz(R[:, energy > _ROUNDING * carried], K, M, top)
+    lam, R = _ritz(R[:, energy > _ROUNDING * represented], K, M, top)
     return replace(
         modal,
         frequency=np.concatenate([modal.frequency, np.sqrt(lam) / (2 * np.pi)]),

@@ -35,7 +35,7 @@ PLACES = 48  # middles of lines, all over the sheets
 BEGUN = 12  # lines, far from each other, that are moved while they explain more
 TURNS = (-np.pi / 8, -np.pi / 16, np.pi / 16, np.pi / 8)
 STRETCHED = (0.7, 1.4)  # times its length
-BESIDE = 1.7  # of a shell's size: distance of its neighbours
+NEIGHBOUR_DISTANCE = 1.7  # of a shell's size: distance of its neighbours
 WORTH = 0.05  # least gain of a move in -2 ln posterior
 FOLLOWED = 2  # lines that are fitted
 STEPS, BETTER = 4, 0.5  # moves of a fitted line, and the least gain of each in -2 ln posterior
@@ -51,7 +51,7 @@ class Line:
     shells : (k,) int
     centre : (3,)        of these shells [m]
     part, through : int  its part, and the shell whose middle it goes through
-    way : (3,)           unit vector along it there
+    direction : (3,)     unit vector along it there
     times : float        its length, in units of the usual one
     """
 
@@ -59,7 +59,7 @@ class Line:
     centre: np.ndarray
     part: int
     through: int
-    way: np.ndarray
+    direction: np.ndarray
     times: float
 
 
@@ -90,14 +90,14 @@ class LineFinder:
         normal = cell_normals(assembly.points, shells.nodes)
         return cls(middle, normal, shells.part, np.sqrt(area), size)
 
-    def through(self, shell: int, way: np.ndarray, times: float) -> Line | None:
-        """The line through a shell's middle along ``way`` (3,), ``times`` the usual length.
+    def through(self, shell: int, direction: np.ndarray, times: float) -> Line | None:
+        """The line through a shell's middle along ``direction`` (3,), ``times`` the usual length.
 
         The line follows the sheet. On a coarse mesh it spans at least ``SHELLS`` shells. The result
-        is None if there are fewer, or if ``way`` leaves the sheet.
+        is None if there are fewer, or if ``direction`` leaves the sheet.
         """
         n = self.normal[shell]
-        flat = way - (way @ n) * n
+        flat = direction - (direction @ n) * n
         if np.linalg.norm(flat) < 0.5:
             return None
         along = unit(flat)
@@ -121,8 +121,8 @@ class LineFinder:
         for k in shells.tolist():
             u, v = tangents(self.normal[k])
             for angle in np.pi * np.arange(ANGLES) / ANGLES:
-                way = np.cos(angle) * u + np.sin(angle) * v
-                found += [self.through(k, way, times) for times in lengths]
+                direction = np.cos(angle) * u + np.sin(angle) * v
+                found += [self.through(k, direction, times) for times in lengths]
         return _different(found)
 
     def moved(self, line: Line) -> list[Line]:
@@ -131,18 +131,18 @@ class LineFinder:
         mine = np.flatnonzero(self.part == line.part)
         d = np.linalg.norm(self.middle[mine] - x, axis=1)
         found = [
-            self.through(int(j), line.way, line.times)
-            for j in mine[d <= BESIDE * self.width[k]]
+            self.through(int(j), line.direction, line.times)
+            for j in mine[d <= NEIGHBOUR_DISTANCE * self.width[k]]
             if j != k
         ]
-        across, half = np.cross(n, line.way), self._half(k, line.times)
-        turned = [(np.cos(a) * line.way + np.sin(a) * across, line.times) for a in TURNS]
-        stretched = [(line.way, line.times * f) for f in STRETCHED]
-        for way, times in (*turned, *stretched):
+        across, half = np.cross(n, line.direction), self._half(k, line.times)
+        turned = [(np.cos(a) * line.direction + np.sin(a) * across, line.times) for a in TURNS]
+        stretched = [(line.direction, line.times * f) for f in STRETCHED]
+        for direction, times in (*turned, *stretched):
             if SHORTEST <= times <= LONGEST:
-                shift = self._half(k, times) * way - half * line.way
+                shift = self._half(k, times) * direction - half * line.direction
                 middles = nearest_points(self.middle[mine], x + np.outer((-1, 0, 1), shift))
-                found += [self.through(int(j), way, times) for j in mine[middles]]
+                found += [self.through(int(j), direction, times) for j in mine[middles]]
         return _different(found)
 
 

@@ -339,8 +339,8 @@ class Effect:
         """
         prior = np.array([p.sd for p in self.parameters])
         with np.errstate(divide="ignore"):
-            told = np.maximum(1 / np.square(sd) - 1 / prior**2, 0.0)
-        return np.asarray(1 / np.sqrt(1 / prior**2 + told / WIDER**2))
+            information = np.maximum(1 / np.square(sd) - 1 / prior**2, 0.0)
+        return np.asarray(1 / np.sqrt(1 / prior**2 + information / WIDER**2))
 
     def location(self, x: np.ndarray) -> Location:
         """The place of the effect after a fit."""

@@ -120,17 +120,17 @@ def _across_beams(
     assembly = groups.structure.assembly
     points, shells = assembly.points, len(assembly.shells)
     nodes = groups.nodes[shells:, :2]
-    line, way = lines(points, nodes), unit(points[nodes[:, 1]] - points[nodes[:, 0]])
+    line, tangent = lines(points, nodes), unit(points[nodes[:, 1]] - points[nodes[:, 0]])
     taken = set(assembly.shells.nodes.ravel().tolist())
     found: list[tuple[int, np.ndarray, int, np.ndarray]] = []
     ends, beam = nodes.ravel(), np.repeat(np.arange(len(nodes)), 2)
     for at in alike(ends):
         row, has = int(ends[at[0]]), list[np.ndarray]()
         for k in beam[at] if row not in taken else []:
-            for d in tangents(way[k]):
+            for d in tangents(tangent[k]):
                 if all(abs(d @ other) < SAME for other in has):
                     has.append(d)
-                    found.append((row, d, int(line[k]), way[k]))
+                    found.append((row, d, int(line[k]), tangent[k]))
     if not found:
         return np.zeros(0, int), np.zeros((0, 3)), np.zeros(0, int), np.zeros((0, 3))
     row_of, across, line_of, along = (np.array(c) for c in zip(*found, strict=True))

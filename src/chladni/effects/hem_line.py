@@ -106,8 +106,8 @@ def _line(assembly: Assembly, group: int, rows: np.ndarray) -> HemLine | None:
     closed = gap < CLOSED * pitch
     along = np.gradient(middle, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    carried, part = _carriers(assembly), _part_of(assembly)
-    sides = tuple(_sides(part, carried, nodes) for nodes in solids.nodes[rows])
+    carriers, part = _carriers(assembly), _part_of(assembly)
+    sides = tuple(_sides(part, carriers, nodes) for nodes in solids.nodes[rows])
     if any(len(a) < 3 or len(b) < 3 for a, b in sides):
         return None
     s = np.concatenate([[0.0], np.cumsum(step)])
@@ -136,10 +136,10 @@ def _part_of(assembly: Assembly) -> np.ndarray:
 
 
 def _sides(
-    part: np.ndarray, carried: dict[int, np.ndarray], nodes: np.ndarray
+    part: np.ndarray, carriers: dict[int, np.ndarray], nodes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows of the grids to which a solid is attached, in its first and in its second part."""
-    rows = np.unique(np.concatenate([carried.get(int(n), np.array([n])) for n in nodes]))
+    rows = np.unique(np.concatenate([carriers.get(int(n), np.array([n])) for n in nodes]))
     mine = part[rows]
     known = np.unique(mine[mine >= 0])
     none = np.zeros(0, int)

@@ -32,7 +32,7 @@ LOWEST = 20.0  # highest spectral line over the lowest frequency tried
 TRIED = 14  # frequencies, evenly spaced in their logarithm; broadened peaks smooth the gaps
 PLACES = 60  # at which each is tried
 LEAST_MASS = 0.05  # of the typical mass: the least mass accepted
-CARRIED = 1e3  # times the spring: stiffness that holds the written mass in the plane of the sheet
+IN_PLANE = 1e3  # times the spring: stiffness that holds the written mass in the plane of the sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def with_oscillator(
     frame = np.stack([normal, *tangents(normal)])
     if np.isclose(np.abs(normal).max(), 1.0, rtol=0, atol=1e-6):
         frame = np.eye(3)
-    stiffness = np.where(np.abs(frame @ normal) > 0.5, k, CARRIED * k)
+    stiffness = np.where(np.abs(frame @ normal) > 0.5, k, IN_PLANE * k)
     masses, bushes, none = assembly.masses, assembly.bushes, np.zeros((1, 6))
     new_mass = Masses(
         np.append(masses.ids, int(masses.ids.max(initial=0)) + 1),

@@ -176,10 +176,10 @@ def kept_lines(
     if use is not None:
         keep &= use
     if keep.sum() < LEAST_LINES:
-        asked = "" if band is None else " between {:g} and {:g} Hz".format(*band)
+        in_band = "" if band is None else " between {:g} and {:g} Hz".format(*band)
         raise FileError(
-            f"{int(keep.sum())} lines{asked} are too few for identification; the recording covers "
-            f"{frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
+            f"{int(keep.sum())} lines{in_band} are too few for identification; the recording "
+            f"covers {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
         )
     return keep
 

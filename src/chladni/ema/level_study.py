@@ -114,8 +114,8 @@ def level_study(recordings: Sequence[AtLevel]) -> LevelStudy:
     """
     modes = modes_over_levels(recordings)
     found = [_studied(m) for m in modes]
-    told = [ModeStudy(m.mode, "overlapped") if _overlapped(m, found) else m for m in found]
-    return LevelStudy(tuple(told), _drifts(modes))
+    known = [ModeStudy(m.mode, "overlapped") if _overlapped(m, found) else m for m in found]
+    return LevelStudy(tuple(known), _drifts(modes))
 
 
 def _overlapped(one: ModeStudy, every: Sequence[ModeStudy]) -> bool:

@@ -15,7 +15,7 @@ from .pole_search import (
     chi_of,
     own_spread,
     with_noise_left,
-    with_those_beside,
+    with_outer_poles_if_close,
 )
 from .pole_search_by_parts import few_channels
 from .pole_selection import Rule, uncertainty
@@ -62,7 +62,7 @@ def edited(
     usual = float(np.median(-p.real / np.abs(p))) if len(p) else 0.01
     begun = np.array([f / f_max * (-usual + 1j) for f in pick])
     alone = polish(data, np.concatenate([p, begun]), rule.largest, iterations=6)
-    fit, slope = with_those_beside(data, alone, rule)
+    fit, slope = with_outer_poles_if_close(data, alone, rule)
     for f in pick:
         _nearest(fit.p, f, f_max)
     return _solution(data, fit, slope, stated)

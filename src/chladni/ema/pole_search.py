@@ -70,11 +70,11 @@ def selected(
     fit, slope = with_neighbours(data, fit, slope, rule)
     fit, _ = merge_duplicate_poles(data, fit, slope, rule)
     alone = paid(data, fit.p, rule)
-    found = with_those_beside(data, alone, rule)
+    found = with_outer_poles_if_close(data, alone, rule)
     return alone if found is alone else paid(data, found[0].p, rule)
 
 
-def with_those_beside(
+def with_outer_poles_if_close(
     data: PoleData, alone: tuple[PoleFit, PoleSystem], rule: Rule
 ) -> tuple[PoleFit, PoleSystem]:
     """Add poles outside the band if the residual is then close to the noise.

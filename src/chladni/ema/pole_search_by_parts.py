@@ -75,9 +75,9 @@ def searched_by_parts(
         step(len(parts))
     progress(f"identifying {size}: all bands together", SEARCH)
     lines, whole, whole_spread = _with_outer(data, _once(parts), rule, stated)
-    beside = outside(data, whole.p)
+    out_of_band = outside(data, whole.p)
     of_part = [
-        np.flatnonzero(~beside & (one.begin <= np.abs(whole.p)) & (np.abs(whole.p) < one.end))
+        np.flatnonzero(~out_of_band & (one.begin <= np.abs(whole.p)) & (np.abs(whole.p) < one.end))
         for one in parts
     ]
     fit, delta_chi2, spread = solve(data, whole.p)[0], whole.delta_chi2, np.array(whole_spread)

@@ -38,7 +38,7 @@ class BaseMotion:
         force = built.T.T @ (over_all_motions(built.assembly)[0] @ self.whole)
         return BaseMotion(self.whole, np.pad(self.free, ((0, more), (0, 0))), np.asarray(force))
 
-    def carried(self, rows: sp.csr_array) -> np.ndarray:
+    def moved_with_base(self, rows: sp.csr_array) -> np.ndarray:
         """Motion (m, k) of rows (m, n) in the rigid motion of the base."""
         return np.asarray(rows @ self.free[: rows.shape[1]])
 

@@ -120,14 +120,14 @@ def _solid(structure: Structure, a: Assembly, section: SolidSection, name: str) 
         if name == "rho":
             one = np.ones(len(group))
             A = solid.mass(X, one) if a.coupled_mass else solid.lumped_mass(X, one)
-            out = replace(out, M=out.M + _carried(structure, with_rotations(A), group.nodes))
+            out = replace(out, M=out.M + _assembled(structure, with_rotations(A), group.nodes))
             continue
         C, dC = (
             np.broadcast_to(c, (len(group), 6, 6))
             for c in (solid.elasticity(material), solid.elasticity_derivative(material, name))
         )
         A = solid.stiffness_derivative(X, C, dC, 0 if section.full else section.modes)
-        out = replace(out, K=out.K + _carried(structure, with_rotations(A), group.nodes))
+        out = replace(out, K=out.K + _assembled(structure, with_rotations(A), group.nodes))
     return out
 
 
@@ -146,8 +146,8 @@ def of_part(structure: Structure, part: int, name: str) -> Slope:
                                    for k, p in enumerate(a.parts)))  # fmt: skip
     M, _, K, _ = over_all_motions(a)
     found = {"E": {"K": K}, "rho": {"M": M}, "wall": {"K": K, "M": M}}[name]
-    carried = {matrix: congruence(structure.T, A) for matrix, A in found.items()}
-    return replace(_of(structure), **carried)
+    assembled = {matrix: congruence(structure.T, A) for matrix, A in found.items()}
+    return replace(_of(structure), **assembled)
 
 
 def of_lumps(structure: Structure, family: str, rows: Sequence[int]) -> Slope:
@@ -183,8 +183,8 @@ def by_bush(structure: Structure, row: int, direction: int, name: str = "K") -> 
         unit if name == "K" else zero, unit if name == "B" else zero, zero,
     )  # fmt: skip
     K, V, *_ = spring.matrices(_bare(structure.assembly, bushes=one))
-    carried = congruence(structure.T, K if name == "K" else V)
-    return replace(_of(structure), **{"K" if name == "K" else "V": carried})
+    assembled = congruence(structure.T, K if name == "K" else V)
+    return replace(_of(structure), **{"K" if name == "K" else "V": assembled})
 
 
 def by_mass(structure: Structure, row: int) -> Slope:
@@ -213,11 +213,11 @@ Matrices = tuple[np.ndarray, np.ndarray]
 
 def _of(structure: Structure, M: Matrices | None = None, K: Matrices | None = None) -> Slope:
     n = structure.T.shape[1]
-    found = [sp.csr_array((n, n)) if x is None else _carried(structure, *x) for x in (M, K)]
+    found = [sp.csr_array((n, n)) if x is None else _assembled(structure, *x) for x in (M, K)]
     return Slope(found[0], sp.csr_array((n, n)), found[1])
 
 
-def _carried(structure: Structure, A: np.ndarray, nodes: np.ndarray) -> sp.csr_array:
+def _assembled(structure: Structure, A: np.ndarray, nodes: np.ndarray) -> sp.csr_array:
     """Tᵀ A T of element matrices."""
     return congruence(structure.T, blocks(A, nodes, len(structure.assembly.points)))
 

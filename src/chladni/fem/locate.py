@@ -9,15 +9,15 @@ from .assemble import Structure
 
 
 def rows_at(
-    structure: Structure, feet: ClosestPoints, directions: np.ndarray, turning: bool = False
+    structure: Structure, closest: ClosestPoints, directions: np.ndarray, turning: bool = False
 ) -> sp.csr_array:
     """Translation of points of shells along directions (k, 3): rows over the free dofs (k, n).
 
     With ``turning``, rotation about the directions.
     """
     k = len(directions)
-    columns = 6 * feet.nodes[:, :, None] + (3 if turning else 0) + np.arange(3)
-    values = feet.weight[:, :, None] * directions[:, None, :]
+    columns = 6 * closest.nodes[:, :, None] + (3 if turning else 0) + np.arange(3)
+    values = closest.weight[:, :, None] * directions[:, None, :]
     pick = (values.ravel(), (np.repeat(np.arange(k), 9), columns.ravel()))
     return sp.csr_array(sp.csr_array(pick, shape=(k, structure.T.shape[0])) @ structure.T)
 

@@ -6,7 +6,7 @@ from scipy.linalg import orth
 from .assemble import Structure
 from .energy import rigid_motions
 
-_BESIDE = 0.05  # sine of the angle to the rigid motions of the whole; rounding is far below
+_NOT_RIGID = 0.05  # sine of the angle to the rigid motions of the whole; rounding is far below
 _FOLLOWS = 1e-3  # weight of a scalar point, so that the grid tied to it is reported instead
 
 
@@ -32,6 +32,6 @@ def loose_grids(structure: Structure, phi: np.ndarray) -> tuple[int, ...]:
         scale[made.scalar_points] *= _FOLLOWS
     scale = scale.reshape(-1, 1)
     u, R = (orth(scale * A) for A in (structure.T @ phi, rigid_motions(made)))
-    beside, sine, _ = np.linalg.svd(u - R @ (R.T @ u), full_matrices=False)
-    moved = np.linalg.norm(beside[:, sine > _BESIDE].reshape(len(made.ids), 6, -1), axis=1)
+    directions, sine, _ = np.linalg.svd(u - R @ (R.T @ u), full_matrices=False)
+    moved = np.linalg.norm(directions[:, sine > _NOT_RIGID].reshape(len(made.ids), 6, -1), axis=1)
     return tuple(int(made.ids[k]) for k in np.argmax(moved, axis=0))

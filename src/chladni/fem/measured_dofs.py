@@ -88,7 +88,7 @@ class MeasuredDofs:
             return self.rows(built)
         return sp.csr_array(-base_motion(built, self.directions).force.T)
 
-    def carried_by(self, inputs: "MeasuredDofs") -> np.ndarray:
+    def moved_with_base(self, inputs: "MeasuredDofs") -> np.ndarray:
         """Motion of each dof for a unit rigid motion of the base (k, n_in)."""
         return np.where(inputs.base, self.directions @ inputs.directions.T, 0.0)
 

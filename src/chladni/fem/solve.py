@@ -242,9 +242,9 @@ def base_response(
     s = 2j * np.pi * np.asarray(frequency, dtype=float)
     phi_in = (built.T.T @ load).T @ modal.shapes
     H = transfer(modal, pick @ modal.shapes, phi_in, s, residual=residual)
-    carried = motion_at(built.assembly, dofs, rigid)
+    rigid_motion = motion_at(built.assembly, dofs, rigid)
     outputs = tuple(f"{p}:+{COMPONENTS[c - 1]}" for p, c in np.asarray(dofs).tolist())
-    values = carried[None] + (s**2)[:, None, None] * H
+    values = rigid_motion[None] + (s**2)[:, None, None] * H
     return FRF(
         values,
         np.asarray(frequency),

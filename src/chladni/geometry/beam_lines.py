@@ -56,9 +56,9 @@ def lines(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     [0, 0, 1]
     """
     m = len(nodes)
-    way = unit(points[nodes[:, 1]] - points[nodes[:, 0]])
+    axis = unit(points[nodes[:, 1]] - points[nodes[:, 0]])
     ends = nodes.T.ravel()  # of beam k % m
-    away = np.concatenate([way, -way])  # from the end into the beam
+    away = np.concatenate([axis, -axis])  # from the end into the beam
     met = [np.zeros((0, 2), dtype=int)]
     for at in alike(ends):
         i, j = np.nonzero(np.triu(away[at] @ away[at].T < -STRAIGHT, 1))

@@ -112,10 +112,10 @@ class ShellSurface:
         for k in range(0, max(len(places), 1), AT_ONCE):
             some = slice(k, k + AT_ONCE)
             facing = None if normal is None else normal[some]
-            found.append(vars(self._feet(places[some], facing, cosine, near)).values())
+            found.append(vars(self._closest(places[some], facing, cosine, near)).values())
         return ClosestPoints(*(np.concatenate(column) for column in zip(*found, strict=True)))
 
-    def _feet(
+    def _closest(
         self, places: np.ndarray, normal: np.ndarray | None, cosine: float, near: int
     ) -> ClosestPoints:
         k, count = len(places), min(near, len(self.owner))

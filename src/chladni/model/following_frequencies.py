@@ -34,9 +34,9 @@ class Between:
         ends = np.unique(np.concatenate([[self.low], inside, [self.high]]))
         ends = np.log(ends) if self.logarithmic else ends
         x = np.linspace(-1, 1, self.count)
-        way = np.sign(x) * np.abs(x) ** (1 / self.cluster)
+        position = np.sign(x) * np.abs(x) ** (1 / self.cluster)
         a, b = ends[:-1, None], ends[1:, None]
-        f = np.append(((a + b) / 2 + (b - a) / 2 * way).ravel(), ends)
+        f = np.append(((a + b) / 2 + (b - a) / 2 * position).ravel(), ends)
         return np.exp(f) if self.logarithmic else f
 
 

@@ -91,9 +91,9 @@ def _rows(dofs: MeasuredDofs, role: str, masses: np.ndarray) -> list[list[str]]:
     for k, label in enumerate(dofs.labels):
         grid = int(dofs.grids[k])
         place = [""] * 3 if grid else [f"{x:.7g}" for x in dofs.points[k]]
-        way = [f"{x:.9g}" for x in dofs.directions[k]]
+        axis = [f"{x:.9g}" for x in dofs.directions[k]]
         own = [role, f"{masses[k]:.6g}", f"{dofs.sd[k]:.6g}"]
-        out.append([label, str(grid) if grid else "", *place, *way, *own])
+        out.append([label, str(grid) if grid else "", *place, *axis, *own])
     return out
 
 

@@ -36,17 +36,19 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
         blocks.append(_table(found.dofs))
     modes = ", ".join(number(f) for f in found.frequency)
     facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
-    told = [Section(f"For {who}", [Items(said)]) for who, said in _told(found.unused)]
+    unused_words = [
+        Section(f"For {who}", [Items(said)]) for who, said in _unused_words(found.unused)
+    ]
     sections = [
         Section("Possible errors", [Items(looks)] if looks else []),
         Section("Data and settings in use", [Facts(facts)]),
         Section("Sensors", blocks),
-        *told,
+        *unused_words,
     ]
     return PageParts(_lead(found), sections, (), [(path.name, "sensors on the mesh")])
 
 
-def _told(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
+def _unused_words(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
     """(commands, sentences): what is said to the same commands together, and once.
 
     >>> _told({"calibrate": ("a", "b"), "diagnose": ("a",), "study": ("b",)})

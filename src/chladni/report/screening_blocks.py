@@ -15,12 +15,12 @@ _WORD = {True: "in order", False: "check it", None: "not possible"}
 
 def screening_section(*screenings: Screening | None) -> Section:
     """Tabulate findings first, then every check; nothing without a screening."""
-    told = [s for s in screenings if s is not None and (s.checks or s.findings)]
-    if len(told) > SEVERAL:
-        return Section("The recordings", _of_several(told))
+    done = [s for s in screenings if s is not None and (s.checks or s.findings)]
+    if len(done) > SEVERAL:
+        return Section("The recordings", _of_several(done))
     blocks: list[Block] = []
-    for s in told:
-        of = s.name if len(told) > 1 else ""
+    for s in done:
+        of = s.name if len(done) > 1 else ""
         blocks.append(Items([s.sentence + "."]))
         if s.findings:
             blocks.append(Table(_FINDING, [_found(f) for f in s.findings], _FINDING, of))
@@ -36,30 +36,30 @@ def lead_of(screenings: Sequence[Screening]) -> str:
     return f"{len(screenings)} recordings; {of_all(screenings) or 'no fault found'}"
 
 
-def _of_several(told: Sequence[Screening]) -> list[Block]:
+def _of_several(done: Sequence[Screening]) -> list[Block]:
     """Return one table of findings and one of checks, with equal rows merged."""
-    blocks: list[Block] = [Items([(of_all(told) or "no fault found") + "."])]
+    blocks: list[Block] = [Items([(of_all(done) or "no fault found") + "."])]
     found: dict[tuple[str, ...], list[str]] = {}
     looked: dict[tuple[str, str], dict[str, list[str]]] = {}
-    for s in told:
+    for s in done:
         for f in s.findings:
             found.setdefault(_found(f), []).append(s.name)
         for c in s.checks:
             of = looked.setdefault((c.name, _WORD[c.passed]), {})
             of.setdefault(c.result, []).append(s.name)
     if found:
-        rows = [(which(names, told), *row) for row, names in found.items()]
+        rows = [(which(names, done), *row) for row, names in found.items()]
         blocks.append(Table(("in", *_FINDING), rows, ("in", *_FINDING)))
     rows = [
-        (name, named(results, 2), word, which([n for each in results.values() for n in each], told))
-        for (name, word), results in sorted(looked.items(), key=lambda one: _order(told, one[0][0]))
+        (name, named(results, 2), word, which([n for each in results.values() for n in each], done))
+        for (name, word), results in sorted(looked.items(), key=lambda one: _order(done, one[0][0]))
     ]
     return [*blocks, Table((*_CHECK, "in"), rows, (*_CHECK, "in"))]
 
 
-def _order(told: Sequence[Screening], name: str) -> int:
+def _order(done: Sequence[Screening], name: str) -> int:
     """Return the position of a check in the first recording that has it."""
-    return next(k for s in told for k, c in enumerate(s.checks) if c.name == name)
+    return next(k for s in done for k, c in enumerate(s.checks) if c.name == name)
 
 
 def _found(f: Finding) -> tuple[str, ...]:

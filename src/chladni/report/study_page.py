@@ -111,15 +111,15 @@ def _sensitivities(
 ) -> list[Block]:
     from ..view import study_plots
 
-    told = [s for s in found.sensitivities if np.isfinite(s.log_slope).any() and s.r2 >= _LAW]
+    lawful = [s for s in found.sensitivities if np.isfinite(s.log_slope).any() and s.r2 >= _LAW]
     blocks: list[Block] = []
-    if told:
+    if lawful:
         path = folder / "slopes.png"
-        values = np.stack([s.log_slope for s in told])
+        values = np.stack([s.log_slope for s in lawful])
         study_plots.slope_map(
             path,
             values,
-            [label(s.result) for s in told],
+            [label(s.result) for s in lawful],
             [_drawable(name) for name in found.names],
             "d ln result / d ln parameter",
         )

@@ -31,7 +31,7 @@ class _Worker:
 
     process: BaseProcess
     pipe: Connection
-    asked: deque[int] = field(default_factory=deque)
+    queued: deque[int] = field(default_factory=deque)
     ready: bool = False
 
 
@@ -49,7 +49,7 @@ def local_results(
     alive: dict[Connection, _Worker] = {}
     failed = 0
     try:
-        while waiting or any(worker.asked for worker in alive.values()):
+        while waiting or any(worker.queued for worker in alive.values()):
             while waiting and len(alive) < workers:
                 worker = _started(study)
                 alive[worker.pipe] = worker
@@ -68,7 +68,7 @@ def local_results(
                 if isinstance(found, Exception):
                     raise found
                 if found is not None:
-                    worker.asked.popleft()
+                    worker.queued.popleft()
                     yield found
                 worker.ready = True
                 _fed(worker, X, waiting)
@@ -105,20 +105,20 @@ def _work(pipe: Connection, study: StudyModel) -> None:
 def _fed(worker: _Worker, X: np.ndarray, waiting: deque[int]) -> None:
     """Samples for a worker; one that has just ended is seen by its pipe."""
     with suppress(OSError):
-        while waiting and len(worker.asked) < AHEAD:
+        while waiting and len(worker.queued) < AHEAD:
             worker.pipe.send((waiting[0], X[waiting[0]]))
-            worker.asked.append(waiting.popleft())
+            worker.queued.append(waiting.popleft())
 
 
 def _given_back(worker: _Worker, waiting: deque[int], ends: Counter[int]) -> Iterator[SampleResult]:
     """Samples of a worker that ended go to others; one that ended every worker has failed."""
     _ended(worker)
-    if worker.asked:
-        first = worker.asked[0]
+    if worker.queued:
+        first = worker.queued[0]
         ends[first] += 1
         if ends[first] >= TRIES:
-            yield SampleResult(worker.asked.popleft(), {}, ENDED)
-    waiting.extendleft(reversed(worker.asked))
+            yield SampleResult(worker.queued.popleft(), {}, ENDED)
+    waiting.extendleft(reversed(worker.queued))
 
 
 def _ended(worker: _Worker) -> None:

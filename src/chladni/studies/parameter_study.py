@@ -138,15 +138,15 @@ def study(
         refuse_many(workers)
     settings = settings or StudySettings()
     wanted = [vary_text(text) for text in vary]
-    if isinstance(source, Case) and any(asked.name == "suspension" for asked in wanted):
+    if isinstance(source, Case) and any(wanted_one.name == "suspension" for wanted_one in wanted):
         source = replace(source, given=tuple(g for g in source.given if g[1] != "hangers"))  # used
     model = as_model(source, "study")
     case = source if isinstance(source, Case) else None
     varied, notes = _varied(model, case, wanted)
     progress("the nominal model", 0.0)
-    asked = _asked(model, case, varied, settings)
+    wanted_one = _study_model(model, case, varied, settings)
     own = np.array([v.nominal for v in varied])
-    nominal = computed(asked, -1, own)
+    nominal = computed(wanted_one, -1, own)
     if nominal.why:
         raise FileError(
             f"{model.source}: the deck with its own values cannot be solved: {nominal.why}"
@@ -158,7 +158,7 @@ def study(
     made = _provenance(model, case, varied, settings)
     names = [v.name for v in varied]
     rows: dict[int, dict[str, Any]] = {}
-    stored = _store(out, asked, drawn, made, names, X)
+    stored = _store(out, wanted_one, drawn, made, names, X)
     with client_of(scheduler) as client, stored as store:
         before = dict(store.rows) if store else {}
         todo = [k for k in range(len(X)) if k not in before]
@@ -166,7 +166,7 @@ def study(
         clock = _Clock(len(X), len(before), progress)
         try:
             many = min(workers or affordable(len(todo), nominal.seconds), max(1, len(todo)))
-            for result in results(asked, X, todo, many, client, clock.told_of):
+            for result in results(wanted_one, X, todo, many, client, clock.report):
                 values = dict(zip(names, X[result.number].tolist(), strict=True))
                 row = store.keep(result, values) if store else row_of(result, values)
                 rows[result.number] = row
@@ -193,10 +193,10 @@ def _varied(
     units = units_of(model.deck, model.units) if model.deck and model.units else model.units
     if vary:
         found = [
-            of_effect(asked, model.assembly, case, units)
-            if asked.is_effect
-            else of_parts(asked, model.assembly, model.deck, units)
-            for asked in vary
+            of_effect(wanted_one, model.assembly, case, units)
+            if wanted_one.is_effect
+            else of_parts(wanted_one, model.assembly, model.deck, units)
+            for wanted_one in vary
         ]
         if case is not None and case.parameters:
             notes = [
@@ -248,7 +248,7 @@ def _places(varied: Sequence[Variation], own: np.ndarray) -> np.ndarray:
     return np.array(out)
 
 
-def _asked(
+def _study_model(
     model: Model, case: Case | None, varied: tuple[Variation, ...], settings: StudySettings
 ) -> StudyModel:
     """The study model of every sample: nominal modes, and the frequency up to which to solve."""
@@ -287,27 +287,27 @@ def _elastic(whole: Model, count: int) -> ModalModel:
 
 @contextmanager
 def _store(
-    out: Path | str | None, asked: StudyModel, drawn: Design, made: dict[str, Any],
+    out: Path | str | None, wanted_one: StudyModel, drawn: Design, made: dict[str, Any],
     names: list[str], X: np.ndarray,
 ) -> Iterator[StudyStore | None]:  # fmt: skip
     if out is None:
         yield None
         return
-    with opened_store(Path(out), _identity(asked), made, names, X) as store:
+    with opened_store(Path(out), _identity(wanted_one), made, names, X) as store:
         yield store
 
 
-def _identity(asked: StudyModel) -> dict[str, Any]:
+def _identity(wanted_one: StudyModel) -> dict[str, Any]:
     """Identity of a study: the contents of its files and settings, not names or folders."""
-    s, case = asked.settings, asked.case
+    s, case = wanted_one.settings, wanted_one.case
     measured: tuple[Any, ...] = ()
     if case is not None:
         measured = (*case.frfs[:1], case.outputs, case.inputs, case.band, case.exclude,
                     case.damping, case.gain_known, case.sensor_masses)  # fmt: skip
     rest = replace(s, samples=1, sampler="sobol", seed=0)
     return {
-        "model": fingerprint((asked.model.assembly, *measured)),
-        "parameters": fingerprint(asked.varied),
+        "model": fingerprint((wanted_one.model.assembly, *measured)),
+        "parameters": fingerprint(wanted_one.varied),
         "settings": fingerprint(rest),
         "sampler": s.sampler,
         "samples": s.samples,
@@ -350,14 +350,14 @@ def _kept(done: int, n: int, store: StudyStore | None) -> str:
 class _Clock:
     """Rate and remaining time of the samples of this run."""
 
-    def __init__(self, n: int, before: int, told: Progress) -> None:
-        self.n, self.before, self.told = n, before, told
+    def __init__(self, n: int, before: int, progress_to: Progress) -> None:
+        self.n, self.before, self.progress_to = n, before, progress_to
         self.begun, self.done = 0.0, before
-        told(f"{before} of {n} samples", before / n)
+        progress_to(f"{before} of {n} samples", before / n)
 
-    def told_of(self, what: str) -> None:
+    def report(self, what: str) -> None:
         """Report what the study waits for."""
-        self.told(what, self.done / self.n)
+        self.progress_to(what, self.done / self.n)
 
     def tick(self, done: int) -> None:
         """Report the number of finished samples, rate and remaining time."""
@@ -369,7 +369,7 @@ class _Clock:
         if new and spent > 0:
             rate = new / spent
             said += f", {per_time(rate)}, {remaining((self.n - done) / rate)} left"
-        self.told(said, done / self.n)
+        self.progress_to(said, done / self.n)
 
 
 def per_time(rate: float) -> str:

@@ -82,7 +82,7 @@ def of_case(
 
 
 def of_parts(
-    asked: VaryText, assembly: Assembly, deck: Deck | None, units: Units | None
+    request: VaryText, assembly: Assembly, deck: Deck | None, units: Units | None
 ) -> Variation:
     """The variation of a number of parts over a range.
 
@@ -94,16 +94,16 @@ def of_parts(
     FileError, LabelError
         One sentence that names the text, its error and the alternatives.
     """
-    free = free_parameter(_section(asked, assembly), assembly, deck)
-    if asked.grid is not None or free.field not in FIELDS:
-        raise asked.refused(
-            f'{asked.name} is a number of parts; write "{asked.name} of PART=LOW:HIGH"'
+    free = free_parameter(_section(request, assembly), assembly, deck)
+    if request.grid is not None or free.field not in FIELDS:
+        raise request.refused(
+            f'{request.name} is a number of parts; write "{request.name} of PART=LOW:HIGH"'
             if free.field in FIELDS
             else f"{free.field} is an effect, which no part has"
         )
     nominal, unit = _nominal(assembly, free, units is not None)
-    low, high = _range(asked, nominal, _scale(asked, assembly, free, units))
-    return Variation(_called(free), free, nominal, low, high, unit, asked.log)
+    low, high = _range(request, nominal, _scale(request, assembly, free, units))
+    return Variation(_called(free), free, nominal, low, high, unit, request.log)
 
 
 class _Wish(TomlSection):
@@ -113,12 +113,12 @@ class _Wish(TomlSection):
         return f"{self.name} ({key})"
 
 
-def _section(asked: VaryText, assembly: Assembly) -> TomlSection:
-    values: dict[str, Any] = {"field": asked.name}
-    if (parts := asked.parts) is not None:
+def _section(request: VaryText, assembly: Assembly) -> TomlSection:
+    values: dict[str, Any] = {"field": request.name}
+    if (parts := request.parts) is not None:
         whole = any(parts == p.name for p in assembly.parts)
         values["parts"] = [parts] if whole else [p.strip() for p in parts.split(",")]
-    return _Wish(Path("--vary"), f"--vary {asked.text!r}", values, {}, 0)
+    return _Wish(Path("--vary"), f"--vary {request.text!r}", values, {}, 0)
 
 
 def _called(free: FreeParameter) -> str:
@@ -145,16 +145,18 @@ def _turns(assembly: Assembly, free: FreeParameter) -> bool:
     return bool((springs > 3).any() or turned.any())
 
 
-def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Units | None) -> float:
+def _scale(
+    request: VaryText, assembly: Assembly, free: FreeParameter, units: Units | None
+) -> float:
     """Factor on a plain number; FileError where the members have no common value."""
     _, unit = _nominal(assembly, free, True)
-    if not asked.plain or (units is None and unit != "of the deck's"):
+    if not request.plain or (units is None and unit != "of the deck's"):
         return 1.0
     if free.field == "wall":
         return 1.0
     if unit == "of the deck's":
         values = np.unique(values_of(assembly, free))
-        raise asked.refused(
+        raise request.refused(
             f"{_called(free)} has {len(values)} different values in the deck; give a share of the "
             "deck's value, for example 90%:110%, or vary one part at a time"
         )
@@ -166,17 +168,17 @@ def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Unit
     }.get(free.field, 1.0)
 
 
-def _range(asked: VaryText, nominal: float, scale: float) -> tuple[float, float]:
+def _range(request: VaryText, nominal: float, scale: float) -> tuple[float, float]:
     """Ends (low, high) in the unit of the nominal value; FileError where they are far from it."""
-    low, high = asked.ends(scale, nominal)
-    reach = _REACH.get(asked.name, FARTHEST) if asked.log else FARTHEST
+    low, high = request.ends(scale, nominal)
+    reach = _REACH.get(request.name, FARTHEST) if request.log else FARTHEST
     for value in (low, high):
         if not 1 / reach <= value / nominal <= reach:
-            raise asked.refused(
+            raise request.refused(
                 f"{value / scale:g} is {value / nominal:.3g} times the deck's own "
                 f"{nominal / scale:g}; plain numbers are in the deck's units, a share of its "
                 "value is written 90%:110%"
-                + ("" if asked.log or asked.name not in _REACH else ", decades 1e2:1e6:log")
+                + ("" if request.log or request.name not in _REACH else ", decades 1e2:1e6:log")
             )
     return low, high
 

@@ -40,7 +40,7 @@ class VariedEffect(Variation):
 
 
 def of_effect(
-    asked: VaryText, assembly: Assembly, case: Case | None, units: Units | None
+    request: VaryText, assembly: Assembly, case: Case | None, units: Units | None
 ) -> VariedEffect:
     """The variation of an effect over a range, at a grid or at the place in the test of a case.
 
@@ -51,48 +51,50 @@ def of_effect(
     FileError
         One sentence that names the text, its error and the alternatives.
     """
-    kind, grid = family(asked.name), asked.grid
-    if asked.parts is not None:
-        raise asked.refused(f'{kind.name} is an effect; write "{kind.name} at GRID=LOW:HIGH"')
+    kind, grid = family(request.name), request.grid
+    if request.parts is not None:
+        raise request.refused(f'{kind.name} is an effect; write "{kind.name} at GRID=LOW:HIGH"')
     if grid is not None:
-        effect = _at(asked, kind, grid, assembly)
+        effect = _at(request, kind, grid, assembly)
     else:
-        effect = _placed(asked, kind, assembly, case)
+        effect = _placed(request, kind, assembly, case)
     scale, unit = _scale(effect.parameters[0].unit, units)
-    low, high = asked.ends(scale, None)
+    low, high = request.ends(scale, None)
     free = FreeParameter(kind.name, kind.name, () if grid is None else (str(grid),))
     name = kind.name if grid is None else f"{kind.name} at {grid}"
-    return VariedEffect(name, free, 0.0, low, high, unit, asked.log, effect)
+    return VariedEffect(name, free, 0.0, low, high, unit, request.log, effect)
 
 
-def _at(asked: VaryText, kind: Family, grid: int, assembly: Assembly) -> Effect:
+def _at(request: VaryText, kind: Family, grid: int, assembly: Assembly) -> Effect:
     """The effect at a grid; one with a direction acts across the sheet or beam."""
     where = _surroundings(assembly, None)
     if not issubclass(kind.effect, MovableAttachment) or kind.effect.own_dofs:
-        raise _refused(asked, kind)
+        raise _refused(request, kind)
     if grid not in where.grids.grids:
-        raise asked.refused(f"grid {grid} is on no shell and no beam of the deck")
+        raise request.refused(f"grid {grid} is on no shell and no beam of the deck")
     return kind.effect.near(where, where.grids.position(grid))
 
 
-def _placed(asked: VaryText, kind: Family, assembly: Assembly, case: Case | None) -> Effect:
+def _placed(request: VaryText, kind: Family, assembly: Assembly, case: Case | None) -> Effect:
     """The effect at the place given by the test of a case."""
     if kind.placed is None or kind.on_sheets:
         if issubclass(kind.effect, MovableAttachment) and not kind.effect.own_dofs:
-            raise asked.refused(f"no place; write {kind.name} at GRID=..., with a grid of the deck")
-        raise _refused(asked, kind)
+            raise request.refused(
+                f"no place; write {kind.name} at GRID=..., with a grid of the deck"
+            )
+        raise _refused(request, kind)
     every = kind.placed(_surroundings(assembly, case))
     if not every:
-        raise asked.refused(
+        raise request.refused(
             "its place is not known; a case with [test] sensors or hangers defines it"
         )
     if len(every[0].parameters) > 1:
-        raise _refused(asked, kind)
+        raise _refused(request, kind)
     return every[0]
 
 
-def _refused(asked: VaryText, kind: Family) -> FileError:
-    return asked.refused(
+def _refused(request: VaryText, kind: Family) -> FileError:
+    return request.refused(
         f"{kind.name} takes more than one number or a grid; point-mass and extra-support at a "
         "grid can be varied, and sensor-mass and suspension of a case"
     )

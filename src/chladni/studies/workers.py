@@ -50,7 +50,7 @@ def affordable(samples: int, seconds: float) -> int:
 
 def results(
     study: StudyModel, X: np.ndarray, todo: Sequence[int], workers: int, scheduler: Any = None,
-    told: Callable[[str], None] = lambda text: None,
+    report: Callable[[str], None] = lambda text: None,
 ) -> Iterator[SampleResult]:  # fmt: skip
     """Samples ``todo`` of X in the order in which they finish.
 
@@ -58,7 +58,7 @@ def results(
     ----------
     workers : local processes; with one, and no scheduler, samples are computed in this process
     scheduler : a ``distributed.Client`` instead of local processes
-    told : called with the reason of a wait
+    report : called with the reason of a wait
     """
     if not todo:
         return
@@ -67,7 +67,7 @@ def results(
             yield computed(study, k, X[k])
         return
     if scheduler is not None:
-        yield from _distributed(scheduler, study, X, todo, told)
+        yield from _distributed(scheduler, study, X, todo, report)
         return
     yield from local_results(study, X, todo, workers)
 
@@ -126,7 +126,7 @@ def _connected(address: str) -> Any:
 
 def _distributed(
     client: Any, study: StudyModel, X: np.ndarray, todo: Sequence[int],
-    told: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Iterator[SampleResult]:  # fmt: skip
     """Compute few samples at a time, so that a lost worker or a kill costs only these.
 
@@ -135,24 +135,24 @@ def _distributed(
     from distributed import as_completed
 
     held = client.submit(_itself, study, pure=False)
-    asked: dict[Any, int] = {}
+    running: dict[Any, int] = {}
     waiting = list(reversed(todo))
     ready, counted, ahead = as_completed(), -np.inf, 1
-    while waiting or asked:
+    while waiting or running:
         if time.monotonic() - counted > _COUNTED:
             counted = time.monotonic()
             ahead = _AHEAD * _threads(client)
-        while waiting and len(asked) < ahead:
+        while waiting and len(running) < ahead:
             k = waiting.pop()
             future = client.submit(_on_worker, held, k, X[k], pure=False)
-            asked[future] = k
+            running[future] = k
             ready.add(future)
-        _wait(ready, client, told)
+        _wait(ready, client, report)
         future = next(ready)
-        yield _result(future, asked.pop(future))
+        yield _result(future, running.pop(future))
 
 
-def _wait(ready: Any, client: Any, told: Callable[[str], None]) -> None:
+def _wait(ready: Any, client: Any, report: Callable[[str], None]) -> None:
     """Wait until a sample is finished; report once if the cluster has no workers."""
     looked, said = time.monotonic(), False
     while not ready.has_ready():
@@ -160,7 +160,7 @@ def _wait(ready: Any, client: Any, told: Callable[[str], None]) -> None:
         if not said and time.monotonic() - looked > ALONE:
             looked, said = time.monotonic(), not _workers_of(client)
             if said:
-                told(NO_WORKER)
+                report(NO_WORKER)
 
 
 def _threads(client: Any) -> int:

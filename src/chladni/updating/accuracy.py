@@ -125,9 +125,9 @@ def products(
     for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
             rows = model.wide(term.rows, term.strained)
-            beside = sp.csr_array((rows.shape[0], n - rows.shape[1]))
+            idle = sp.csr_array((rows.shape[0], n - rows.shape[1]))
             own = sp.csr_array(own_part(term, first, n_own))
-            b = sp.hstack([rows, beside, own], format="csr")
+            b = sp.hstack([rows, idle, own], format="csr")
             added = b.T @ (term.coefficient[:, None] * (b @ q))
             K, M = (K + added, M) if term.matrix == "K" else (K, M + added)
         for part in effect.matrices(x[at]):

@@ -70,11 +70,11 @@ class Participating:
         """Add masses c at rows b (k, r); ``moved`` is ∂b/∂x of parameters that move them."""
         if term.matrix != "M":
             return
-        along = self.motion.carried(term.rows if term.carrier is None else term.carrier)
+        along = self.motion.moved_with_base(term.rows if term.carrier is None else term.carrier)
         self.value = self.value + (b.T * term.coefficient) @ along
         self.slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, along, optimize=True)
         for p, db in moved.items():
-            d_along = self.motion.carried(term.moving[p])
+            d_along = self.motion.moved_with_base(term.moving[p])
             c = term.coefficient
             self.slope[at.start + p] += (db.T * c) @ along + (b.T * c) @ d_along
 
@@ -82,7 +82,7 @@ class Participating:
         """Add a part of the mass that scales as a whole."""
         if part.matrix != "M":
             return
-        load = basis.projected(self.motion.carried(part.operator))
+        load = basis.projected(self.motion.moved_with_base(part.operator))
         l = np.pad(load, ((0, self.n_own), (0, 0)))
         self.value = self.value + part.coefficient * l
         self.slope[at] += part.gradient[:, None, None] * l

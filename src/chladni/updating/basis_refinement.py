@@ -124,8 +124,8 @@ def _on_new_structure(
         f_max,
     )
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
-    (first, start), *beside = found
-    fresh = fresh.holding(beside)
+    (first, start), *others = found
+    fresh = fresh.holding(others)
     return fresh, _with_valleys(fresh.fitted_with(first, start, fresh.mean()), hypothesis)
 
 

@@ -208,9 +208,9 @@ class UpdatingContext:
                 continue
             if isinstance(data, Poles):
                 prior = _prior(effect, start)
-                for way, scale in enumerate(ways):
+                for scale_index, scale in enumerate(ways):
                     r, _ = replace(data, scale=scale).residual(state, False)
-                    out[way, k] = r @ r + prior
+                    out[scale_index, k] = r @ r + prior
             else:
                 r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]

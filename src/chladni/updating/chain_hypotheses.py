@@ -148,7 +148,7 @@ def smoothed(
         some, _weights(f, some), log_test - level, level,
         outputs.rows(built) @ modes.shapes, inputs.loads(built) @ modes.shapes,
         np.where(modes.frequency < RIGID * f[-1], 0.0, omega),
-        outputs.carried_by(inputs), DERIVATIVES[frf.quantity],
+        outputs.moved_with_base(inputs), DERIVATIVES[frf.quantity],
     )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from .diagnosis import Diagnosis, fit_test
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Responses
-from .local_damping_test import heard_of_damping
+from .local_damping_test import damping_test_along_effect
 from .map_fit import fit
 from .pole_data import Poles
 from .question import Prepared
@@ -137,8 +137,8 @@ def measured(
         return replace(known, written={**known.written, key: written}).row(replace(row, left=left))
     if wanted.ask is Ask.AFTER:
         return _after(prepared, known, row, wanted.after)
-    asked = known.fits.get(key, found.null)
-    chances = fit_test(problem, asked)
+    tested_one = known.fits.get(key, found.null)
+    chances = fit_test(problem, tested_one)
     tests = {**known.tests, key: chances.test} if chances.test else known.tests
     return replace(known, tests=tests).row(chances.of(row))
 
@@ -147,12 +147,12 @@ def _votes(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> V
     """Held-out evidence on a row, or on a member of a set with the other members in place."""
     problem, unseen = prepared.problem, prepared.unseen
     if key in known.fits:
-        asked = held_out_evidence(problem, unseen, found.null, known.fits[key])
+        tested_one = held_out_evidence(problem, unseen, found.null, known.fits[key])
     else:
         whole, member = key.rsplit("/", 1)
         s = known.sets[whole]
-        asked = held_out_evidence(problem, unseen, s.without[int(member)], s.own, s.about)
-    return Votes(asked.held_out, asked.sensors, asked.lines)
+        tested_one = held_out_evidence(problem, unseen, s.without[int(member)], s.own, s.about)
+    return Votes(tested_one.held_out, tested_one.sensors, tested_one.lines)
 
 
 def _refined(
@@ -196,13 +196,13 @@ def on_its_own_basis(
 def _after(prepared: Prepared, known: Measured, row: Row, leader: str) -> Measured:
     """Test whether the damping that a row does not explain follows the leader's changes."""
     key, test, damping = after(row.key, leader), known.tests.get(row.key), prepared.problem.damping
-    asked = Row(key, row.names, row.neg2_log_evidence, p_damping=1.0)
+    tested_one = Row(key, row.names, row.neg2_log_evidence, p_damping=1.0)
     if test is None or damping is None:
-        return known.row(asked)
+        return known.row(tested_one)
     left = damping.beyond(known.fits[row.key].fit.state)
-    follows = heard_of_damping(test, known.fits[leader], left)
+    follows = damping_test_along_effect(test, known.fits[leader], left)
     tests = {**known.tests, key: follows}
-    return replace(known, tests=tests).row(replace(asked, p_damping=follows.p))
+    return replace(known, tests=tests).row(replace(tested_one, p_damping=follows.p))
 
 
 def _calibrated(

@@ -124,7 +124,7 @@ class DecisionWords:
             "them"
         )
 
-    def _borne_by_all(self, step: Step) -> str:
+    def _supported_by_all(self, step: Step) -> str:
         row, data = self.row(step.key), "poles" if self.known.table.poles else "data"
         return (
             f"{row.name} gained {self.gain(step.key):.1f} in -2 ln evidence on the {data} that "
@@ -178,7 +178,7 @@ class DecisionWords:
 
     def _set_refused(self, step: Step) -> str:
         assert step.why is not None
-        if step.why is Reason.NOT_BORNE:
+        if step.why is Reason.NOT_SUPPORTED:
             why = f"that is too little for {self._held_out_of_set(step)}"
         elif step.why is Reason.UNFIT:
             why = f"the residual is not explained: {self.known.tests[refined(step.key)].what}"
@@ -247,7 +247,7 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.TESTED: DecisionWords._tested,
     Reason.RENEWED: DecisionWords._refined,
     Reason.TOO_FEW: DecisionWords._too_few,
-    Reason.BORNE_BY_ALL: DecisionWords._borne_by_all,
+    Reason.SUPPORTED_BY_ALL: DecisionWords._supported_by_all,
     Reason.HELD_OUT: DecisionWords._held_out,
     Reason.AGAINST: DecisionWords._refused,
     Reason.TOO_LITTLE: DecisionWords._refused,
@@ -258,7 +258,7 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.FOUND_TOGETHER: DecisionWords._found_together,
     Reason.HELD_OUT_OF_SET: DecisionWords._held_out_of_set,
     Reason.SET_REFUSED: DecisionWords._set_refused,
-    Reason.PERHAPS_BESIDE: DecisionWords._perhaps_of_set,
+    Reason.PERHAPS_PRESENT: DecisionWords._perhaps_of_set,
     Reason.RIVAL_OF_MEMBER: DecisionWords._rival_of_member,
     Reason.USUAL_LEFT: DecisionWords._usual_left,
     Reason.NEXT: DecisionWords._next,

@@ -65,7 +65,7 @@ def detectable(question: Question, noise: float = NOISE) -> Detectable:
 
     Parameters
     ----------
-    asked : without a recording; its band is what will be measured
+    question : without a recording; its band is the planned band
     noise : of |H|, at every line that is compared
     """
     low, f_max = question.band
@@ -79,7 +79,8 @@ def detectable(question: Question, noise: float = NOISE) -> Detectable:
     shape = (len(s), len(question.outputs.labels), len(question.inputs.labels))
     unit = Responses(
         np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
-        noise=np.full(shape, noise / LN10), direct=question.outputs.carried_by(question.inputs),
+        noise=np.full(shape, noise / LN10),
+        direct=question.outputs.moved_with_base(question.inputs),
         sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
     ).rebased(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, mesh)

@@ -28,7 +28,7 @@ from .discrepancy import MEDIAN
 from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted, wide_start
 from .implausible_values import implausible_values
 from .likelihood import Responses
-from .local_damping_test import heard_of_damping
+from .local_damping_test import damping_test_along_effect
 from .pole_data import Poles
 from .reduced_model import evaluate
 from .rows_of_fits import row_of, row_of_null
@@ -146,7 +146,7 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     found = _names_alone(problem, found, whole)
     del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
     give_back_freed_memory()
-    found = _searched_beside(problem, found, within(progress, 0.8, 1.0))
+    found = _with_sets_of_effects(problem, found, within(progress, 0.8, 1.0))
     return _names_alone(problem, found, 1)
 
 
@@ -163,8 +163,8 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
     )
     tests = dict(found.tests)
     while isinstance(said := called(table), Wanted):
-        asked = found.null if said.key == NULL else found.hypotheses[0]
-        chances = fit_test(problem, asked)
+        tested = found.null if said.key == NULL else found.hypotheses[0]
+        chances = fit_test(problem, tested)
         table = table.having(chances.of(table.rows[said.key]))
         tests |= {said.key: chances.test} if chances.test else {}
     return replace(found, verdict=said.verdict, table=table, tests=tests)
@@ -176,7 +176,9 @@ def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diag
     return replace(found, hypotheses=(*found.hypotheses[:whole], *behind))
 
 
-def _searched_beside(problem: UpdatingProblem, alone: Diagnosis, progress: Progress) -> Diagnosis:
+def _with_sets_of_effects(
+    problem: UpdatingProblem, alone: Diagnosis, progress: Progress
+) -> Diagnosis:
     """The tested diagnosis with the sets of several effects that explain more than its leader.
 
     Natural frequencies alone are too few numbers to bear two names.
@@ -219,7 +221,7 @@ def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
     )  # fmt: skip
     if fits is None:
         return FitChances(None, np.nan, np.nan)
-    both = heard_of_damping(fits, winner, damping)
+    both = damping_test_along_effect(fits, winner, damping)
     return FitChances(both, fits.p, both.p if both.p != fits.p else np.nan)
 
 

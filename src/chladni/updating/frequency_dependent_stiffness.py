@@ -208,8 +208,10 @@ def _dissipated(
         slopes += rise.loss / 2 * (change - share * growth) / strained
         slopes[at] += rise.loss_gradient[:, None] / 2 * share
         dN[at] += rise.loss * slope[at] + rise.loss_gradient[:, None, None] * B
-    beside = 1 - np.eye(m)
-    return Dissipated(np.diag(N) / 2 / strained, slopes, N * beside, dN * beside, np.sqrt(strained))
+    off_diagonal = 1 - np.eye(m)
+    return Dissipated(
+        np.diag(N) / 2 / strained, slopes, N * off_diagonal, dN * off_diagonal, np.sqrt(strained)
+    )
 
 
 def _mixing(

@@ -65,7 +65,7 @@ def held_out_evidence(
     null : without the effects that are tested
     about : the model whose state errors of form spread from; that of ``null`` unless it is given
     """
-    asked = [e for e in hypothesis.effects if e not in null.effects]
+    added = [e for e in hypothesis.effects if e not in null.effects]
     held = None
     if unseen.any():
         data = null.data.rebased(about or null.model)
@@ -80,8 +80,8 @@ def held_out_evidence(
         predictive(problem, hypothesis, folds) - predictive(problem, null, folds)
         for folds in (by_sensor, by_line)
     ]
-    faults = all(e.channels for e in asked)  # they change no other channel
-    sensors = None if asked and faults else gains[0]
+    faults = all(e.channels for e in added)  # they change no other channel
+    sensors = None if added and faults else gains[0]
     return HeldOutEvidence(held, sensors, gains[1])
 
 

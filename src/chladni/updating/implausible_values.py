@@ -69,8 +69,8 @@ def _far_together(fit: Fit) -> list[str]:
         return []
     z = np.concatenate([(fit.of(e) - _each(e, "mean")) / _each(e, "sd") for e in own])
     left = sum(float(((fit.sd(e) / _each(e, "sd")) ** 2).sum()) for e in own)
-    told = max(1.0, len(z) - left)
-    if chi2.sf(z @ z, told) >= chi2.sf(FAR**2, 1):
+    freedom = max(1.0, len(z) - left)
+    if chi2.sf(z @ z, freedom) >= chi2.sf(FAR**2, 1):
         return []
     names = ", ".join(e.text for e in own)
     return [

@@ -144,14 +144,14 @@ def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:
 
 
 def _informed(effect: Effect, posterior: Posterior) -> Effect:
-    told = [
+    estimates = [
         posterior.get((effect.name, effect.text, k), (p.mean, p.sd))
         for k, p in enumerate(effect.parameters)
     ]
-    wide = effect.widened(np.array([sd for _, sd in told]))
+    wide = effect.widened(np.array([sd for _, sd in estimates]))
     own = [
         replace(p, mean=mean, sd=float(sd))
-        for p, (mean, _), sd in zip(effect.parameters, told, wide, strict=True)
+        for p, (mean, _), sd in zip(effect.parameters, estimates, wide, strict=True)
     ]
     return replace(effect, parameters=tuple(own))
 

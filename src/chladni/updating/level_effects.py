@@ -39,10 +39,10 @@ def level_effects(study: LevelStudy, model: Modelled) -> tuple[NamedEffect, ...]
 
 def _numbers(modes: Sequence[ModeStudy]) -> tuple[Estimate, ...]:
     """The parameters of the nonlinear element that explains each mode."""
-    told = level_tables(LevelStudy(tuple(modes)))
+    known = level_tables(LevelStudy(tuple(modes)))
     return tuple(
         Estimate(f"{n.name}, {t.rows[0].frequency_hz:.4g} Hz", n.value, n.unit, n.low, n.high)
-        for t in told
+        for t in known
         if t.explained
         for n in t.elements[0].numbers
     )
@@ -96,13 +96,13 @@ def linear_joints(
     ----------
     fitted : the level at which the deck was fitted
     """
-    told = [
+    known = [
         t for one, t in zip(study.modes, level_tables(study), strict=True)
         if one in study.moving and one.signature in EFFECT and one.explained is not None
     ]  # fmt: skip
-    f = [t.rows[0].frequency_hz for t in told]
+    f = [t.rows[0].frequency_hz for t in known]
     out: list[LinearJoint] = []
-    for t, hertz, shares in zip(told, f, energy_shares(model, f), strict=True):
+    for t, hertz, shares in zip(known, f, energy_shares(model, f), strict=True):
         e = shares.get(JOINTS, 0.0)
         kappa = [(r.level, e + (r.stiffness or 0.0), r.loss or 0.0) for r in t.rows]
         if e < HOLDS or min(real for _, real, _ in kappa) <= 0:
@@ -136,8 +136,8 @@ def energy_shares(model: Modelled, frequency: Sequence[float]) -> list[dict[str,
     away = np.abs(np.log(np.maximum(model.modes.frequency, 1e-9)[:, None] / frequency))
     nearest, near = away.argmin(axis=0), away.min(axis=0) <= NEAR_LN_F
     share = part_energies(model.structure, model.modes.shapes[:, nearest]).T
-    told = near & np.isfinite(share).all(axis=1)
-    return [_named(model, one) if t else {} for one, t in zip(share, told, strict=True)]
+    known = near & np.isfinite(share).all(axis=1)
+    return [_named(model, one) if t else {} for one, t in zip(share, known, strict=True)]
 
 
 def _named(model: Modelled, share: np.ndarray) -> dict[str, float]:

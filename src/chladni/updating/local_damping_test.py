@@ -22,7 +22,7 @@ NEAR_MODE = (
 )
 
 
-def heard_of_damping(
+def damping_test_along_effect(
     test: FitTest, hypothesis: HypothesisFit, damping: ModalDamping | None
 ) -> FitTest:
     """The given test, or the test of damping along the effect where its p-value is smaller."""

@@ -114,7 +114,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
             identified=error,
-            direct=question.outputs.carried_by(question.inputs), sensors=wrong,
+            direct=question.outputs.moved_with_base(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.rebased(reduced.model))
     nuisance = nuisances(reduced, nominal, mesh)
@@ -158,8 +158,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     if spreads[1] is not None:
         floor = np.maximum(floor, spreads[1] ** 2)
-    borne = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
-    few = too_little(borne, int(data[0].use.any(axis=0).sum()))
+    supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
+    few = too_little(supporting, int(data[0].use.any(axis=0).sum()))
     return Prepared(
         problem, data[1], held, what, tuple(notes), nominal, floor, found, few, unseen=unseen,
         others=tuple(others), levels=studied,

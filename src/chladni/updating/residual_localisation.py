@@ -66,7 +66,7 @@ def residual_localisation(
         gain = np.fmax(gain, gained)
     if np.isnan(gain).all():
         return None
-    return _told(groups, gain)
+    return _localised(groups, gain)
 
 
 def bumps(groups: ElementGroups) -> np.ndarray:
@@ -78,7 +78,7 @@ def bumps(groups: ElementGroups) -> np.ndarray:
     return np.where(sheet[:, None] == sheet[None], near, 0.0)
 
 
-def _told(groups: ElementGroups, gain: np.ndarray) -> ResidualLocalisation:
+def _localised(groups: ElementGroups, gain: np.ndarray) -> ResidualLocalisation:
     assembly = groups.structure.assembly
     best = int(np.nanargmax(gain))
     known = np.where(np.isnan(gain), -np.inf, gain)

@@ -149,8 +149,8 @@ def reanalysis(
     phi_b = model.rows(places.rows) @ base.state.phi
     G_bi = modal_sum(phi_b, d, phi_i).transpose(1, 0, 2)
     if massive and model.base is not None:
-        carried = model.base.motion.carried(places.rows)
-        G_bi = G_bi + carried[:, None] / (data.s**2)[:, None]
+        moved_with_base = model.base.motion.moved_with_base(places.rows)
+        G_bi = G_bi + moved_with_base[:, None] / (data.s**2)[:, None]
     return Reanalysis(
         base,
         data,

@@ -37,13 +37,13 @@ class Side:
     ----------
     gain : relative standard deviation
     rows : four (k, n)     motions added by tilts and wrong places, times standard deviations
-    carried : (4, k, n_in) rigid-body share of these motions under a moving base
+    with_base : (4, k, n_in) rigid-body share of these motions under a moving base
     modal : (4, k, r)      the rows in a basis
     """
 
     gain: float
     rows: tuple[sp.csr_array, ...]
-    carried: np.ndarray
+    with_base: np.ndarray
     modal: np.ndarray
 
     def rebased(self, model: Reduced) -> Self:
@@ -60,8 +60,10 @@ def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: Sens
         place @ v.rows(built, turning=True), place @ u.rows(built, turning=True),
     )  # fmt: skip
     still = np.zeros((len(dofs.labels), len(inputs.labels)))
-    carried = np.stack([turn * u.carried_by(inputs), turn * v.carried_by(inputs), still, still])
-    return Side(known.gain, tuple(map(sp.csr_array, rows)), carried, np.zeros((WAYS, 0, 0)))
+    with_base = np.stack(
+        [turn * u.moved_with_base(inputs), turn * v.moved_with_base(inputs), still, still]
+    )
+    return Side(known.gain, tuple(map(sp.csr_array, rows)), with_base, np.zeros((WAYS, 0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +106,9 @@ def _of_outputs(
     """Change of the deviation of each output by one sd of each of its errors (5, *H)."""
     _, phi_i, d = data.modal(state)
     out = [errors.gain / scale]
-    for modal, carried in zip(errors.modal, errors.carried, strict=True):
+    for modal, with_base in zip(errors.modal, errors.with_base, strict=True):
         G = modal_sum(modal @ state.phi, d, phi_i)
-        out.append((data.s[:, None, None] ** data.power * G + carried) / (H * scale))
+        out.append((data.s[:, None, None] ** data.power * G + with_base) / (H * scale))
     return np.stack(out)
 
 

@@ -28,10 +28,10 @@ def as_written(
     for mesh and joints.  On a coarse plate with a concealed crack E went to 264 GPa for 210 without
     it, and to 212 with it.
     """
-    effects, start, (effect, *beside) = _kept(hypothesis)
+    effects, start, (effect, *others) = _kept(hypothesis)
     model = hypothesis.model
     found = fit(model, effects, hypothesis.data, mass_measurement, start).kept()
-    return HypothesisFit(effect, found, model, tuple(beside))
+    return HypothesisFit(effect, found, model, tuple(others))
 
 
 def as_foretold(
@@ -59,7 +59,7 @@ def as_foretold(
     state = evaluate(model, found.effects, found.x, False)
     foretold = whole.values * 10 ** whole.deviation(state)
     target = replace(whole, values=foretold, sigma_model=LEFT)
-    effects, x, (effect, *beside) = _kept(hypothesis)
+    effects, x, (effect, *others) = _kept(hypothesis)
     hidden = of_mesh(effects)
     bare = [_held(e, 0 * found.of(e)) if isinstance(e, MeshError) else e for e in effects]
     near = fit(model, bare, target, mass_measurement, np.where(hidden, 0.0, x))
@@ -67,7 +67,7 @@ def as_foretold(
     x = x + _share_within(sd, step := np.where(hidden, 0.0, near.x - x)) * step
     state = evaluate(model, effects, x, False)
     near = replace(near, effects=tuple(effects), x=x, state=state, data=data)
-    return HypothesisFit(effect, near.kept(), model, tuple(beside))
+    return HypothesisFit(effect, near.kept(), model, tuple(others))
 
 
 def _share_within(sd: np.ndarray, step: np.ndarray) -> float:

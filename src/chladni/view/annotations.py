@@ -57,8 +57,8 @@ def scale_bar(ax: Axes, camera: Camera, unit: str) -> None:
         [u0, u0 + length], [v, v], color="#222222", lw=2.2, solid_capstyle="butt", clip_on=False
     )
     text = f"{length:g} {unit}" if unit != "m" or length >= 1 else f"{1e3 * length:g} mm"
-    beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8}
-    ax.annotate(text.strip(), (u0 + length, v), (5, 0), **beside, annotation_clip=False)
+    label_style: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8}
+    ax.annotate(text.strip(), (u0 + length, v), (5, 0), **label_style, annotation_clip=False)
     ax.set(xlim=(u0, u1), ylim=(v0, v1))
 
 

@@ -27,7 +27,7 @@ _STYLES: dict[str, dict[str, Any]] = {
     "model": {"color": AFTER, "lw": 1.3, "zorder": 4},
 }
 _WIDEST = 9.0  # inches of a row of bars: a page would shrink a wider one until it is unreadable
-_TOLD = 40  # most bars with a number; above that every second or third bar has one
+_MOST_LABELS = 40  # most bars with a number; above that every second or third bar has one
 _MORE = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 
 
@@ -127,8 +127,8 @@ def frequency_ladder(
             at + offset, 100 * (np.asarray(model, float) / test - 1), wide, color=colour, label=name
         )
     ax.axhline(0, color=TEST, lw=0.9)
-    told = at[:: 1 + len(test) // _TOLD]
-    ax.set_xticks(told, [f"{f:.4g}" for f in test[told]], rotation=60, fontsize=8)
+    labelled = at[:: 1 + len(test) // _MOST_LABELS]
+    ax.set_xticks(labelled, [f"{f:.4g}" for f in test[labelled]], rotation=60, fontsize=8)
     ax.set(xlabel="frequency of the test [Hz]", ylabel="model - test [%]")
     ax.grid(axis="y", lw=0.3, alpha=0.6)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, **LEGEND)

@@ -241,11 +241,11 @@ def _sheets(
     cameras: Sequence[Camera], width: float = 7.0, bar: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """A figure with views side by side, and room for a title (and a colour bar)."""
-    n, margin, beside = len(cameras), 0.14, 0.9 if bar else 0.0
-    picture = width - 2 * margin - (beside if n == 1 else 0.0)
+    n, margin, bar_width = len(cameras), 0.14, 0.9 if bar else 0.0
+    picture = width - 2 * margin - (bar_width if n == 1 else 0.0)
     picture = picture if n == 1 else 0.75 * width
     height = min(max(picture / c.aspect for c in cameras), 1.3 * width)
-    wide, high = n * picture + (n + 1) * margin + beside, height + 0.75
+    wide, high = n * picture + (n + 1) * margin + bar_width, height + 0.75
     figure = Figure(figsize=(wide, high))
     steps = [(margin + k * (picture + margin)) / wide for k in range(n)]
     return figure, [

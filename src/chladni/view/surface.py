@@ -122,7 +122,7 @@ class Surface:
         return edges[np.isin(line, long)]
 
 
-def _carried(assembly: Assembly) -> np.ndarray:
+def _at_joints(assembly: Assembly) -> np.ndarray:
     """Mask of points (n,) that are means of shells' points (RBE3), as corners of welds are."""
     means = [t.reference for t in assembly.rigid if isinstance(t, Average)]
     on = np.zeros(len(assembly.points), bool)
@@ -136,12 +136,12 @@ def surface(assembly: Assembly, unit: str = "m") -> Surface:
     The shells' faces come first and in the deck's order, so a value per shell is a value per face.
     """
     faces, parts = [assembly.shells.nodes], [assembly.shells.part]
-    joints, carried = [np.zeros(len(assembly.shells), bool)], _carried(assembly)
+    joints, at_joints = [np.zeros(len(assembly.shells), bool)], _at_joints(assembly)
     for solids in assembly.solids:
         outer, part, _ = skin(solids.nodes, solids.part)
         faces.append(outer)
         parts.append(part)
-        joints.append(carried[outer].all(axis=1))
+        joints.append(at_joints[outer].all(axis=1))
     pairs = [assembly.beams.nodes, assembly.springs.nodes, assembly.bushes.nodes]
     lines = np.concatenate(pairs).astype(np.int64)
     seen = Surface(

@@ -41,9 +41,9 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     ways = case.outputs.directions
     declared, _, _ = _fit(case, found, model, ways)
     turned = [ways[:, order] for order in list(permutations(range(3)))[1:]]
-    others = [(_where_declared(ways, way), way) for way in turned]
+    others = [(_where_declared(ways, turned_one), turned_one) for turned_one in turned]
     others.append(("across the surface", _across(case, ways)))
-    fits = [(_fit(case, found, model, way), said) for said, way in others]
+    fits = [(_fit(case, found, model, turned_one), said) for said, turned_one in others]
     (total, pairs, mean), said = max(fits, key=lambda one: one[0][0])
     beaten = total >= BETTER * declared or (mean > SURE and total * MOST > declared)
     if pairs < SHARE * found.order or mean < ALIKE or not beaten:

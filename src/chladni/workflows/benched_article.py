@@ -57,7 +57,7 @@ def true_places(
     off = np.where(outputs.sd > 0, outputs.sd, kind.place_sd) * rng.normal(size=(2, n))
     at_drive = np.linalg.norm(outputs.points - inputs.points[0], axis=1) < SAME_PLACE
     angle = rng.uniform(0, 2 * np.pi, n)
-    off = np.where(at_drive, kind.beside * np.stack([np.cos(angle), np.sin(angle)]), off)
+    off = np.where(at_drive, kind.drive_offset * np.stack([np.cos(angle), np.sin(angle)]), off)
     tilt = kind.tilt_sd * rng.normal(size=(2, n))
     directions = unit(outputs.directions + tilt[0][:, None] * u + tilt[1][:, None] * v)
     if not len(assembly.shells):
@@ -106,8 +106,8 @@ def benched(
         hangers=(hung @ phi).reshape(-1, 3, r), output_labels=outputs.labels,
         input_label=inputs.labels[0], masses=outputs.mass, channels=outputs.channels,
         base=(base @ phi).ravel(),
-        carried=places.directions @ inputs.directions[0],
-        mounts_carried=np.tile(inputs.directions[0], (n, 1)),
+        with_base=places.directions @ inputs.directions[0],
+        mounts_with_base=np.tile(inputs.directions[0], (n, 1)),
     )  # fmt: skip
 
 
@@ -140,13 +140,13 @@ def _hung(built: Structure, hangers: Sequence[int]) -> sp.csr_array:
     """Motion of the hangers (3 k, n): along the cord, two ways across it."""
     if not hangers:
         return sp.csr_array((0, built.T.shape[1]))
-    up = cords_way(built.assembly, hangers)
+    up = cord_directions(built.assembly, hangers)
     axes = np.stack([up, *tangents(up)])
     ids = np.repeat(np.array(hangers), 3)
     return built.along(ids, np.tile(axes, (len(hangers), 1)))
 
 
-def cords_way(assembly: Assembly, hangers: Sequence[int]) -> np.ndarray:
+def cord_directions(assembly: Assembly, hangers: Sequence[int]) -> np.ndarray:
     """Return the unit vector (3,) of the cords' pull, from the centre of gravity to the hangers.
 
     If the hangers are on both sides of the centre, it is the middle one of the structure's three

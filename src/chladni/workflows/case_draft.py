@@ -75,8 +75,8 @@ class CaseDraft:
     @property
     def found(self) -> str:
         """How many dofs were found in which way."""
-        count: Counter[str] = Counter(d.way for d in self.dofs)
-        return ", ".join(f"{count[way]} {text}" for way, text in WAYS.items() if count[way])
+        count: Counter[str] = Counter(d.matched_by for d in self.dofs)
+        return ", ".join(f"{count[kind]} {text}" for kind, text in WAYS.items() if count[kind])
 
 
 def draft(
@@ -145,7 +145,7 @@ def _recordings(path: Path, quantity: str | None) -> tuple[Recording, ...]:
 
 
 def _far(dofs: Sequence[MatchedDof]) -> list[str]:
-    far = [d for d in dofs if d.way == "nearest" and d.distance > _FAR]
+    far = [d for d in dofs if d.matched_by == "nearest" and d.distance > _FAR]
     if not far:
         return []
     worst = max(far, key=lambda d: d.distance)
@@ -160,7 +160,7 @@ def _missing(
 ) -> list[str]:
     """List what is still missing, and how to supply it."""
     out = []
-    lost = [f"{d.label} ({d.role})" for d in dofs if d.way == "missing"]
+    lost = [f"{d.label} ({d.role})" for d in dofs if d.matched_by == "missing"]
     if lost:
         more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
         out.append(
@@ -181,21 +181,21 @@ def _missing(
 
 def sensors_text(made: CaseDraft) -> str:
     """Return the text of ``sensors.csv``; a missing sensor has no row."""
-    rows = [_row(d) for d in made.dofs if d.way != "missing"]
+    rows = [_row(d) for d in made.dofs if d.matched_by != "missing"]
     return "\n".join([",".join(COLUMNS), *(",".join(row) for row in rows), ""])
 
 
 def _row(d: MatchedDof) -> list[str]:
     place = [""] * 3 if d.place is None else [f"{x:.7g}" for x in d.place]
-    way, axis = "n", [""] * 3
+    axis_text, axis = "n", [""] * 3
     if d.axis is not None:
         k = int(np.abs(d.axis).argmax())
         plain = np.isclose(abs(d.axis[k]), 1.0, atol=1e-9)
-        way = f"{'+' if d.axis[k] > 0 else '-'}{'XYZ'[k]}" if plain else ""
+        axis_text = f"{'+' if d.axis[k] > 0 else '-'}{'XYZ'[k]}" if plain else ""
         axis = [""] * 3 if plain else [f"{x:.9g}" for x in d.axis]
-    grid = "" if d.grid is None or d.way == "base" else str(d.grid)
+    grid = "" if d.grid is None or d.matched_by == "base" else str(d.grid)
     mass = f"{d.mass:g}" if d.mass else ""
-    return [d.label, grid, *place, way, *axis, d.role, mass, ""]
+    return [d.label, grid, *place, axis_text, *axis, d.role, mass, ""]
 
 
 def case_text(made: CaseDraft, folder: Path) -> str:
@@ -235,7 +235,7 @@ def case_text(made: CaseDraft, folder: Path) -> str:
 def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
     """Return the line that permits files outside the folder, if there are any."""
     ways = (Path(_seen_from(path, folder)) for path in (made.deck, *made.recordings))
-    if not any(way.is_absolute() or ".." in way.parts for way in ways):
+    if not any(axis_text.is_absolute() or ".." in axis_text.parts for axis_text in ways):
         return []
     return ["outside = true  # files outside this folder: not part of the case"]
 

@@ -27,7 +27,7 @@ def model_frf(case: Case, model: Modelled, damping: float | np.ndarray, test: FR
     s, f = model.structure, test.frequency
     modal = model.modes.with_damping(damping)
     pick = case.outputs.rows(s).T.toarray()
-    load, carried = case.inputs.loads(s).T.toarray(), case.outputs.carried_by(case.inputs)
+    load, with_base = case.inputs.loads(s).T.toarray(), case.outputs.moved_with_base(case.inputs)
     shift = residual_shift(modal, f[-1])
     rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s), shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
@@ -35,7 +35,7 @@ def model_frf(case: Case, model: Modelled, damping: float | np.ndarray, test: FR
     H = coupled_receptance(modal, phi_o, phi_i, f, V=s.system.V, loss=loss, residual=rest)
     if not case.inputs.base.any():
         return FRF(H, f, test.outputs, test.inputs).to(test.quantity)
-    T = carried - (2 * np.pi * f)[:, None, None] ** 2 * H
+    T = with_base - (2 * np.pi * f)[:, None, None] ** 2 * H
     return FRF(T, f, test.outputs, test.inputs, "transmissibility")
 
 

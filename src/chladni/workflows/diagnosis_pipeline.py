@@ -153,7 +153,7 @@ def explained(
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
     made = searched(case, diagnosing, progress, known, freeze)
     question, prepared, screening = made.question, made.prepared, made.screening
-    found, distrust = _judged(made, diagnosing)
+    found, distrust = _apply_held_out(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; a fit to it distorts the model")
     return Explained(case, question, prepared, found, distrust, screening, made.study)
@@ -190,7 +190,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     )  # fmt: skip
 
 
-def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
+def _apply_held_out(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
     if not diagnosing:  # nothing is to be named

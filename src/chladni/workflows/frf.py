@@ -221,7 +221,7 @@ def _places_from_base(
     rest = residual_flexibility(built.system, modal, pick, load, points=node_points(built))
     s = 2j * np.pi * frequency
     H = transfer(modal, pick.T @ modal.shapes, load.T @ modal.shapes, s, residual=rest)
-    values = outputs.carried_by(inputs) + (s**2)[:, None, None] * H
+    values = outputs.moved_with_base(inputs) + (s**2)[:, None, None] * H
     return FRF(values, frequency, outputs.labels, inputs.labels, "transmissibility")
 
 
@@ -230,22 +230,22 @@ def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> 
 
     Subcases at other frequencies form a separate FRF.
     """
-    asked = models.analysis
-    cases = [c for c in asked.subcases if c.dload and c.frequency]
+    requests = models.analysis
+    cases = [c for c in requests.subcases if c.dload and c.frequency]
     if not cases:
         raise FileError(
             f"{models.source} requests no frequency response; give --input and --output"
         )
     first = models.model(cases[0].id)
-    labels, notes = list(outputs), list(dict.fromkeys((*first.notes, *asked.notes)))
+    labels, notes = list(outputs), list(dict.fromkeys((*first.notes, *requests.notes)))
     if not labels:
-        labels, said = _wanted(first, asked, cases)
+        labels, said = _wanted(first, requests, cases)
         notes = [*said, *notes]
     notes.append(
         "Each input is a subcase with all loads of the deck: values are motion, not motion per "
         "unit force."
     )
-    if asked.solution == 111 and not any(c.residual for c in cases):
+    if requests.solution == 111 and not any(c.residual for c in cases):
         notes.append(
             "Modes beyond those of METHOD are missing, as in Nastran without RESVEC; RESVEC = YES "
             "in the case control adds residual vectors."
@@ -296,7 +296,9 @@ def _gathered(
     ]
 
 
-def _wanted(model: Model, asked: Analysis, cases: Sequence[Subcase]) -> tuple[list[str], list[str]]:
+def _wanted(
+    model: Model, requests: Analysis, cases: Sequence[Subcase]
+) -> tuple[list[str], list[str]]:
     """Return the dofs that the case control requests; the loaded ones for none or all."""
     ids = model.assembly.ids
     runs = [run for case in cases for run in case.outputs]
@@ -304,24 +306,24 @@ def _wanted(model: Model, asked: Analysis, cases: Sequence[Subcase]) -> tuple[li
     for first, last in runs:
         named |= (ids >= first) & (ids <= last)
     if not named.any():
-        return _loaded(model, asked), []
+        return _loaded(model, requests), []
     if 6 * named.sum() > MOST_DOFS:
         note = (
             f"The deck requests the motion of {named.sum()} points; only the loaded ones were "
             "calculated. Use --output for others."
         )
-        return _loaded(model, asked), [note]
+        return _loaded(model, requests), [note]
     scalar = model.assembly.scalar_points
     alone = np.zeros(len(ids), bool) if scalar is None else np.asarray(scalar, bool)
     found = np.flatnonzero(named)
     return [label(int(ids[k]), c) for k in found for c in range(1, 2 if alone[k] else 7)], []
 
 
-def _loaded(model: Model, asked: Analysis) -> list[str]:
+def _loaded(model: Model, requests: Analysis) -> list[str]:
     """Return the loaded degrees of freedom, used when none is requested."""
     ends = {
         (int(model.assembly.ids[row]), int(c))
-        for loads in asked.dynamic.values()
+        for loads in requests.dynamic.values()
         for load in loads
         for row, c in zip(load.rows, load.components, strict=True)
     }

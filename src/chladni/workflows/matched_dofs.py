@@ -23,9 +23,9 @@ class MatchedDof:
 
     Attributes
     ----------
-    way : "grid" (its number is a grid of the deck), "place" (a grid lies where the recording has
-          it), "nearest" (on the nearest shell or grid), "base", "table" (a row of the user's own),
-          or "missing"
+    matched_by : "grid" (its number is a grid of the deck), "place" (a grid is at its place in the
+        recording), "nearest" (on the nearest shell or grid), "base", "table" (a row of the given
+        table), or "missing"
     grid, place : one of them, [m]; neither where it is missing or the base
     distance : between the recording's place and the deck's [m], nan where one is unknown
     axis : (3,) unit vector, basic frame; None: the surface's normal
@@ -34,7 +34,7 @@ class MatchedDof:
 
     label: str
     role: Role
-    way: MatchedBy
+    matched_by: MatchedBy
     grid: int | None = None
     place: np.ndarray | None = None
     distance: float = np.nan
@@ -90,8 +90,8 @@ def matched(
         for role, labels in sides
         for label in labels
     ]
-    asked = {(d.label, d.role) for d in found}
-    idle = [s.label for s in table if (s.label, s.role) not in asked]
+    matched_labels = {(d.label, d.role) for d in found}
+    idle = [s.label for s in table if (s.label, s.role) not in matched_labels]
     if idle:
         notes.append(f"rows of the given table that are not in {recording.name}: {named(idle)}")
     return found, notes
@@ -131,8 +131,8 @@ def _by_place(
     away = np.linalg.norm(made.points - place, axis=1)
     near = int(away.argmin())
     if away[near] <= SAME_PLACE * size or not len(made.shells):
-        way: MatchedBy = "place" if away[near] <= SAME_PLACE * size else "nearest"
+        matched_by: MatchedBy = "place" if away[near] <= SAME_PLACE * size else "nearest"
         grid = int(made.ids[near])
-        return MatchedDof(label, role, way, grid, distance=float(away[near]), axis=axis)
+        return MatchedDof(label, role, matched_by, grid, distance=float(away[near]), axis=axis)
     off = float(ShellSurface.whole(made).closest_points(place).distance[0])
     return MatchedDof(label, role, "nearest", None, place, off, axis)

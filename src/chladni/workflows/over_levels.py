@@ -10,7 +10,7 @@ from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 
 
 def over_levels(
-    asked: Question, prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult,
+    fitted_question: Question, prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult,
     diagnosing: bool,
 ) -> DiagnosisResult:  # fmt: skip
     """Add the modes over levels; the verdict is nonlinear if they move and no effect is named.
@@ -34,7 +34,7 @@ def over_levels(
         "modes with level, so the verdict is 'nonlinear'"
     )
     model = stages.final.model
-    joints = linear_joints(study, model, asked.level)
+    joints = linear_joints(study, model, fitted_question.level)
     return replace(
         result, verdict="nonlinear", effects=level_effects(study, model), joints=joints,
         models=_with_comment(stages, joints), calibrated=kept, notes=(*result.notes, note),

@@ -36,7 +36,7 @@ def question_of(case: Case) -> Question:
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
         raise nothing_measured(case)
-    asked = Question(
+    base_question = Question(
         case.assembly,
         case.outputs,
         case.inputs,
@@ -53,10 +53,10 @@ def question_of(case: Case) -> Question:
     )
     if frfs:
         first = case.recordings[0]
-        return replace(asked, frf=frfs[0], others=_others(case), level=first.level,
+        return replace(base_question, frf=frfs[0], others=_others(case), level=first.level,
                        control=first.control)  # fmt: skip
     state = poles[0].of(poles[0].states[0])
-    return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
+    return replace(base_question, frequency=state.frequency, frequency_sd=state.frequency_sd)
 
 
 MASS_SD = 0.002  # of the mass, where the user gives none

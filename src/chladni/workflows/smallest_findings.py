@@ -47,10 +47,10 @@ def smallest_findings(
         raise FileError(
             f"{layout}: smallest findings are predicted for a force, not for a moving base"
         )
-    asked = Question(
+    plain_question = Question(
         model.assembly, outputs, inputs, band=band,
         sensor_masses=sensor_masses(model.assembly, outputs, inputs),
     )  # fmt: skip
     mass = float(mass_properties(model.assembly)[0])
     weighed = MassMeasurement(mass, MASS_SD * mass)
-    return detectable(replace(asked, mass_measurement=weighed), noise)
+    return detectable(replace(plain_question, mass_measurement=weighed), noise)

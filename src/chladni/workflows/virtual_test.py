@@ -169,7 +169,7 @@ def _places_known(case: Case, settings: BenchSettings) -> None:
         "--excitation hammer": settings.excitation == "hammer",
         "--local": bool(settings.local), "--time": settings.keep_time,
     }  # fmt: skip
-    if words := [word for word, asked in amiss.items() if asked]:
+    if words := [word for word, is_set in amiss.items() if is_set]:
         raise FileError(f"{case.path} moves its supports by a shaker table, which has no "
                         f"{', '.join(words)}")  # fmt: skip
 

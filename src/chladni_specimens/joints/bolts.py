@@ -96,13 +96,13 @@ def screw(
     """
     place = np.asarray(place, dtype=float)
     surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
-    feet = [s.closest_points(place[None]) for s in surfaces]
-    for surface, foot in zip(surfaces, feet, strict=True):
+    closest = [s.closest_points(place[None]) for s in surfaces]
+    for surface, foot in zip(surfaces, closest, strict=True):
         surface.within(foot, place[None], reach)
-    rims = [rim(s, f.place[0], diameter) for s, f in zip(surfaces, feet, strict=True)]
+    rims = [rim(s, f.place[0], diameter) for s, f in zip(surfaces, closest, strict=True)]
     if common := set(rims[0].tolist()) & set(rims[1].tolist()):
         raise ModelError(f"the holes of a screw share grids {sorted(common)[:3]}; name two sheets")
-    ends = _ends(feet[0].place[0], feet[1].place[0], feet[0].normal[0])
+    ends = _ends(closest[0].place[0], closest[1].place[0], closest[0].normal[0])
     grown, centres = with_points(assembly, ends)
     first = next_id(grown)
     spiders = tuple(_spider(first + k, centres[k], rims[k]) for k in range(2))
@@ -110,7 +110,7 @@ def screw(
     grown = _with_bar(grown, first + 2, centres, _round_bar(material, diameter), name)
     bar = material.rho * np.pi * diameter**2 / 4 * float(np.linalg.norm(ends[1] - ends[0]))
     grown = with_masses(grown, centres, max(mass - bar, 0.0) / 2)
-    far = max(float(f.distance[0]) for f in feet)
+    far = max(float(f.distance[0]) for f in closest)
     x, y, z = ends.mean(axis=0).tolist()
     return grown, (
         Joint("screw", (x, y, z), (surfaces[0].name, surfaces[1].name), (first + 2,), far),
@@ -179,17 +179,17 @@ def tied_hole(
     """One RBE2 over the rims of an empty hole in all its sheets, which has no real counterpart."""
     place = np.asarray(place, dtype=float)
     surfaces = [ShellSurface.of(assembly, s) for s in sheets]
-    feet = [s.closest_points(place[None]) for s in surfaces]
-    for surface, foot in zip(surfaces, feet, strict=True):
+    closest = [s.closest_points(place[None]) for s in surfaces]
+    for surface, foot in zip(surfaces, closest, strict=True):
         surface.within(foot, place[None], reach)
     rows = np.unique(
-        np.concatenate([rim(s, f.place[0], radius) for s, f in zip(surfaces, feet, strict=True)])
+        np.concatenate([rim(s, f.place[0], radius) for s, f in zip(surfaces, closest, strict=True)])
     )
-    grown, centre = with_points(assembly, np.mean([f.place for f in feet], axis=0))
+    grown, centre = with_points(assembly, np.mean([f.place for f in closest], axis=0))
     id_ = next_id(grown)
     grown = replace(grown, rigid=(*grown.rigid, _spider(id_, centre[0], rows)))
     x, y, z = grown.points[centre[0]].tolist()
-    far = max(float(f.distance[0]) for f in feet)
+    far = max(float(f.distance[0]) for f in closest)
     names = (surfaces[0].name, surfaces[-1].name)
     return grown, (Joint("tied hole", (x, y, z), names, (id_,), far),)
 
@@ -215,10 +215,10 @@ def grip(
     surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
     ends, far = [], np.zeros(len(places))
     for surface in surfaces:
-        feet = surface.closest_points(places)
-        surface.within(feet, places, reach)
-        far = np.maximum(far, feet.distance)
-        assembly, rows = tied(assembly, places, cell_carriers(surface, feet))
+        closest = surface.closest_points(places)
+        surface.within(closest, places, reach)
+        far = np.maximum(far, closest.distance)
+        assembly, rows = tied(assembly, places, cell_carriers(surface, closest))
         ends.append(rows)
     k = np.zeros((len(places), 6))
     k[:, 0] = stiffness

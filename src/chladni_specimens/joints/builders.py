@@ -94,10 +94,10 @@ def tied(
 
 
 def cell_carriers(
-    surface: ShellSurface, feet: ClosestPoints
+    surface: ShellSurface, closest: ClosestPoints
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """The nodes of the nearest shell, all of weight one (Echaniz Granado 2015, figure 1)."""
-    return [(nodes, np.ones(len(nodes))) for nodes in surface.cells(feet)]
+    return [(nodes, np.ones(len(nodes))) for nodes in surface.cells(closest)]
 
 
 def hexahedra(
@@ -162,15 +162,15 @@ def _carriers(
     far = np.zeros(len(places))
     for k, surface in enumerate(sheets):
         mine = np.flatnonzero(side == k)
-        feet = surface.closest_points(places[mine])
-        surface.within(feet, places[mine], reach)
-        far[mine] = feet.distance
+        closest = surface.closest_points(places[mine])
+        surface.within(closest, places[mine], reach)
+        far[mine] = closest.distance
         if patch:
             middle = corners[:, 4 * k : 4 * k + 4].mean(axis=1)
             discs = {o: surface.patch(middle[o], patch) for o in np.unique(owner[mine])}
             found = [discs[o] for o in owner[mine]]
         else:
-            found = cell_carriers(surface, feet)
+            found = cell_carriers(surface, closest)
         for row, carrier in zip(mine, found, strict=True):
             out[row] = carrier
     return out, far

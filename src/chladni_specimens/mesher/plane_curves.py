@@ -120,7 +120,7 @@ class Loop:
         """Distance of the points (n, 2) from the line (n,), exact on its segments, up to 0.12 m."""
         at = self.tree.query(points, distance_upper_bound=FAR)[1]
         out, near = np.full(len(points), FAR), at < len(self.points)
-        out[near] = np.linalg.norm(points[near] - self._feet(points[near], at[near]), axis=-1)
+        out[near] = np.linalg.norm(points[near] - self._projected(points[near], at[near]), axis=-1)
         return out
 
     def normal(self, points: np.ndarray) -> np.ndarray:
@@ -135,13 +135,13 @@ class Loop:
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
         """Nearest places of the line (n, 2)."""
-        return self._feet(points, self.tree.query(points)[1])
+        return self._projected(points, self.tree.query(points)[1])
 
-    def _feet(self, points: np.ndarray, at: np.ndarray) -> np.ndarray:
+    def _projected(self, points: np.ndarray, at: np.ndarray) -> np.ndarray:
         here, n = self.points[at], len(self.points)
-        feet = np.stack([_foot(points, here, self.points[(at + k) % n]) for k in (-1, 1)])
-        side = np.linalg.norm(feet - points, axis=-1).argmin(axis=0)
-        return feet[side, np.arange(len(here))]
+        projected = np.stack([_foot(points, here, self.points[(at + k) % n]) for k in (-1, 1)])
+        side = np.linalg.norm(projected - points, axis=-1).argmin(axis=0)
+        return projected[side, np.arange(len(here))]
 
     def between(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """The open line along the loop, counter-clockwise from one place to another."""

@@ -63,7 +63,10 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -
         If the file, a column or a cell is missing, or a column is unknown.
     """
     if not path.is_file():
-        near = difflib.get_close_matches(path.name, beside_it(path), 3, 0.4) or beside_it(path)[:6]
+        near = (
+            difflib.get_close_matches(path.name, files_next_to(path), 3, 0.4)
+            or files_next_to(path)[:6]
+        )
         raise FileError(f"no file {path}; the folder has {named(near)}")
     refuse_large(path)
     try:
@@ -89,7 +92,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -
     return CsvTable(path, columns, [line for line, _ in rows[1:]])
 
 
-def beside_it(path: Path) -> list[str]:
+def files_next_to(path: Path) -> list[str]:
     """Names of the files in the folder of this one."""
     return (
         sorted(p.name for p in path.parent.glob("*") if p.is_file()) if path.parent.is_dir() else []

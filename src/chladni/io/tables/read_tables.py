@@ -18,7 +18,7 @@ from ..damage import DAMAGED
 from ..file_size import refuse_large
 from ..time.read_time import read_mat, read_time_csv, read_time_npz, read_wav
 from ..time.time_channels import is_time, only_known
-from .csv_table import CsvTable, beside_it, read_table
+from .csv_table import CsvTable, files_next_to, read_table
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
 ENDINGS = (".npz", ".csv", ".wav", ".mat", *_UNIVERSAL)
@@ -48,7 +48,7 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     if path.is_file():
         refuse_large(path)
     elif ending in ENDINGS and ending not in _UNIVERSAL:
-        raise FileError(f"no file {path}; the folder has {named(beside_it(path))}")
+        raise FileError(f"no file {path}; the folder has {named(files_next_to(path))}")
     if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
         return (_timed(path, _TIMED[ending](path), quantity),)
     if ending == ".npz":
@@ -59,7 +59,7 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
         from ..uff.read_uff import read_uff
 
         found = read_uff(path, quantity)
-        return (_asked(found, quantity),)
+        return (_as_quantity(found, quantity),)
     raise FileError(
         f"{path.name}: recordings end in .uff, .unv, .npz, .csv, .mat or .wav, not {ending!r}"
     )
@@ -72,10 +72,10 @@ def _timed(path: Path, read: tuple[TimeRecord, list[str]], quantity: str | None)
     record, notes = read
     if not record.inputs:
         return Recording(path.name, functions=of_responses(record), notes=tuple(notes))
-    return _asked(Recording(path.name, time=record, notes=tuple(notes)), quantity)
+    return _as_quantity(Recording(path.name, time=record, notes=tuple(notes)), quantity)
 
 
-def _asked(r: Recording, quantity: str | None) -> Recording:
+def _as_quantity(r: Recording, quantity: str | None) -> Recording:
     """Time data read as the quantity that was asked for, whatever its units say."""
     if r.time is None or quantity in (None, r.time.quantity):
         return r
@@ -246,7 +246,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileError(f"no file {path}; the folder has {named(beside_it(path))}")
+        raise FileError(f"no file {path}; the folder has {named(files_next_to(path))}")
     if not zipfile.is_zipfile(path):
         raise FileError(f"{path.name} cannot be read as NPZ: it is not an archive of arrays")
     try:

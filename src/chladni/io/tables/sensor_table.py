@@ -70,8 +70,8 @@ def exciter(label: str, where: str) -> Sensor:
         If the label is of another form.
     """
     node = _node(label, where)
-    way = direction(label, where)
-    return Sensor(label, None if np.isnan(node) else int(node), None, way, "input")
+    axis_word = direction(label, where)
+    return Sensor(label, None if np.isnan(node) else int(node), None, axis_word, "input")
 
 
 def with_input(path: Path, label: str) -> str:
@@ -112,10 +112,12 @@ def _planned(path: Path) -> tuple[Sensor, ...]:
 def _of_plan(at: dict[str, Any], role: Role) -> Sensor:
     """A place of a plan; where it is no grid its point counts."""
     label, grid, mass = str(at["label"]), at["grid"], float(at.get("mass_kg", 0.0))
-    way = direction(np.array(at["direction"], dtype=float).reshape(3), label)
+    axis_word = direction(np.array(at["direction"], dtype=float).reshape(3), label)
     if grid is not None:
-        return Sensor(label, int(grid), None, way, role, mass)
-    return Sensor(label, None, np.array(at["point_m"], dtype=float).reshape(3), way, role, mass)
+        return Sensor(label, int(grid), None, axis_word, role, mass)
+    return Sensor(
+        label, None, np.array(at["point_m"], dtype=float).reshape(3), axis_word, role, mass
+    )
 
 
 def _sensor(table: CsvTable, k: int) -> Sensor:
@@ -188,11 +190,11 @@ def direction(text: str | np.ndarray, where: str) -> np.ndarray | None:
         if not np.isfinite(length) or length == 0:
             raise FileError(f"{where}: nx, ny, nz = {named(text.tolist())} is not a direction")
         return text / length
-    way = text.rpartition(":")[2].strip().upper()
-    if way == "N":
+    axis_word = text.rpartition(":")[2].strip().upper()
+    if axis_word == "N":
         return None
-    sign = -1.0 if way.startswith("-") else 1.0
-    axis = way.lstrip("+-")
+    sign = -1.0 if axis_word.startswith("-") else 1.0
+    axis = axis_word.lstrip("+-")
     if axis not in COMPONENTS[:3]:
         raise FileError(f"{where}: direction {text!r}; write +X, -X, +Y, -Y, +Z, -Z or n")
     return sign * np.eye(3)[COMPONENTS.index(axis)]

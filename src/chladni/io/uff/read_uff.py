@@ -169,7 +169,7 @@ def _take(uff: UffAccumulator, one: UffSet, quantity: str | None) -> None:
 def _take_function(uff: UffAccumulator, record: FunctionSet, quantity: str | None) -> None:
     where, kind = uff.where(record), record.function
     record = _complete(record, where)
-    node, way = record.reference
+    node, axis = record.reference
     if kind in _REAL and (np.iscomplexobj(record.y) or (kind == 1 and record.abscissa.kind == 18)):
         they_are = "a function of frequency" if kind == 1 else "complex"
         raise FileError(
@@ -177,11 +177,11 @@ def _take_function(uff: UffAccumulator, record: FunctionSet, quantity: str | Non
             "frequency response has function type 4"
         )
     try:
-        output, input = _dof(*record.response), _dof(node, way)
+        output, input = _dof(*record.response), _dof(node, axis)
     except FileError as error:
         raise FileError(f"{where}: {error}") from error
-    if kind in (4, 5, 6) and node == 0 and way != 0:
-        input = label(0, abs(way), way).replace("0:", "base:")
+    if kind in (4, 5, 6) and node == 0 and axis != 0:
+        input = label(0, abs(axis), axis).replace("0:", "base:")
     if kind in (4, 5) or (kind == 0 and np.iscomplexobj(record.y) and node):
         _take_frf(uff, record, (output, input), quantity)
     elif kind in (6, 26):

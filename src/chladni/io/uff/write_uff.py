@@ -105,11 +105,11 @@ def _blocks(frf: FRF, title: str, binary: bool) -> Iterator[bytes]:
 
 def uff_code(dof: str) -> tuple[int, int]:
     """(node, direction code) of a label."""
-    node, _, way = dof.partition(":")
+    node, _, axis_text = dof.partition(":")
     try:
         if node == "base":
-            return 0, parse(f"1:{way}")[1] * parse(f"1:{way}")[2]
-        if way == "n":
+            return 0, parse(f"1:{axis_text}")[1] * parse(f"1:{axis_text}")[2]
+        if axis_text == "n":
             return int(node), 0
         point, component, sign = parse(dof)
     except (LabelError, ValueError) as error:
@@ -136,13 +136,13 @@ def binary_set(head: str, bits: bytes) -> bytes:
 
 def head_records(record: FunctionSet, title: str, even: bool, single: bool = False) -> str:
     """Records 1 to 11; ``single``: real numbers of single precision, in place of double."""
-    (out, out_way), (ref, ref_way) = record.response, record.reference
+    (out, out_axis), (ref, ref_axis) = record.response, record.reference
     f, kind = record.x, 6 if np.iscomplexobj(record.y) else 2 if single else 4
     start, step = (f[0], (f[-1] - f[0]) / (len(f) - 1)) if even else (0.0, 0.0)
     lines = [f"{title[:80]:80}"] + [f"{'NONE':80}"] * 4
     lines += [
-        f"{record.function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{out:10d}{out_way:4d} {'NONE':10}"
-        f"{ref:10d}{ref_way:4d}",
+        f"{record.function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{out:10d}{out_axis:4d} {'NONE':10}"
+        f"{ref:10d}{ref_axis:4d}",
         f"{kind:10d}{len(f):10d}{int(even):10d}{start:13.5e}{step:13.5e}{0:13.5e}",
     ]
     names = ("Time" if record.abscissa.kind == 17 else "Frequency", "NONE", "NONE", "NONE")

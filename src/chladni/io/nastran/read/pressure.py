@@ -54,34 +54,34 @@ def _elements(ctx: Context) -> dict[int, tuple[str, np.ndarray]]:
     return out
 
 
-def on_faces(X: np.ndarray, p: np.ndarray, way: np.ndarray | None = None) -> np.ndarray:
+def on_faces(X: np.ndarray, p: np.ndarray, load_axis: np.ndarray | None = None) -> np.ndarray:
     """Consistent forces (m, c, 3) of corner pressures p (m, c) on faces X (m, c, 3), c = 3 or 4.
 
-    Along the normals, or along unit vectors ``way`` (m, 3). Bilinear on quadrilaterals
+    Along the normals, or along unit vectors ``load_axis`` (m, 3). Bilinear on quadrilaterals
     (2 x 2 Gauss points), exact on triangles: f_i = A (p_i + Σ p) / 12.
     """
     if X.shape[1] == 3:
         area = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]) / 2
-        return (p + p.sum(axis=1)[:, None])[:, :, None] / 12 * _along(area, way)
+        return (p + p.sum(axis=1)[:, None])[:, :, None] / 12 * _along(area, load_axis)
     f = np.zeros(X.shape)
     a = 1 / np.sqrt(3)
     s, t = np.array([-1, 1, 1, -1]), np.array([-1, -1, 1, 1])
     for xi, eta in ((-a, -a), (a, -a), (a, a), (-a, a)):
         N = (1 + s * xi) * (1 + t * eta) / 4
         e1, e2 = (np.einsum("c,mcj->mj", d / 4, X) for d in (s * (1 + t * eta), t * (1 + s * xi)))
-        f += N[:, None] * _along(np.cross(e1, e2), way) * (p @ N)[:, None, None]
+        f += N[:, None] * _along(np.cross(e1, e2), load_axis) * (p @ N)[:, None, None]
     return f
 
 
-def _along(area: np.ndarray, way: np.ndarray | None) -> np.ndarray:
+def _along(area: np.ndarray, load_axis: np.ndarray | None) -> np.ndarray:
     """Area vectors (m, 1, 3), or as much area along other ways."""
-    turned = area if way is None else np.linalg.norm(area, axis=1)[:, None] * way
+    turned = area if load_axis is None else np.linalg.norm(area, axis=1)[:, None] * load_axis
     return turned[:, None]
 
 
-def on_face(X: np.ndarray, p: np.ndarray, way: np.ndarray | None = None) -> np.ndarray:
+def on_face(X: np.ndarray, p: np.ndarray, load_axis: np.ndarray | None = None) -> np.ndarray:
     """The same of one face (c, 3)."""
-    return on_faces(X[None], p[None], None if way is None else way[None])[0]
+    return on_faces(X[None], p[None], None if load_axis is None else load_axis[None])[0]
 
 
 def _on_shells(ctx: Context, cards: Cards, unit: float) -> tuple[np.ndarray, list[Nodal]]:
@@ -149,8 +149,8 @@ def _pload4(
         if name in _FACES:
             rows = _face(ctx, cards, i, name, rows, marks)
         X = ctx.places[rows]
-        way = _direction(ctx, cards, i, X.mean(axis=0))
-        yield sid, rows, on_face(X, p[: len(rows)], way)
+        load_axis = _direction(ctx, cards, i, X.mean(axis=0))
+        yield sid, rows, on_face(X, p[: len(rows)], load_axis)
 
 
 def _direction(ctx: Context, cards: Cards, i: int, place: np.ndarray) -> np.ndarray | None:

@@ -87,12 +87,12 @@ def _along(ctx: Context, cards: Cards, sums: Sums) -> None:
     """FORCE1, MOMENT1: along the way from grid G1 to G2."""
     rows = ctx.rows(cards, cards.integers(2))
     ends = ctx.places[ctx.rows(cards, cards.ids(4, 2))]
-    way = ends[:, 1] - ends[:, 0]
-    size = np.linalg.norm(way, axis=1)
+    span = ends[:, 1] - ends[:, 0]
+    size = np.linalg.norm(span, axis=1)
     if np.any(size == 0):
         raise cards.refuse(int(np.argmax(size == 0)), "G1 and G2 are at the same place")
     unit, first = _unit(ctx, cards)
-    _spread(cards, sums, rows, way / size[:, None] * cards.reals(3)[:, None] * unit, first)
+    _spread(cards, sums, rows, span / size[:, None] * cards.reals(3)[:, None] * unit, first)
 
 
 def _gravity(ctx: Context, cards: Cards, sums: Sums) -> None:

@@ -72,8 +72,8 @@ def _additions(deck: Deck, kind: str) -> dict[int, list[int]]:
         TopologicalSorter(added).prepare()
     except CycleError as error:
         ring = error.args[1]
-        way = " -> ".join(map(str, ring[::-1]))
-        raise cards.refuse(list(added).index(ring[0]), f"the set joins itself ({way})") from None
+        chain = " -> ".join(map(str, ring[::-1]))
+        raise cards.refuse(list(added).index(ring[0]), f"the set joins itself ({chain})") from None
     return added
 
 

@@ -101,8 +101,10 @@ class _Case:
         if command == "RESVEC":
             self.residual = value not in ("NO", "NOSYSTEM")
         elif command[:4] in _OUTPUTS:
-            asked = (EVERY,) if value == "ALL" else sets.get(int(value) if value.isdecimal() else 0)
-            self.outputs = [*(self.outputs or ()), *(asked or ())]
+            wanted = (
+                (EVERY,) if value == "ALL" else sets.get(int(value) if value.isdecimal() else 0)
+            )
+            self.outputs = [*(self.outputs or ()), *(wanted or ())]
         elif name and value.isdecimal():
             self.selects[name] = int(value)
         elif name and "2" in name:

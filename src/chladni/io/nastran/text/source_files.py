@@ -44,35 +44,35 @@ def sources(path: Path) -> tuple[Source, ...]:
     return tuple(source for source in found if source is not None)
 
 
-def _read(path: Path, asked: str) -> bytes:
+def _read(path: Path, prefix: str) -> bytes:
     """The bytes of a text file, or one sentence about why not."""
     if path.is_dir():
-        raise FileError(f"{asked}{path} is a folder, not a deck")
+        raise FileError(f"{prefix}{path} is a folder, not a deck")
     if path.exists() and not path.is_file():
-        raise FileError(f"{asked}{path} is a device or a pipe, not a file")
+        raise FileError(f"{prefix}{path} is a device or a pipe, not a file")
     try:
         refuse_large(path)
         data = path.read_bytes()
     except OSError as error:
-        raise FileError(f"{asked}{path} cannot be read: {error.strerror}") from None
+        raise FileError(f"{prefix}{path} cannot be read: {error.strerror}") from None
     if data.count(b"\0", 0, 4096) > 8:
-        raise FileError(f"{asked}{path} is binary, not a Nastran deck")
+        raise FileError(f"{prefix}{path} is binary, not a Nastran deck")
     return data
 
 
-def _load(path: Path, above: tuple[Path, ...], found: list[Source | None], asked: str) -> int:
+def _load(path: Path, above: tuple[Path, ...], found: list[Source | None], prefix: str) -> int:
     """Read one file and its includes into ``found``; its position there."""
     try:
         here = path.resolve()
     except (OSError, RuntimeError):  # links that lead round in a circle
-        raise FileError(f"{asked}{path} cannot be read: too many links") from None
+        raise FileError(f"{prefix}{path} cannot be read: too many links") from None
     if here in above:
-        raise FileError(f"{asked}{path} includes itself through {above[-1].name}")
+        raise FileError(f"{prefix}{path} includes itself through {above[-1].name}")
     if len(found) > 5000:
-        raise FileError(f"{asked}more than 5000 included files")
+        raise FileError(f"{prefix}more than 5000 included files")
     if len(above) > _DEEPEST:
-        raise FileError(f"{asked}includes are nested more than {_DEEPEST} deep")
-    data = _read(path, asked)
+        raise FileError(f"{prefix}includes are nested more than {_DEEPEST} deep")
+    data = _read(path, prefix)
     lines = data.splitlines(keepends=True)
     starts = [0, *accumulate(map(len, lines))]
     position = len(found)
@@ -125,13 +125,13 @@ def _includes(
         if first >= past or (out and first < out[-1].past):
             continue
         name, after = _statement(path, lines, first)
-        asked = f"{path}:{first + 1}: INCLUDE "
+        prefix = f"{path}:{first + 1}: INCLUDE "
         target = _target(name, path, above)
         file = -1
         if first >= bulk:
-            file = _load(target, above, found, asked)
+            file = _load(target, above, found, prefix)
         elif 0 <= cend < first and not target.is_file():
-            raise FileError(f"{asked}{target} does not exist")
+            raise FileError(f"{prefix}{target} does not exist")
         out.append(Include(first, after, name, file))
     return tuple(out)
 
@@ -158,10 +158,10 @@ def _target(name: str, path: Path, above: tuple[Path, ...]) -> Path:
     if "\0" in name or not name:
         raise FileError(f"{path}: INCLUDE names no file")
     wanted = Path(name.replace("\\", "/"))
-    beside = [folder / wanted for folder in (path.parent, above[0].parent)]
+    places = [folder / wanted for folder in (path.parent, above[0].parent)]
     try:
-        found = next((p for p in beside if p.is_file()), None)
-        return found or _spelled_otherwise(beside[0]) or beside[0]
+        found = next((p for p in places if p.is_file()), None)
+        return found or _spelled_otherwise(places[0]) or places[0]
     except OSError:
         raise FileError(f"{path}: INCLUDE {name[:80]!r} is not a file name") from None
 
