@@ -83,9 +83,10 @@ I12 and J, whatever card they stand in); K of springs (`PELAS`, `CELAS2`) and bu
 `CONM2`.
 `global-stiffness` and `part-stiffness` are E, `global-density` is rho, `thickness-scale` is t,
 `adhesive-stiffness` is E of the solid parts named. `orthotropic-material`, `sensor-mass` and
-`suspension` are freed as they are; they take no sd, low and high. So is `weld-patch`: one factor on E
-of the shells about all welds of solids, and the radius of that patch. An effect whose place is unknown
-is found by `diagnose` and cannot be freed here. Every change is written into the updated deck.
+`suspension` are freed as they are; they take no sd, low and high. So is `weld-patch`: one factor on
+E of the shells about all welds of solids, and the radius of that patch. An effect whose place is
+unknown is found by `diagnose` and cannot be freed here. Every change is written into the updated
+deck.
 """
 
 _FILES = """\
