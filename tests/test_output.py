@@ -94,14 +94,14 @@ def test_a_command_that_adds_keeps_what_it_wrote(tmp_path):
 @pytest.mark.parametrize(("mark", "by"), [("study_begun.json", "study"), ("blind.json", "blind")])
 def test_a_folder_that_fills_bit_by_bit_is_no_other_commands(tmp_path, mark, by):
     (tmp_path / mark).write_text("{}")
-    with pytest.raises(FileError, match=f"holds the results of chladni {by}"):
+    with pytest.raises(FileError, match=f"has the results of chladni {by}"):
         wrote(tmp_path, "a.json")
     wrote(tmp_path, "a.json", command=by)
 
 
 def test_a_folder_holds_the_results_of_one_command(tmp_path):
     wrote(tmp_path / "run", "a.json")
-    with pytest.raises(FileError, match="holds the results of chladni modes; give another --out"):
+    with pytest.raises(FileError, match="has the results of chladni modes; give another --out"):
         wrote(tmp_path / "run", "a.json", command="frf")
     assert (tmp_path / "run" / "a.json").read_text() == "new a.json"
 
@@ -182,7 +182,7 @@ def test_a_place_that_takes_nothing_is_said(tmp_path, monkeypatch):
         raise OSError(EROFS, "Read-only file system")
 
     monkeypatch.setattr("tempfile.mkdtemp", fails)
-    with pytest.raises(FileError, match=r"nothing can be written there .Read-only file system"):
+    with pytest.raises(FileError, match=r"no file can be written there .Read-only file system"):
         wrote(tmp_path / "new", "a.json")
     assert not list(tmp_path.iterdir())
 

@@ -189,8 +189,8 @@ def recovery(seeds: Iterable[int], out: Path, say: Callable[[str], None]) -> lis
         known = [r.inside for r in rows if r.inside is not None]
         frozen = ", ".join(r.name for r in rows if r.inside is None) or "none"
         say(
-            f"seed {seed}: {sum(known)} of {len(known)} intervals hold the truth; "
-            f"frozen: {frozen}; mass {masses[-1]:.2%} off, exit {3 if found.distrust else 0}"
+            f"seed {seed}: {sum(known)} of {len(known)} intervals contain the truth; frozen: "
+            f"{frozen}; mass {masses[-1]:.2%} off, exit {3 if found.distrust else 0}"
         )
         data = [[vars(r) for r in one] for one in every]
         (out / "recovery.json").write_text(json.dumps({"rows": data, "mass_off": masses}), "utf-8")
@@ -214,7 +214,7 @@ def summary(every: list[list[Recovered]], masses: list[float]) -> list[str]:
     held = [r.inside for rows in every for r in rows if r.inside is not None]
     share = sum(held) / max(len(held), 1)
     out.append(
-        f"{sum(held)} of {len(held)} intervals of 95 % hold the truth ({share:.1%}); mass off by "
-        f"{max(masses, default=np.nan):.2%} at most"
+        f"{sum(held)} of {len(held)} intervals of 95 % contain the truth ({share:.1%}); mass off "
+        f"by {max(masses, default=np.nan):.2%} at most"
     )
     return out

@@ -173,13 +173,13 @@ def change(folder: Path, old: str, new: str, name: str = "case.toml") -> None:
         ("damping = 0.01", "damping = true", r"line 4: \[model\] damping = True is not a number"),
         ("damping = 0.01", "damping = 1.0", "line 4: .* between 0 and 0.5"),
         ("[band]", "[bend]", r"line 13: \[bend\] is unknown; did you mean \[band\]"),
-        ('"a.npz"', "7", "line 7: .* holds 7; write a list of text"),
+        ('"a.npz"', "7", "line 7: .* contains 7; write a list of text"),
         ('["a.npz"]', '["b.npz"]', r"line 7: .*no file 'b.npz'; did you mean 'a.npz'\?"),
         ("mass = 1.413", 'mass = "1.4"', "line 9: .* is not a number"),
         ("mass = 1.413", "mass = -1", "line 9: .* must be at least"),
         ("[1, 35]", "[1, 36]", r"line 11: \[test\] hangers: the deck has no grid 36, the nearest"),
         ("[10.0, 90.0]", "[90.0, 10.0]", "line 14: .* first must be below the second"),
-        ("[10.0, 90.0]", "[200.0, 300.0]", r"line 14: \[band\] fit .*a.npz, which holds 5 to 100"),
+        ("[10.0, 90.0]", "[200.0, 300.0]", r"line 14: \[band\] fit .*a.npz, which covers 5 to 100"),
         ("[[23.0, 27.5]]", "[[23.0]]", r"line 15: .*write \[low, high\]"),
         ('["12:+Z"]', '["99:+Z"]', r"line 18: \[held_out\] sensors: no output '99:\+Z'; there"),
         ('["12:+Z"]', "3", "line 18: .* between 0 and 2"),
@@ -221,7 +221,7 @@ def test_labels_without_a_place(folder: Path, outputs: tuple[str, ...], said: st
 
 def test_a_place_in_millimetres_is_noticed(folder: Path) -> None:
     change(folder, "0.25,0.1,0.002", "250,100,2", "sensors.csv")
-    with pytest.raises(ChladniError, match=r"269 m away .* places are in metres"):
+    with pytest.raises(ChladniError, match=r"269 m from .* places are in metres"):
         load_case(folder)
 
 

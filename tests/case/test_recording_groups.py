@@ -87,7 +87,7 @@ def test_the_same_numbers_are_no_repeat() -> None:
     rounded = replace(b, frf=replace(a.frf, values=a.frf.values.astype(np.complex64)))
     refuse_copies([a, noisy], "[test] recordings")
     for copy in (b, rounded):
-        with pytest.raises(FileError, match=r"\[test\] recordings: b.npz holds the same .* a.npz"):
+        with pytest.raises(FileError, match=r"\[test\] recordings: b.npz has the same .* a.npz"):
             refuse_copies([a, noisy, copy], "[test] recordings")
         refuse_copies([a, noisy, replace(copy, article="B")], "[test] recordings")
     said = notes_of([a, replace(b, article="B")])
@@ -108,7 +108,7 @@ def test_a_word_is_said_once_and_not_against_the_file() -> None:
     a = one("a.npz", "8:+Z", level=1.0, article="A")
     (named,) = described([told(file="a.npz", state="cold")], "a.npz", [a])
     assert (named.state, named.article, named.level) == ("cold", "A", 1.0)
-    with pytest.raises(FileError, match=r"level = 2\.0, but a\.npz itself says 1\.0"):
+    with pytest.raises(FileError, match=r"level = 2\.0, but a\.npz states 1\.0"):
         described([told(file="a.npz", level=2.0)], "a.npz", [a])
     with pytest.raises(FileError, match="described twice"):
         described([told(file="a.npz"), told(file="a.npz")], "a.npz", [a])

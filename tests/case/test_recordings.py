@@ -117,7 +117,7 @@ def test_places_count_where_numbers_coincide_by_chance(tmp_path: Path, factor: f
     found = places(section(), TestSetup(), made, labels, "output", recorded, notes)
     np.testing.assert_allclose(found.points, there, atol=1e-9)
     assert any("3 of 3 differ): the places were used" in n for n in notes)
-    assert any("fit the deck in mm" in n for n in notes) == (factor != 1)
+    assert any("read in mm, which fits the deck" in n for n in notes) == (factor != 1)
 
 
 @pytest.mark.parametrize("nodes", [{}, {k: np.zeros(3) for k in (1, 2, 3)}])
@@ -126,7 +126,7 @@ def test_labels_that_count_are_channels(tmp_path: Path, nodes: dict[int, np.ndar
     (tmp_path / "plate.bdf").write_text(deck())
     made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
     labels, recorded = ("1:+Z", "2:+Z", "3:+Z"), Recording("a.uff", nodes=nodes)
-    with pytest.raises(LabelError, match="number channels"):
+    with pytest.raises(LabelError, match="taken as channel numbers"):
         places(section(), TestSetup(), made, labels, "output", [recorded], [])
     known = dict(zip((1, 2, 3), made.points[made.rows([1, 2, 3])], strict=True))
     recorded = replace(recorded, nodes=known)

@@ -85,7 +85,7 @@ def test_mass_and_centre_are_those_of_the_devices(folder: Path) -> None:
     grids = case.assembly.points[case.assembly.rows([3, 8])]
     moment = 0.02 * grids[0] + 0.04 * grids[1] + 0.03 * np.array([0.35, 0.2, 0])
     assert_allclose(after * centre - before * at, moment, atol=1e-9)
-    said = "The model carries sensors of 50 g in all and 40 g where it is driven (sensors.csv)"
+    said = "The model carries sensors of 50 g in all and 40 g at the drive point (sensors.csv)"
     assert any(note.startswith(f"{said}, at 5 grids") for note in case.said("calibrate"))
     layout = placed_layout(as_model(case, "modes"), folder / "sensors.csv")[0]
     assert f"{said}." in layout.notes  # frf of a deck says of the same table the same

@@ -208,7 +208,7 @@ def test_plain_calibration_stands_beside():
     assert lines["E off, %"] == ["10", "1", "2"]
     assert lines["held-out Q"] == ["0.5", "0.2", "2"]
     assert "t off, %" not in lines
-    assert "not asked" in calibration_against_diagnosis([row(said(0.0), truth)])
+    assert "not tested" in calibration_against_diagnosis([row(said(0.0), truth)])
 
 
 def test_what_an_answer_leaves_open_is_no_crash():

@@ -36,5 +36,5 @@ def test_intervals_are_held_against_the_truth_and_what_is_missing_is_frozen():
     rows = compared_with({"E glue": 0.05, "rho": 0.0, "patch R": 0.0, "nu": 0.1}, found)
     assert [r.inside for r in rows] == [True, False, True, None]
     lines = summary([rows], [0.001])
-    assert "2 of 3 intervals of 95 % hold the truth (66.7%)" in lines[-1]
+    assert "2 of 3 intervals of 95 % contain the truth (66.7%)" in lines[-1]
     assert any(line.split()[:4] == ["nu", "0", "0", "1"] for line in lines)

@@ -36,16 +36,16 @@ GOOD = {
         ("level", np.array(np.inf), "level is inf; an amplitude must be finite and not negative"),
         ("level", np.array(np.nan), "level is nan"),
         ("level", np.array(-2.0), "level is -2"),
-        ("level", np.array("2020-01-01", dtype="datetime64[s]"), "level holds datetime64"),
-        ("values", np.full((6, 2, 1), "x"), "values holds <U1, not numbers"),
-        ("variance", np.full((6, 2, 1), "<script>"), "variance holds <U8"),
-        ("outputs", np.array(["1:+Z", "1:+Z"]), "output 1:.Z is there twice"),
+        ("level", np.array("2020-01-01", dtype="datetime64[s]"), "level has datetime64"),
+        ("values", np.full((6, 2, 1), "x"), "values has <U1, not numbers"),
+        ("variance", np.full((6, 2, 1), "<script>"), "variance has <U8"),
+        ("outputs", np.array(["1:+Z", "1:+Z"]), "output 1:.Z occurs twice"),
         ("frequency_hz", np.append(F[:-1], np.inf), "negative or not a number"),
         ("frequency_hz", F[:, None], r"frequencies are \(6, 1\); one list is due"),
         ("frequency_hz", F - 15.0, "negative or not a number"),
         ("huge", np.zeros(3), "unknown array huge"),
         ("quantity", np.array(["mobility", "mobility"]), "quantity has 2 texts; it must be one"),
-        ("outputs", np.array([["1:+Z"], ["2:+Z"]]), "outputs holds an array of 2 dimensions"),
+        ("outputs", np.array([["1:+Z"], ["2:+Z"]]), "outputs has an array of 2 dimensions"),
         (
             "values",
             np.where(F[:, None, None] == F[2], np.nan, np.ones((6, 2, 1))),
@@ -188,7 +188,7 @@ def test_a_doubled_or_lost_line_is_refused(tmp_path: Path) -> None:
     start = [k for k, line in enumerate(lines) if line.strip() == "58"][1]
     for new, said in (
         ([*lines[: start + 20], lines[start + 19], *lines[start + 20 :]], "a line is doubled"),
-        ([*lines[: start + 20], *lines[start + 21 :]], "values are there"),
+        ([*lines[: start + 20], *lines[start + 21 :]], "values are present"),
         ([*lines[:start], *lines[start + 1 :]], "not with its type"),
     ):
         path.write_text("\n".join(new))
@@ -236,7 +236,7 @@ def test_coherence_of_no_frf_is_named_and_twice_it_is_refused(tmp_path: Path) ->
     lines = written(path, np.full((61, 3, 1), 0.9))
     start = [k for k, line in enumerate(lines) if line.strip() == "58"]
     path.write_text("\n".join([*lines[:-1], *lines[start[1] - 1 : start[2] - 1], ""]))
-    with pytest.raises(ChladniError, match=r"coherence of 1:\+Z / 1:\+Z is there twice"):
+    with pytest.raises(ChladniError, match=r"coherence of 1:\+Z / 1:\+Z occurs twice"):
         read_uff(path)
 
 
@@ -248,7 +248,7 @@ def test_a_node_at_two_places_is_refused(tmp_path: Path) -> None:
         if good:
             np.testing.assert_allclose(read_uff(path).nodes[7], (1.0, 2.0, 0.5))
         else:
-            with pytest.raises(ChladniError, match=r"a\.uff, dataset 2 .*node 7 is there twice"):
+            with pytest.raises(ChladniError, match=r"a\.uff, dataset 2 .*node 7 occurs twice"):
                 read_uff(path)
 
 
@@ -259,8 +259,8 @@ def test_a_node_at_two_places_is_refused(tmp_path: Path) -> None:
         (13, 6, "1", r"real numbers are of format 1 \(DEC VMS\)"),
         (13, 6, "3", r"real numbers are of format 3 \(IBM 370\)"),
         (19, 12, "9", "states 9 lines of its head"),
-        (31, 12, "100", "holds 100 bytes of numbers, 144 are there"),
-        (31, 12, "288", "holds 288 bytes of numbers, 144 are there"),
+        (31, 12, "100", "states 100 bytes of numbers, but has 144"),
+        (31, 12, "288", "states 288 bytes of numbers, but has 144"),
         (31, 12, "many", "does not hold four counts"),
         (31, 12, "0", ""),  # not stated
     ],

@@ -117,13 +117,13 @@ def test_include(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [
-        ("            0.62", "            0.6b", "line 10: '0.6b' is no number"),
+        ("            0.62", "            0.6b", "line 10: '0.6b' is not a number"),
         ("       3       4\n", "       3       8\n", "shell 1 names a node"),
-        ("*ELEMENT_SHELL_THICKNESS", "*ELEMENT_SHELL", "is no number in .ELEMENT_SHELL$"),
+        ("*ELEMENT_SHELL_THICKNESS", "*ELEMENT_SHELL", "is not a number in .ELEMENT_SHELL$"),
         ("            0.70            0.71            0.72            0.72\n", "", "2 per element"),
         ("*NODE", "*INCLUDE\nnowhere.k\n*NODE", "no file 'nowhere.k'"),
         ("*NODE", "*INCLUDE\nbad.k\n*NODE", "line 4: 'bad.k' includes itself"),
-        ("            0.62", "             nan", "line 10: 'nan' is no number"),
+        ("            0.62", "             nan", "line 10: 'nan' is not a number"),
         (FIXED, "*KEYWORD\n*END\n", "both are needed"),
     ],
 )
@@ -155,9 +155,9 @@ SHELL_2 = FIXED.partition("0.64             0.0\n")[2].partition("*END")[0]
 @pytest.mark.parametrize(
     ("line", "other", "said"),
     [
-        (NODE_2, NODE_2.replace("10.0", "11.0"), "line 6: node 2 is there twice.* line 5 of a.k"),
+        (NODE_2, NODE_2.replace("10.0", "11.0"), "line 6: node 2 occurs twice.* line 5 of a.k"),
         (SHELL_2, SHELL_2.replace("0.71", "0.91"), "line 13: shell 2 .* line 11 of a.k"),
-        (SHELL_2, SHELL_2.replace("5", "6"), "line 13: shell 2 is there twice"),
+        (SHELL_2, SHELL_2.replace("5", "6"), "line 13: shell 2 occurs twice"),
     ],
 )
 def test_a_line_may_be_repeated_but_not_contradicted(tmp_path, line, other, said):
@@ -181,7 +181,7 @@ def test_a_word_that_is_no_finite_number_is_refused_with_its_line(tmp_path, word
     path.write_text(FIXED.replace(NODE_2, NODE_2.replace("10.0", f"{word:>4}"[-4:])))
     if word == "1e999":
         path.write_text(FREE.replace("0.0e+0", word))
-    with pytest.raises(FileError, match=rf"a.k, line \d: '{word}' is no number in \*NODE"):
+    with pytest.raises(FileError, match=rf"a.k, line \d: '{word}' is not a number in \*NODE"):
         read_keyword(path)
 
 
@@ -195,7 +195,7 @@ def test_a_mesh_that_contradicts_itself_is_refused(tmp_path):
         ("negative", "cell 3 .counted from 0. names point -1; there are 0 to 24"),
         ("beyond", "cell 3 .counted from 0. names point 25"),
         ("place", r"point 7 .counted from 0. is at \(nan, "),
-        ("thickness", "is no number"),
+        ("thickness", "is not a number"),
     ):
         points, cells, t = 1e3 * mesh.points, np.array(mesh.cells), scaled(mesh.nodal)
         if fault in ("negative", "beyond"):
@@ -276,7 +276,7 @@ def test_csv(tmp_path):
     assert mesh.ids.tolist() == [4, 5]
     path.write_text("# Node,x,y,z,Thickness,set\n4,0,0,0,0.6,A\n4,0,0,0,0.6,B\n")
     assert read_formed(path).ids.tolist() == [4, 4]
-    for cell, said in (("abc", "line 3: thickness is 'abc'"), ("0.7", "line 3: node 4 is there")):
+    for cell, said in (("abc", "line 3: thickness is 'abc'"), ("0.7", "line 3: node 4 occurs")):
         path.write_text(f"node,x,y,z,thickness\n4,0,0,0,0.6\n4,0,0,0,{cell}\n")
         with pytest.raises(FileError, match=rf"t\.csv, {said}"):
             read_formed(path)

@@ -38,7 +38,7 @@ def test_an_open_sheet_is_said_to_be_open(tmp_path):
 
 def test_triangles_wound_against_each_other_are_named(tmp_path):
     scan = read_scan(_saved(tmp_path, CORNERS, np.array([[0, 1, 2], [0, 3, 2]])))
-    assert any("Across 1 edges" in note for note in scan.notes)
+    assert any("both sides of 1 edges" in note for note in scan.notes)
 
 
 def test_triangles_without_area_are_left_out_and_counted(tmp_path):

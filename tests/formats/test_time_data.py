@@ -68,7 +68,9 @@ def test_wav_gets_units_from_the_table_beside_it(tmp_path: Path) -> None:
     """16 bits: shares of full scale to 2⁻¹⁶, times the scale of each channel."""
     numbers = np.round(np.vstack([FORCE, MOTION]).T * 32767).astype(np.int16)
     wavfile.write(tmp_path / "hit.wav", int(RATE), numbers)
-    with pytest.raises(ChladniError, match=r"hit.wav holds 3 channels .* write hit.channels.csv"):
+    with pytest.raises(
+        ChladniError, match=r"hit.wav has 3 channels .* add the file hit.channels.csv"
+    ):
         read_recordings(tmp_path / "hit.wav")
     (tmp_path / "hit.channels.csv").write_text(CHANNELS)
     found = the_record(tmp_path / "hit.wav")
@@ -141,7 +143,7 @@ def test_a_quantity_that_is_asked_for_counts(tmp_path: Path) -> None:
     (found,) = read_recordings(csv(tmp_path / "a.csv"), "receptance")
     assert found.time is not None
     assert found.time.quantity == "receptance"
-    assert "read as receptance as asked" in found.notes[-1]
+    assert "read as receptance as requested" in found.notes[-1]
 
 
 def test_responses_without_a_force_are_time_histories(tmp_path: Path) -> None:
@@ -235,7 +237,7 @@ def test_the_table_of_channels_is_held_to_its_words(tmp_path: Path) -> None:
         ("channel,label,unit\n8,7:+Z,N\n", r"a\.channels\.csv, line 2: no channel '8'"),
         ("channel,label,unit,role\n1,7:+Z,N,shaker\n", "line 2: role 'shaker'"),
         ("channel,label,unit\n1,,N\n", "line 2: channel 1 has no label"),
-        ("channel,label,unit\n1,7:+Z,N\n2,7:+Z,g\n3,7:+Z,g\n", r"channel 7:\+Z is there twice"),
+        ("channel,label,unit\n1,7:+Z,N\n2,7:+Z,g\n3,7:+Z,g\n", r"channel 7:\+Z occurs twice"),
     ):
         (tmp_path / "a.channels.csv").write_text(table)
         with pytest.raises(ChladniError, match=said):

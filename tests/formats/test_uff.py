@@ -205,18 +205,20 @@ def bad(path: Path, kind: str) -> Path:
     good = foreign(path, record(), record(rsp_node=5))
     if kind == "truncated":
         good.write_bytes(good.read_bytes()[:-60])
-    elif kind == "no universal file":
+    elif kind == "not a universal file":
         good.write_text("hello")
     elif kind == "not numbers":
         good.write_text(good.read_text().replace("5.00000000000e+00", "              NaN"))
-    elif kind == "are there":
+    elif kind == "are present":
         text = good.read_text().splitlines(keepends=True)
         del text[15]
         good.write_text("".join(text))
     return good
 
 
-@pytest.mark.parametrize("kind", ["truncated", "no universal file", "not numbers", "are there"])
+@pytest.mark.parametrize(
+    "kind", ["truncated", "not a universal file", "not numbers", "are present"]
+)
 def test_what_is_wrong_is_said_in_a_sentence(tmp_path: Path, kind: str) -> None:
     with pytest.raises(FileError, match=rf"(?s)a\.uff.*{kind}|a\.uff is {kind}") as said:
         read_uff(bad(tmp_path / "a.uff", kind))

@@ -127,7 +127,7 @@ def test_modes_of_nastran_itself():
     [
         ("none.pch", None, "no file"),
         ("modes.txt", "", "modes are read from .op2, .pch"),
-        ("modes.pch", "$TITLE\n", "holds no eigenvectors"),
+        ("modes.pch", "$TITLE\n", "has no eigenvectors"),
         ("modes.unv", "    -1\n    -1\n", "modes.unv"),
     ],
 )

@@ -61,7 +61,7 @@ def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_
     assert t.deck_value == pytest.approx(1e-3)
     assert "210 GPa" in page
     assert "frozen (186.7 GPa to 236.2 GPa by its prior)" in page
-    for title in ("What the data can know", "Basins of the fit", "How sure the values are"):
+    for title in ("Identifiability", "Basins of the fit", "Uncertainty of the values"):
         assert f"<h2>{title}</h2>" in page
     assert t.estimate.low < t.estimate.value < t.estimate.high
 

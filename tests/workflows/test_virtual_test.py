@@ -204,7 +204,7 @@ def test_a_case_without_sensors_is_refused(case):
         (["--excitation", "noise"], "no excitation"),
         (["--sensors", "x.csv"], "already defines sensors"),
         (["--band", "100:20"], "must increase"),
-        (["--band", "50:90000"], "GB of time data, more than the 1 GB"),
+        (["--band", "50:90000"], "GB of time data, more than the limit of 1 GB"),
         (["--resolution", "0.001", "--averages", "500"], "use lines of --resolution"),
     ],
 )

@@ -55,8 +55,8 @@ def make(
 ) -> None:
     """Make cases, seal their truths, publish the hashes.
 
-    They are in seals.json, of every truth and of every case's own files, before any answer is.
-    Stopped, it goes on with the same command.
+    The hashes of every truth and of the files of every case are in seals.json before any answer.
+    The same command continues a stopped run.
     """
     from chladni_evidence.benched_recording import RECORDERS
     from chladni_evidence.blind_make import make

@@ -8,8 +8,8 @@ def run(
     source: CaseFolder,
     out: Out = None,
 ) -> None:
-    """Fit E, rho and t of the parts (or what the case frees); write the updated deck and a page.
+    """Fit E, rho and t of the parts, or the case's parameters; write the updated deck and a page.
 
-    Modes are chosen by their frequency: [band] fit and exclude in case.toml.
+    Choose modes by their frequency: [band] fit and exclude in case.toml.
     """
     diagnosed("calibrate", source, out, calibrate)

@@ -11,7 +11,7 @@ def run(
     source: CaseFolder,
     out: Out = None,
 ) -> None:
-    """Look a case over before minutes are spent on it: units, mass, size, places, band, words."""
+    """Check a case before a long run: units, mass, size, places, band, words."""
     from ..report.check_page import check_page
 
     with started("check", source, out) as job:

@@ -27,10 +27,10 @@ def run(
     allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Paired modes, MAC, and the deviation Q by channel and band, nothing calibrated.
+    """Compare model and test without a fit: paired modes, MAC, deviation Q by channel and band.
 
-    A case is compared with its recording; with --modes a case or a bare deck with the modes of
-    another program.
+    A case is compared with its recording. With --modes, a case or a bare deck is compared with
+    the modes of another program.
     """
     with started("correlate", source, out) as job:
         if modes is not None:

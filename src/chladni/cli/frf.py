@@ -55,10 +55,10 @@ def run(
     ] = None,
     out: Out = None,
 ) -> None:
-    """Frequency responses between degrees of freedom.
+    """Compute frequency responses between degrees of freedom.
 
-    Without --input and --sensors those the deck asks for, or of a case those its first recording
-    holds.
+    Without --input and --sensors: the responses that the deck requests, or those of the first
+    recording of a case.
     """
     low, high = limits(band)
     per_force = [name for name in UNIT if name != "transmissibility"]

@@ -42,7 +42,7 @@ def run(
     ] = None,
     out: Out = None,
 ) -> None:
-    """Poles with their spread, damping, shapes; a stabilisation diagram, the fit, a state space."""
+    """Identify poles, damping and shapes with standard deviations; write a state space."""
     from ..report.identification_page import identification_page
 
     limit = limits(band) if band else None

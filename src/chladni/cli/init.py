@@ -30,7 +30,7 @@ def run(
     allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Write a case: units guessed, labels matched to the deck, what is missing named."""
+    """Draft a case: guess units, match labels to the deck, list missing words."""
     if mass is not None and not 0 < mass < 1e9:
         raise FileError(f"--mass {mass:g}: a weighed mass must be above zero, in kg")
     place = place_of("init", source, out)

@@ -42,10 +42,10 @@ def run(
     allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Thickness of a forming simulation or a scan, mapped onto the shells of a deck.
+    """Map the thickness of a forming simulation or a scan onto the shells of a deck.
 
     FORMED is an LS-DYNA keyword file, VTU or CSV with thickness, or a scan of both faces (STL, PLY,
-    OBJ). Writes the deck with a thickness at every corner, and what the mapping is worth.
+    OBJ). Writes the deck with a thickness at every corner, and the error of the mapping.
     """
     from ..report.map_page import map_page
 

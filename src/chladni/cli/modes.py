@@ -22,7 +22,7 @@ def run(
     ] = None,
     out: Out = None,
 ) -> None:
-    """Normal modes: frequencies, shapes, mass, energy of each part, a VTU file and pictures."""
+    """Compute normal modes: frequencies, shapes, mass, energy of each part, VTU file, pictures."""
     from ..report.modes_page import modes_page
 
     with started("modes", source, out) as job:

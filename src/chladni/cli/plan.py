@@ -66,7 +66,7 @@ def run(
     allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Sensors by effective independence and exchange, shaker and cords, lines and duration."""
+    """Plan a test: sensors by effective independence and exchange, shaker, cords, duration."""
     settings = PlanSettings(
         sensors=sensors,
         modes=modes,

@@ -44,10 +44,10 @@ def run(
     allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Pictures: modes, animations, thickness, strain energy, clearance, sections, a scan.
+    """Draw pictures: modes, animations, thickness, strain energy, clearance, sections, a scan.
 
-    Modes are numbered as by ``chladni modes``, from 1 with the rigid motions. A scan without
-    --align lies where the model lies.
+    Mode numbers are those of ``chladni modes``: from 1, with the rigid motions. A scan without
+    --align must already lie on the model.
     """
     chosen = numbers(modes)
     with started("render", source, out) as job:

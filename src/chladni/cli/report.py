@@ -22,7 +22,7 @@ def run(
     ] = None,
     title: Annotated[str, typer.Option(help="Title of the page.")] = "",
 ) -> None:
-    """Write report.html of a diagnosis again: after a note was changed, or for another title."""
+    """Write report.html of a diagnosis again, for example with a changed note or title."""
     result = read_diagnosis(folder)
     figures = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix in (".png", ".gif", ".svg")}
     tables = [Section("Pictures as files", [Links([(p.name, n) for n, p in figures.items()])])]

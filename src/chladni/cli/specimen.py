@@ -64,7 +64,7 @@ def run(
     units: Annotated[str, typer.Option(help="Unit system of the deck.")] = "mm-t-s",
     out: Out = None,
 ) -> None:
-    """A generated structure: its deck, candidates for sensors, thickness after forming.
+    """Generate a structure: its deck, candidates for sensors, thickness after forming.
 
     The thickness (LS-DYNA keyword file) is that of the tailgate and the panel; the sheets of box
     and plate are flat and keep their gauge.

@@ -73,9 +73,9 @@ def run(
     allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Sample parameters: frequencies, mass, responses and Q of every sample, and what moves them.
+    """Sample parameters: frequencies, mass, responses, Q of every sample, and sensitivities.
 
-    A study that was stopped goes on with the same command. Every finished sample is a line of
+    The same command continues a stopped study. Every finished sample is a line of
     samples.jsonl in --out.
     """
     settings = StudySettings(

@@ -16,8 +16,8 @@ _KNOWN = (
     "Plausible: values beyond stand for something else. Standard deviations before the fit, at the "
     "deck's values. Single: all other parameters "
     "known. All: every parameter free. Both from the data alone; mesh error, scatter, joints and "
-    "folds free. With priors: what the fit can reach. A parameter is frozen where the data tell "
-    "less than its prior; the intervals of the others count its prior."
+    "folds free. With priors: what the fit can reach. A parameter is frozen if its prior "
+    "determines it better than the data; the intervals of the others include its prior."
 )
 _BASINS = (
     "Fits from a Latin hypercube of {n} starts. Starts that end within 1 in -2 ln evidence and one "
@@ -25,7 +25,7 @@ _BASINS = (
 )
 _PROFILE = (
     "-2 ln profile likelihood above the best, all other parameters fitted again, at one and two "
-    "standard deviations. Beside it in brackets: what the interval of the table assumes."
+    "standard deviations. In brackets: the value assumed by the interval of the table."
 )
 
 
@@ -34,9 +34,9 @@ def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = (
     if study is None:
         return []
     return [
-        Section("What the data can know", _known(study.identifiability)),
+        Section("Identifiability", _known(study.identifiability)),
         Section("Basins of the fit", _basins(study)),
-        Section("How sure the values are", [*_profiles(study), *pictures]),
+        Section("Uncertainty of the values", [*_profiles(study), *pictures]),
     ]
 
 
@@ -56,8 +56,8 @@ def _known(found: Identifiability) -> list[Block]:
     texts = [f"prior of {name}: {reason}" for name, reason in reasons.items()]
     texts += [p.why for p in found.parameters if p.why]
     texts += [
-        f"the data do not tell {', '.join(f'{c:+.2f} % of {name}' for name, c in direction)} apart "
-        "from no change"
+        "the data cannot distinguish "
+        f"{', '.join(f'{c:+.2f} % of {name}' for name, c in direction)} from no change"
         for direction in found.directions
         if len(direction) > 1
     ]

@@ -86,7 +86,7 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
     deck = result.files.get("deck")
     if not deck or not result.deck_changed:
         return []
-    return [f"Use {deck}: it holds the change."]
+    return [f"Use {deck}: it contains the change."]
 
 
 def _validate(result: DiagnosisResult) -> list[str]:

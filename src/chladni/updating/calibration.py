@@ -69,7 +69,7 @@ def calibration(
     ----------
     freeze : False keeps parameters free that the data do not know; they are named all the same
     """
-    progress("what the data can know", 0.0)
+    progress("identifiability", 0.0)
     whole, known = problem, identifiability(_about_nominal(problem))
     problem = _without(whole, known.frozen if freeze else ())
     progress("calibration without new physics", 0.05)

@@ -286,7 +286,7 @@ def _why(k: int, names: Sequence[str], prior: np.ndarray, F: np.ndarray) -> str:
     makes_up = ", ".join(
         f"{answer[j] * prior[j] / prior[k]:+.2f} % of {names[j]}" for j in partners
     )
-    return f"{names[k]} trades off: {makes_up or 'many small changes'} undo +1 % of it"
+    return f"{names[k]} trades off: {makes_up or 'many small changes'} compensate +1 % of it"
 
 
 def _settled(k: int, told: Information, held: np.ndarray) -> str:

@@ -27,7 +27,7 @@ def test_a_card_not_known_is_refused_unless_allowed(bulk, card):
     ("name", "meant"), [("SPCC1", "SPC1"), ("RBE22", "RBE2"), ("GRIDD", "GRID")]
 )
 def test_a_misspelt_card_is_told_what_is_meant(name, meant):
-    assert f"is {meant} meant?" in refusal(name, 1)
+    assert f"did you mean {meant}?" in refusal(name, 1)
 
 
 def test_what_is_left_out_with_a_note_is_known():

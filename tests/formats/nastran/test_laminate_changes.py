@@ -114,5 +114,7 @@ def test_what_layers_cannot_take_on_together_is_refused(deck):
     stiff = replace(section.bending, Q=1.1 * section.bending.Q)
     bent = before.with_parts((before.parts[0].with_section(bending=stiff), before.parts[1]))
     for after in (thin, bent):
-        with pytest.raises(ModelError, match=r"laminate .* changed in a way its layers cannot"):
+        with pytest.raises(
+            ModelError, match=r"laminate .* changed in a way that its layers cannot"
+        ):
             laminate_changes(made, before, after, MM, count(900))

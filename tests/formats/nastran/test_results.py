@@ -91,9 +91,9 @@ def test_frequency_responses(tmp_path, polar, by_point):
     ("keep", "said"),
     [
         ([*range(20)], r"subcase 1: point 11 is missing in mode 2.* \(3 of 4 records\)"),
-        ([*range(21)], r"modes.pch:21: the record of grid 11 holds 3 values, 6 are due"),
-        ([*range(8), *range(9, 22)], r"modes.pch:8: the record of grid 7 holds 3 values"),
-        ([*range(9), *range(7, 22)], r"subcase 1: point 7 is there twice in mode 1"),
+        ([*range(21)], r"modes.pch:21: the record of grid 11 has 3 values, but 6 are required"),
+        ([*range(8), *range(9, 22)], r"modes.pch:8: the record of grid 7 has 3 values"),
+        ([*range(9), *range(7, 22)], r"subcase 1: point 7 occurs twice in mode 1"),
     ],
 )
 def test_a_cut_or_doubled_punch_file_is_refused(tmp_path, keep, said):
@@ -120,10 +120,10 @@ def test_what_is_not_there(tmp_path):
     with pytest.raises(FileError, match="has no frequency responses"):
         read_punch_responses(path)
     path.write_text(path.read_text().replace("G  ", "G O", 1))
-    with pytest.raises(FileError, match=r"modes.pch:\d+: .* no record"):
+    with pytest.raises(FileError, match=r"modes.pch:\d+: .* not a record"):
         read_punch_modes(path)
     (tmp_path / "bulk.pch").write_text("GRID    1\n")
-    with pytest.raises(FileError, match="holds no eigenvectors"):
+    with pytest.raises(FileError, match="has no eigenvectors"):
         read_punch_modes(tmp_path / "bulk.pch")
     with pytest.raises(FileError, match="cannot be read"):
         read_punch_modes(tmp_path / "none.pch")
