@@ -69,8 +69,8 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
     candidates, in this order, are the numbers found by the null, these fitted again without
     scatter, and plain calibration. Each of the first two must fit no worse than the given deck,
     with and without its mesh error. Plain calibration must have plausible numbers and not fit worse
-    in every respect. Otherwise the given deck stays; where it leaves the scales, the best of them is
-    taken. Joints beyond their usual scatter count as calibrated, whatever E, rho and t gain.
+    in every respect. Otherwise the given deck stays; where it leaves the scales, the best is taken
+    instead. Joints beyond their usual scatter count as calibrated, whatever E, rho and t gain.
     """
     table, rules = case.table, case.rules
     if decision.named:
