@@ -360,6 +360,24 @@ def test_numbers_of_a_calibration_serve_no_worse_than_the_deck(
     assert answer.verdict == (LITTLE if deck == "GIVEN" else "calibration only")
 
 
+@pytest.mark.parametrize(
+    ("found", "written", "plain", "implausible", "deck"),
+    [
+        ((1.2, 1.3), (1.1, 1.2), (1.1, 1.1), False, "PLAIN"),
+        ((1.2, 1.3), (1.1, 1.2), (0.9, 0.9), True, "WRITTEN"),
+        ((0.9, 1.0), (0.9, 1.0), (0.5, 0.5), False, "FOUND"),  # no worse than the deck
+        ((), (), (1.1, 1.1), True, "GIVEN"),  # no structure has any of these numbers
+    ],
+)
+def test_a_deck_that_leaves_the_scales_does_not_stay(found, written, plain, implausible, deck):
+    each = dict(zip(CalibratedDeck, (found, written, plain, (1.0, 1.0)), strict=True))
+    answer = decision(
+        table(decks=each, nominal=100.0, implausible=implausible, off_the_scales=True)
+    )
+    assert answer.deck is CalibratedDeck[deck]
+    assert answer.verdict == (LITTLE if deck == "GIVEN" else "calibration only")
+
+
 # the leader of a round
 
 

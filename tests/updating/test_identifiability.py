@@ -111,6 +111,21 @@ def in_other_units(effect, c):
     return InOtherUnits((unknown,), effect.text, of=effect, c=c)
 
 
+@dataclass(frozen=True, eq=False)
+class Scatter(InOtherUnits):
+    """The same change as a nuisance."""
+
+    kind = "nuisance"
+
+
+@pytest.mark.parametrize(("sd", "frozen"), [(1e-4, ()), (0.5, (E,))])
+def test_a_nuisance_that_does_the_same_hides_a_parameter(bare, sd, frozen):
+    """What the data tell of the sum of both is told of neither, unless the nuisance is small."""
+    (effect,) = sheet(bare, "E")
+    same = Scatter((Parameter("s", "-", 0.0, sd, kind="linear"),), "scatter", of=effect)
+    assert identifiability(problem(bare, [effect, same])).frozen == frozen
+
+
 def test_the_judgement_does_not_depend_on_units(bare):
     plain = identifiability(problem(bare, defaults(bare.groups), weighed=True))
     scales = (1e-3, 40.0, 2.5)

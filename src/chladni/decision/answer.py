@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from .hypothesis_table import CalibratedDeck
+from .hypothesis_table import CalibratedDeck, HypothesisTable
 from .judgement import JudgedTable
 from .reasons import ALONE, BEYOND, Decision, Reason, Step, names_of, steps
 from .tied import tied
@@ -54,6 +54,14 @@ def _with_doubt(case: JudgedTable, decision: Decision) -> Decision:
     return replace(decision, one_of=one_of, steps=steps(decision, step))
 
 
+def _best_deck(table: HypothesisTable) -> CalibratedDeck | None:
+    """The calibration that fits best as it is written, where the given deck leaves the scales."""
+    plain = () if table.implausible else (CalibratedDeck.PLAIN,)
+    tried = (CalibratedDeck.FOUND, CalibratedDeck.WRITTEN, *plain)
+    Q = {deck: table.deck(deck)[-1] for deck in tried if table.deck(deck)}
+    return min(Q, key=Q.__getitem__, default=None)
+
+
 def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
     """Choose the numbers of the calibration, where no effect is named.
 
@@ -61,8 +69,8 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
     candidates, in this order, are the numbers found by the null, these fitted again without
     scatter, and plain calibration. Each of the first two must fit no worse than the given deck,
     with and without its mesh error. Plain calibration must have plausible numbers and not fit worse
-    in every respect. Otherwise the given deck stays. Joints beyond their usual scatter count as
-    calibrated, whatever E, rho and t gain.
+    in every respect. Otherwise the given deck stays; where it leaves the scales, the best is taken
+    instead. Joints beyond their usual scatter count as calibrated, whatever E, rho and t gain.
     """
     table, rules = case.table, case.rules
     if decision.named:
@@ -82,6 +90,8 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
         Q = table.deck(CalibratedDeck.PLAIN)
         if not all(q > b for q, b in zip(Q, before, strict=True)):
             return decision
+    if table.off_the_scales and (best := _best_deck(table)) is not None:
+        return replace(decision, deck=best)
     verdict = decision.verdict
     verdict = "nothing missing" if verdict == "calibration only" else verdict
     return replace(

@@ -215,6 +215,8 @@ class HypothesisTable:
     implausible : whether plain calibration has implausible values
     decks : Q of each calibration, with and without the mesh error; () where there is no such fit;
         of ``GIVEN`` that of the given deck
+    off_the_scales : whether the given deck has another mass than was weighed, where calibration is
+        all that was asked
     families : number of known families, used where none was tried
     known_noise : whether evidence counts the covariance of the identification
     """
@@ -227,6 +229,7 @@ class HypothesisTable:
     enough: bool = True
     implausible: bool = False
     decks: Mapping[CalibratedDeck, tuple[float, ...]] = field(default_factory=dict)
+    off_the_scales: bool = False
     families: int = 1
     known_noise: bool = False
 

@@ -16,6 +16,7 @@ from .residual_localisation import ResidualLocalisation
 from .result import Agreement, MassComparison
 from .result_parts import foretells_worse
 
+LEAST = 0.005  # smaller changes of ln mass and stiffness are not named
 BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0}  # powers in the bending stiffness of a part
 
 
@@ -75,11 +76,11 @@ def _stands_for(fit: Fit, place: str) -> str:
         stiff[where] = stiff.get(where, 0.0) + BENDING.get(name, 0.0) * change
         heavy[where] = heavy.get(where, 0.0) + (name in ("rho", "t", "wall")) * change
     said = [
-        f"{where} {_more(stiff[where], 'stiffer', 'softer')} in bending and "
-        f"{_more(heavy[where], 'heavier', 'lighter')}"
+        f"{where} {' and '.join(words)}"
         for where in stiff
-        if max(abs(stiff[where]), abs(heavy[where])) > 0.01
-    ]
+        if (words := [*_more(stiff[where], "stiffer", "softer"),
+                      *_more(heavy[where], "heavier", "lighter")])
+    ]  # fmt: skip
     if not said:
         return (
             "the deck keeps its values, as no others fit better on its mesh: refine the mesh, or "
@@ -105,5 +106,7 @@ def _log_change(effect: Effect, x: np.ndarray) -> float:
     return float(np.log(row.value / p.value(p.nominal)))
 
 
-def _more(change: float, up: str, down: str) -> str:
-    return f"{abs(np.expm1(change)):.1%} {up if change > 0 else down}"
+def _more(change: float, up: str, down: str) -> Iterator[str]:
+    """A change of more than half a per cent in words."""
+    if abs(change) > LEAST:
+        yield f"{abs(np.expm1(change)):.1%} {up if change > 0 else down}"

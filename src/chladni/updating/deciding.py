@@ -222,8 +222,8 @@ def _calibrated(
 
     if deck is CalibratedDeck.GIVEN:
         x = given(problem, null)
-        if not found.hypotheses and _leaves_the_scales(problem, null, x):
-            return known.with_Q(deck, (np.inf, np.inf))
+        off = not found.hypotheses and _leaves_the_scales(problem, null, x)
+        known = replace(known, table=replace(known.table, off_the_scales=off))
         return known.with_Q(deck, Q(problem.base, x))
     try:
         made = numbers(prepared, found, known, deck)

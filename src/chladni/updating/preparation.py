@@ -16,8 +16,7 @@ from ..effects.effect_context import EffectContext, Setup
 from ..effects.model_families import joint_nuisances
 from ..effects.registry import catalogue, family
 from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
-from ..effects.weld_patch import FIELD as WELD_PATCH
-from ..effects.weld_patch import weld_patch
+from ..effects.weld_patch import WeldPatch, weld_patch
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
@@ -299,10 +298,7 @@ def updating_problem(
     nuisance: list[Effect],
     f_max: float,
 ) -> UpdatingProblem:
-    """The updating problem of a diagnosis: calibration parameters and nuisances are free.
-
-    A family of joints that the user frees as a whole has no nuisance of its own.
-    """
+    """The updating problem: calibration parameters, and the nuisances that they do not replace."""
     own = freed_by(question, reduced, f_max)
     gone = {name for e in own for name in e.replaces}
     base = [*own, *(e for e in nuisance if e.text not in gone)]
@@ -345,7 +341,7 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
     """
     if p.field in UNITS:
         return user_parameter(reduced.groups, p)
-    if p.field == WELD_PATCH:
+    if p.field == WeldPatch.name:
         return weld_patch(reduced.groups, p)
     placed = family(p.field).placed
     assert placed is not None
