@@ -49,7 +49,7 @@ def run(
     """
     from ..report.map_page import map_page
 
-    place = "mirrored" if mirror else "aligned" if align else "unchanged"
+    place = "mirrored" if mirror else "aligned" if align else "as it lies"
     pairs = dict(_pair(text) for text in pair or []) or None
     other = None if formed_units is None else unit_system(formed_units)
     with started("map", deck, out) as job:

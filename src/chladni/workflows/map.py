@@ -51,7 +51,7 @@ def map_formed(
     model: Model,
     formed: Path | str,
     units: Units | None = None,
-    place: str = "unchanged",
+    place: str = "as it lies",
     pairs: Mapping[str, int] | None = None,
     guess: bool = False,
     *,
