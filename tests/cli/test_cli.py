@@ -291,7 +291,7 @@ def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
     assert done.exit_code == 0, done.output
     assert call("modes", case, "--count", 12, "--out", tmp_path / "modes").exit_code == 0
     page = (out / "report.html").read_text()
-    assert all(word in page for word in ("MPC", "of the orders", "state_space.mat"))
+    assert all(word in page for word in ("MPC", "orders [%]", "state_space.mat"))
     (entry,) = json.loads((out / "identified.json").read_text())["recordings"]
     f = np.array(json.loads((tmp_path / "modes" / "modes.json").read_text())["frequency_hz"])
     f = f[(f > 25) & (f < 180)]
@@ -393,7 +393,7 @@ def test_answer_stands_where_no_card_holds_the_change(case, tmp_path):
     assert deck.model.assembly is final
     assert len(notes) == 1
     assert notes[0].startswith("no updated deck was written: ")
-    assert "changed in a way its layers cannot" in notes[0]
+    assert "changed in a way that its layers cannot" in notes[0]
 
 
 def test_specimen_comes_back_as_a_deck(tmp_path):

@@ -85,7 +85,7 @@ def test_a_package_that_cannot_be_used_is_one_sentence(installed, monkeypatch, t
     ("changes", "said"),
     [
         ({"effect": type("Loose", (Bolt,), {"name": "Loose Bolt"})}, "lower case with hyphens"),
-        ({"effect": type("Nameless", (Bolt,), {"name": "nothing"})}, "is its own"),
+        ({"effect": type("Nameless", (Bolt,), {"name": "nothing"})}, "needs its own name"),
         ({"candidates": None}, "neither candidates nor known places"),
         ({"cards": ()}, "or a reason why it has none"),
         ({"no_cards": "too heavy"}, "or a reason why it has none"),

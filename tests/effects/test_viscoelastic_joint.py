@@ -30,8 +30,9 @@ from chladni.model.assembly import Bushes
 from chladni.updating.accuracy import products
 from chladni.updating.damping_scatter import ModalDamping
 from chladni.updating.frequency_dependent_stiffness import Dissipated
-from chladni.updating.likelihood import Responses, along
+from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import constants, prior_residuals
+from chladni.updating.matrix_stack import along
 from chladni.updating.reduced_model import evaluate
 
 FLEXIBLE = slice(6, 12)

@@ -148,4 +148,4 @@ def test_what_is_found_several_times_is_said_once():
     """As levels do that all differ from the lowest."""
     one = Finding("not linear", "levels differ.", "warning", ("2:+Z",))
     said = Screening("a", (one, replace(one, kind="delay"), one)).sentence
-    assert said == "a is to be looked at: 2 times not linear (2:+Z), delay (2:+Z)"
+    assert said == "a is to be checked: 2 times not linear (2:+Z), delay (2:+Z)"

@@ -436,7 +436,7 @@ def test_deletion_respects_tight_regions(seed):
         (Rules([0, 1], near=~np.eye(9, dtype=bool)), ShapeError, "0 and 1 are too near"),
         (Rules(region=np.arange(9) // 5, most={0: 0, 1: 2}), ShapeError, "room for 2"),
         (Rules(region=np.arange(9) // 5, least={4: 1}), LabelError, "no candidate is in region 4"),
-        (Rules(region=np.arange(9) // 5, least={0: 3, 1: 3}), ShapeError, "ask for 6 sensors"),
+        (Rules(region=np.arange(9) // 5, least={0: 3, 1: 3}), ShapeError, "require 6 sensors"),
     ],
 )
 def test_impossible_requests_say_why(rules, error, words):

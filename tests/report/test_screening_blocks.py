@@ -28,8 +28,7 @@ FOUR = (
 def test_a_finding_of_all_is_one_sentence():
     said = of_all(FOUR)
     assert (
-        said
-        == "at fault: reversed sign (1:+Z) in all 4 recordings; to be looked at: not linear in a"
+        said == "at fault: reversed sign (1:+Z) in all 4 recordings; to be checked: not linear in a"
     )
     assert lead_of(FOUR) == f"4 recordings; {said}"
     first, second = notes_of_all(FOUR)

@@ -265,4 +265,4 @@ def test_a_ring_down_alone_is_a_recording(deck, tmp_path):
     assert ran.exit_code == 0, ran.output
     said = ran.output.replace("\n", " ")
     assert "no force: their natural frequencies are compared" in said
-    assert "the recordings hold neither" not in said
+    assert "the recordings have neither" not in said

@@ -101,7 +101,7 @@ def test_joints_that_slip_are_named_and_found_in_the_springs(run):
     assert effect["name"] == "joint-friction"
     assert "springs and bushes" in effect["where"]["text"]
     assert "joint-friction" in done.output
-    assert any("would be" in note for note in found["notes"])
+    assert any("for the fitted level alone" in note for note in found["notes"])
 
 
 def test_linear_joints_at_each_level_are_those_that_were_measured(run):

@@ -231,7 +231,7 @@ def test_what_drives_is_said_once(case, tmp_path):
     table.write_text(f"label,role\n{rows}\n{case.outputs.labels[0]},input\n")
     done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, "--input", "base:+Z")
     assert done.exit_code == 2
-    assert "names what drives" in done.output
+    assert "already names inputs" in done.output
     done = bench(tmp_path / "o", case.path, "--input", "base:+Z")
     assert done.exit_code == 2
     assert "is a case, which already defines sensors, drive point" in done.output
