@@ -108,7 +108,12 @@ def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
 
 
 def from_xarray(data: "xarray.Dataset", quantity: Quantity | None = None) -> FRF | ModalModel:
-    """Convert such a data set back, its dimensions in any order.
+    """Convert a data set of :func:`to_xarray` back, its dimensions in any order.
+
+    Parameters
+    ----------
+    data : with ``H`` over frequency [Hz], output and input, or ``shapes`` over dof and mode
+    quantity : of the responses, where the attribute ``quantity`` does not say it
 
     Returns
     -------
@@ -183,6 +188,8 @@ def from_sdynpy(data: Any, quantity: Quantity | None = None) -> FRF | ModalModel
 
     Parameters
     ----------
+    data : functions over frequency [Hz] in any order and shape, or shapes over one set of
+        coordinates
     quantity : of the responses, where ``comment1`` of the array does not say it
 
     Raises
