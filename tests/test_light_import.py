@@ -17,6 +17,11 @@ HEAVY = {
     "distributed",
     "SALib",
     "xarray",
+    "pandas",
+    "plotly",
+    "dask",
+    "control",
+    "sdynpy",
 }
 
 

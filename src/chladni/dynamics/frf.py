@@ -207,8 +207,17 @@ def synthesise(
 ) -> FRF:
     """Modal superposition on the frequency axis, H(ω) of :func:`transfer` at s = i ω.
 
-    ``phi_out`` and ``phi_in`` are rows of Φ (``modal.at(labels)``) or any directions. At 0 Hz the
-    receptance of a rigid mode is infinite: use higher frequencies.
+    At 0 Hz the receptance of a rigid mode is infinite: use higher frequencies.
+
+    Parameters
+    ----------
+    modal : frequencies, damping and shapes
+    phi_out, phi_in : (n_out, r), (n_in, r)   rows of Φ (``modal.at(labels)``), or any directions
+    frequency : (n_f,) [Hz]
+    outputs, inputs : labels of these rows
+    quantity : of the result
+    structural : True takes ω_r² (1 + 2 i ζ_r) instead of the viscous term
+    residual : contribution of the modes that were left out
     """
     frequency = np.asarray(frequency, dtype=float)
     s = 2j * np.pi * frequency

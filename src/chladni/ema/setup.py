@@ -142,9 +142,19 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A measured dof as the user describes it: its place, direction and mass.
+    """A sensor or an exciter as the user describes it.
 
-    Either ``grid`` or ``place`` is given; ``direction`` None means the normal of the surface.
+    Attributes
+    ----------
+    label : the name of the channel in the recording, as 412:+Z
+    grid : id of the grid it sits at; or
+    place : (3,)              its place in the basic frame [m]
+    direction : (3,)          unit vector in the basic frame; None: the normal of the surface
+    role : "output" (it measures) or "input" (it drives)
+    mass : on the article during the test [kg]
+    position_sd : standard deviation of the place [m]
+    gain : recorded value over true value [-]
+    use : False leaves an output out
     """
 
     label: str

@@ -7,7 +7,7 @@ pandas (for pyFBS) or python-control. Numbers are SI throughout.
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, cast, get_args, overload
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
@@ -64,10 +64,6 @@ def _package(name: str, install: str) -> ModuleType:
         raise FileError(f"{name} cannot be imported ({error}); pip install {install}") from None
 
 
-@overload
-def to_xarray(data: FRF) -> "xarray.Dataset": ...
-@overload
-def to_xarray(data: ModalModel) -> "xarray.Dataset": ...
 def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
     """Convert responses or modes to a data set.
 
@@ -108,7 +104,12 @@ def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
 
 
 def from_xarray(data: "xarray.Dataset", quantity: Quantity | None = None) -> FRF | ModalModel:
-    """Convert such a data set back, its dimensions in any order.
+    """Convert a data set of :func:`to_xarray` back, its dimensions in any order.
+
+    Parameters
+    ----------
+    data : with ``H`` over frequency [Hz], output and input, or ``shapes`` over dof and mode
+    quantity : of the responses, where the attribute ``quantity`` does not say it
 
     Returns
     -------
@@ -183,6 +184,8 @@ def from_sdynpy(data: Any, quantity: Quantity | None = None) -> FRF | ModalModel
 
     Parameters
     ----------
+    data : functions over frequency [Hz] in any order and shape, or shapes over one set of
+        coordinates
     quantity : of the responses, where ``comment1`` of the array does not say it
 
     Raises

@@ -16,7 +16,15 @@ def write_vtu(
     shapes: np.ndarray | None = None,
     frequency: np.ndarray | None = None,
 ) -> Path:
-    """Write points, elements, thickness and part; shapes (n_points, 3, r) as vectors per mode."""
+    """Write points, elements, thickness and part, and shapes as vectors, for ParaView.
+
+    Parameters
+    ----------
+    path : file, replaced if there
+    assembly : the structure
+    shapes : (n_points, 3, r)   translations of all points in the basic frame
+    frequency : (r,) [Hz]       for the names of the modes
+    """
     import meshio
 
     blocks = _blocks(assembly)

@@ -231,15 +231,19 @@ def _read_scores(q: Mapping[str, Any]) -> Scores:
     return Scores(**{name: q.get(key) for key, name in _Q.items()})
 
 
-def read_diagnosis(folder: Path) -> DiagnosisResult:
-    """The result of a run from its ``diagnosis.json``.
+def read_diagnosis(folder: Path | str) -> DiagnosisResult:
+    """Read the result of a run from its ``diagnosis.json``.
+
+    Parameters
+    ----------
+    folder : of the run; the result has no structure, hence no pictures
 
     Raises
     ------
     FileError
         If it is not there, or is no diagnosis.
     """
-    path = folder / "diagnosis.json"
+    path = Path(folder) / "diagnosis.json"
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -29,7 +29,7 @@ def calibrate(
 
     Parameters
     ----------
-    source, recording, progress, words : as in :func:`chladni.diagnose`
+    source, recording, progress, words : as in :func:`chladni.diagnose` (SI, Hz)
 
     Raises
     ------

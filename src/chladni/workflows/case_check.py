@@ -92,7 +92,7 @@ def check(
 
     Parameters
     ----------
-    source, recording, progress, words : as in :func:`chladni.diagnose`
+    source, recording, progress, words : as in :func:`chladni.diagnose` (SI, Hz)
 
     Raises
     ------

@@ -87,7 +87,7 @@ def correlate(
 
     Parameters
     ----------
-    source, recording, progress, words : as in :func:`chladni.diagnose`
+    source, recording, progress, words : as in :func:`chladni.diagnose` (SI, Hz)
     every_line : False if only its screening is needed: the modes of a long recording are then
         identified from the lines that screening needs
 

@@ -30,6 +30,16 @@ class WorkingModel(Model):
     """A model of a deck; nothing in it changes, :meth:`variant` makes another one.
 
     Modes are numbered from 1 with the rigid ones counted, as Nastran does.
+
+    Attributes
+    ----------
+    source : Path             of the deck or case
+    assembly : Assembly       the structure, SI (in the deck's own units without ``units``)
+    structure : Structure     its matrices, built at first use
+    units, length : of the deck, and its unit of length [m]
+    unit : of lengths, "m"; "" where the unit system is not known
+    notes : cards of the deck that were left out
+    deck : Deck               that was read
     """
 
     def modes(self, count: int = 20) -> NormalModes:

@@ -14,7 +14,14 @@ from ...output import atomic
 
 
 def write_npz(path: str | Path, frf: FRF) -> None:
-    """FRF as NPZ (the arrays `read_npz` takes)."""
+    """Write responses as NPZ, every digit kept.
+
+    Parameters
+    ----------
+    path : file, replaced if there
+    frf : its arrays as ``frequency_hz`` (n_f,) [Hz], ``values`` (n_f, n_out, n_in), ``outputs``,
+        ``inputs``, ``quantity``, ``coherence``, ``variance``
+    """
     arrays: dict[str, Any] = dict(
         frequency_hz=frf.frequency,
         values=frf.values,
@@ -29,7 +36,14 @@ def write_npz(path: str | Path, frf: FRF) -> None:
 
 
 def write_csv(path: str | Path, frf: FRF) -> None:
-    """FRF as CSV, one row per line and channel, every digit kept."""
+    """Write responses as CSV, one row per line and channel, every digit kept.
+
+    Parameters
+    ----------
+    path : file, replaced if there
+    frf : in columns ``frequency_hz``, ``output``, ``input``, ``real``, ``imag``, and ``coherence``
+        and ``variance`` where it has them
+    """
     extra = [name for name in ("coherence", "variance") if getattr(frf, name) is not None]
 
     def rows(file: IO) -> None:

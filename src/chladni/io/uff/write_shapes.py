@@ -24,10 +24,12 @@ def write_shapes(
 
     Parameters
     ----------
+    path : file, replaced if there
     frequency : (r,) [Hz]
     motion : (n, 3, r)     translation of every node in the basic frame [1/√kg], modal masses are 1
     ids, places : (n,), (n, 3) [m]
     damping : fraction of critical of every mode
+    title : first line of the header
     """
     nodes = dict(zip(ids.tolist(), places, strict=True))
     shapes = (
