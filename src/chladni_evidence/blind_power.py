@@ -1,20 +1,18 @@
 """Power of a diagnosis: how often effects of each size are named, and how often none is made up."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from scipy.stats import beta
 
 from chladni.output import write_json, write_text
-from chladni.view.paper import LEGEND, TITLE, save
+from chladni.view.evaluation_plots import shares_over_size
 
 from .blind_score import score
 from .outcome_row import NULLS, Row
 
 NAMED = ("right", "among")
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")  # Okabe and Ito 2008
 
 
 @dataclass(frozen=True)
@@ -68,26 +66,12 @@ def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[
     lines.append("size: change of the responses over that by scatter and mesh; none: false alarms")
     write_json(outs[0] / "power.json", {n: [vars(s) for s in every] for n, every in found.items()})
     write_text(outs[0] / "power.txt", "\n".join(lines) + "\n")
-    draw(outs[0] / "power.png", found)
+    curves = {
+        name: ([s.times for s in every], [s.named / s.cases for s in every],
+               [s.interval for s in every])
+        for name, every in found.items()
+    }  # fmt: skip
+    shares_over_size(outs[0] / "power.png", curves)
     for line in lines:
         say(line)
     return found
-
-
-def draw(path: Path, found: Mapping[str, Sequence[Share]]) -> Path:
-    """Draw the share named over the size of the effect, with intervals of 90 %."""
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
-    ax = figure.subplots()
-    for k, (name, every) in enumerate(found.items()):
-        x = [s.times for s in every]
-        y = [s.named / s.cases for s in every]
-        ends = [s.interval for s in every]
-        off = [[a - low for a, (low, _) in zip(y, ends, strict=True)],
-               [high - a for a, (_, high) in zip(y, ends, strict=True)]]  # fmt: skip
-        ax.errorbar(x, y, off, marker="o", capsize=3, color=COLOURS[k % 4], label=name)
-    ax.set_ylim(-0.03, 1.03)
-    ax.set_xlabel("size of the effect, times scatter and mesh (0: no effect, false alarms)")
-    ax.set_ylabel("share named")
-    ax.set_title("Power of the diagnosis", loc="left", **TITLE)
-    ax.legend(**LEGEND)
-    return save(figure, path)

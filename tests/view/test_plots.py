@@ -98,7 +98,7 @@ PLOTS = {  # name: the drawing, and words that must stand on it
             np.stack([R * 1e-6, R, R / 1e4], axis=1), "micro-slip", (70.0, 0.006),
         ),
         ("friction: 30 Hz", "amplitude [mm]", "natural frequency [Hz]", "damping [% of critical]",
-         "micro-slip, fitted to all", "foretold", "one linear model", "measured"),
+         "micro-slip, fitted to all", "predicted from the others", "one linear model", "measured"),
     ),
 }  # fmt: skip
 

@@ -123,7 +123,7 @@ def test_page_and_json_hold_the_levels(run):
     assert moving
     assert all(len(t["rows"]) == len(LEVELS) for t in moving)
     text = (out / "report.html").read_text()
-    assert "foretold" in text
+    assert "predicted" in text
     assert "Joints at each level" in text
     assert list(out.glob("levels_*.png"))
     assert plain(diagnosis_json(from_json(found))) == found

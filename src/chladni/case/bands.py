@@ -38,11 +38,11 @@ def _inside(
         lines = int(np.count_nonzero((low <= f) & (f <= high)))
         if high - low < 0.5 * (band[1] - band[0]) or lines < 2:
             raise FileError(
-                f"{section.at(key)} = [{band[0]:g}, {band[1]:g}] Hz lies outside of {r.name}, "
-                f"which holds {f[0]:g} to {f[-1]:g} Hz ({lines} lines in common)"
+                f"{section.at(key)} = [{band[0]:g}, {band[1]:g}] Hz lies outside {r.name}, which "
+                f"covers {f[0]:g} to {f[-1]:g} Hz ({lines} lines in common)"
             )
         if (low, high) != band and max(low - band[0], band[1] - high) > 0.02 * (high - low):
-            notes.append(f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, all {r.name} holds")
+            notes.append(f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, as in {r.name}")
         band = (low, high)
     return band
 

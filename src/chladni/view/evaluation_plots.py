@@ -1,12 +1,13 @@
-"""Pictures of a test's evaluation: coherence, distortion, damping against amplitude."""
+"""Pictures of evaluations: coherence, distortion, damping against amplitude, power."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from .paper import AFTER, BEFORE, LEGEND, TEST, save
+from .paper import AFTER, BEFORE, LEGEND, TEST, TITLE, save
 
 _COLOURS = (TEST, AFTER, BEFORE, "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 _STYLES = ("-", (0, (4, 2)), (0, (1, 1)))
@@ -52,4 +53,23 @@ def amplitude_dependence(
         ax.grid(which="both", lw=0.3, alpha=0.5)
     right.set_ylim(bottom=0.0)
     figure.legend(loc="outside upper left", ncols=3, **LEGEND)
+    return save(figure, path)
+
+
+def shares_over_size(
+    path: Path | str,
+    curves: Mapping[str, tuple[Sequence[float], Sequence[float], Sequence[tuple[float, float]]]],
+) -> Path:
+    """Draw shares of named effects over their size: {label: (size, share, interval)}."""
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    ax = figure.subplots()
+    for (label, (size, share, ends)), colour in zip(curves.items(), cycle(_COLOURS)):
+        low, high = np.array(ends).T
+        off = np.array([share - low, high - share])
+        ax.errorbar(size, share, off, marker="o", capsize=3, color=colour, label=label)
+    ax.set_ylim(-0.03, 1.03)
+    ax.set_xlabel("size of the effect, times scatter and mesh (0: no effect, false alarms)")
+    ax.set_ylabel("share named")
+    ax.set_title("Power of the diagnosis", loc="left", **TITLE)
+    ax.legend(**LEGEND)
     return save(figure, path)
