@@ -76,9 +76,9 @@ def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(case, tmp_path, 
     monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: off)
     done = call("calibrate", case.path.parent, "--out", tmp_path / "out")
     assert done.exit_code == 3, (done.output, done.exception)
-    assert "1.00% off" in done.stderr
+    assert "by 1.00%" in done.stderr
     d = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
-    assert "not to be trusted" in d["distrust"][0]
+    assert "do not trust the result" in d["distrust"][0]
     assert "Reasons for doubt" in (tmp_path / "out" / "report.html").read_text()
     assert (tmp_path / "out" / "calibrated.bdf").exists()
 
