@@ -1,4 +1,4 @@
-"""The bands of a case, the sensors that no fit may see, the effects that are tried."""
+"""The bands of a case, its held-out sensors, and the effects that are tried."""
 
 from collections.abc import Sequence
 
@@ -50,7 +50,7 @@ def _inside(
 def held_out(
     keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
 ) -> tuple[int | tuple[str, ...] | None, tuple[float, float] | None]:
-    """Sensors (how many, or which) and band that no fit may see."""
+    """Held-out sensors (how many, or which) and band."""
     section = keys.section("held_out", known("held_out"))
     band = section.band("band")
     if band is not None:

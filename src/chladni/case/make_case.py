@@ -16,7 +16,7 @@ from .schema import SCHEMA, known
 from .toml_sections import KeyFile, TomlSection
 
 Measured = str | Path | FRF | PoleTable | Recording | Mapping[str, Any]
-"""What was measured: a file, responses, poles, a recording, or the keys of a [[recording]]."""
+"""A measurement: a file, responses, poles, a recording, or the keys of a [[recording]]."""
 
 _RENAMED = {  # argument: word of a case, where the names differ
     "band": ("band", "fit"),
@@ -232,6 +232,10 @@ class _ArgumentFile(KeyFile):
         """Add a section that may be repeated."""
         there = self.tables.setdefault(section, [])
         there.append(_Arguments(self.path, section, _plain(values), {}, len(there) + 1))
+
+    def written(self, section: str, key: str, example: str) -> str:
+        """Say which argument is meant."""
+        return f"the {self.empty(section).at(key)}"
 
     def empty(self, name: str) -> TomlSection:
         """A section of which no argument was given."""

@@ -171,6 +171,10 @@ class KeyFile:
         section.only(known)
         return section
 
+    def written(self, section: str, key: str, example: str) -> str:
+        """Say where a key is written, with an example."""
+        return f"{key} = {example} under [{section}]"
+
     def empty(self, name: str) -> TomlSection:
         """A table that is not there."""
         return TomlSection(self.path, name, {}, {}, 1)

@@ -7,7 +7,7 @@ pandas (for pyFBS) or python-control. Numbers are SI throughout.
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, cast, get_args, overload
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
@@ -64,10 +64,6 @@ def _package(name: str, install: str) -> ModuleType:
         raise FileError(f"{name} cannot be imported ({error}); pip install {install}") from None
 
 
-@overload
-def to_xarray(data: FRF) -> "xarray.Dataset": ...
-@overload
-def to_xarray(data: ModalModel) -> "xarray.Dataset": ...
 def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
     """Convert responses or modes to a data set.
 

@@ -75,7 +75,7 @@ class _Paged:
 
 
 def closing_sections(notes: Sequence[str], files: Sequence[tuple[str, str]]) -> list[Section]:
-    """The last sections of a page: notes, and the files beside it."""
+    """The last sections of a page: notes and files."""
     from .blocks import Links
 
     return [

@@ -16,9 +16,9 @@ from .unit_check import refuse_other_units
 def nothing_measured(case: Case) -> FileError:
     """Return the error for a case without data to compare a model with."""
     if not case.recordings:
+        how = case.keys.written("test", "recordings", '["recording.uff"]')
         return FileError(
-            f"{case.path} has no recording to compare with the model; give it as recordings = "
-            '["recording.uff"] under [test]'
+            f"{case.path} has no recording to compare with the model; give it as {how}"
         )
     return FileError(f"{case.path}: the recordings have neither FRFs nor a table of poles")
 
