@@ -136,5 +136,7 @@ def test_what_cannot_go_together_is_named(folder, case):
         chladni.check(chladni.load(folder / "plate.bdf", "SI"), units="mm-t-s")
     with pytest.raises(ChladniError, match="no file or folder"):
         chladni.diagnose(Path("nowhere.bdf"), case.frfs[0])
-    with pytest.raises(ChladniError, match="has no recording .* give it as the argument recording"):
+    with pytest.raises(
+        ChladniError, match=r"has no recording .* give it as the argument recording"
+    ):
         chladni.diagnose(folder / "plate.bdf", units="SI")
