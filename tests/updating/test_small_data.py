@@ -89,7 +89,7 @@ def test_few_poles_calibrate_and_name_nothing(tmp_path: Path, count: int) -> Non
     found = diagnose(case)
     assert (found.verdict, found.effects) == ("not in catalogue", ())
     assert found.one_of[0][0] == "calibration alone"
-    with pytest.raises(AccuracyError, match=r"modes? cannot support a name: 8 modes"):
+    with pytest.raises(AccuracyError, match=r"modes? cannot support a name: at least 8 modes"):
         found.trusted()
     assert len(correlate(case).f_test) == count
 
