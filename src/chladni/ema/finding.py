@@ -28,7 +28,7 @@ class Finding:
     ----------
     kind : what it is, in a few words (duplicated channels, reversed sign, delay, ...)
     text : one sentence with the numbers
-    severity : a fault is to be mended before anything is fitted; a warning is to be looked at
+    severity : a fault is to be mended before anything is fitted; a warning is to be checked
     channels : labels of the outputs (or inputs) it concerns; none: the whole chain
     repair : a line of case.toml or sensors.csv that would mend it, or what to do
     value : its size (a gain, a delay [s], a ratio, ...), nan where it has none
@@ -109,7 +109,7 @@ def of_all(screenings: Sequence[Screening]) -> str:
 
     >>> turned, late = Finding("reversed sign", "..."), Finding("delay", "...", "warning")
     >>> of_all([Screening("a", (turned,)), Screening("b", (turned, late)), Screening("c")])
-    'at fault: reversed sign in a, b; to be looked at: delay in b'
+    'at fault: reversed sign in a, b; to be checked: delay in b'
     """
     said = []
     for severity, word in (("fault", "at fault"), ("warning", "to be checked")):

@@ -54,7 +54,7 @@ def in_words(found: CaseCheck) -> PageParts:
 def _unused_words(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
     """(commands, sentences): what is said to the same commands together, and once.
 
-    >>> _told({"calibrate": ("a", "b"), "diagnose": ("a",), "study": ("b",)})
+    >>> _unused_words({"calibrate": ("a", "b"), "diagnose": ("a",), "study": ("b",)})
     [('calibrate, diagnose', ['a']), ('calibrate, study', ['b'])]
     """
     out: dict[str, list[str]] = {}

@@ -68,7 +68,7 @@ def refusal(name: str, count: int) -> str:
     >>> refusal("CQUAD4", 1), refusal("DESVAR", 1)
     ('', '')
     >>> refusal("SPCC1", 2)
-    'SPCC1 (of which there are 2) is not understood and may change the structure; is SPC1 meant?'
+    'SPCC1 (2 cards) is not understood and may change the structure; did you mean SPC1?'
     """
     if name in FIELDS or name in HARMLESS or name in LEGACY or name in FOLLOWS_TEMPERATURE:
         return ""
