@@ -486,7 +486,10 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
         (["frf", "--input", "999:+Z", "--output", "1:+Z"], "999"),
         (["frf"], "--input"),
         (["frf", "--input", "1:+Z"], "--output"),
-        (["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"], "alone"),
+        (
+            ["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"],
+            "must be the only input",
+        ),
         (["frf", "--input", "1:up", "--output", "1:+Z"], "1:up"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "9"], "--band"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "1:inf"], "be finite"),

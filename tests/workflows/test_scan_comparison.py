@@ -93,7 +93,7 @@ def test_render_shows_sections_and_the_scan(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"), [("q=1", "not of the form x=0.3"), ("x=9", "runs from 0 to")]
+    ("text", "sentence"), [("q=1", "not of the form x=0.3"), ("x=9", "extends from 0 to")]
 )
 def test_a_plane_that_means_nothing_is_refused(tmp_path, text, sentence):
     write_assembly(PANEL, tmp_path / "panel.bdf", units("SI"))
