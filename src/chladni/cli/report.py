@@ -15,7 +15,7 @@ from .run import folder_named
 
 
 def run(
-    folder: Annotated[Path, typer.Argument(metavar="RUN_FOLDER", help="What a diagnosis wrote.")],
+    folder: Annotated[Path, typer.Argument(metavar="RUN_FOLDER", help="Folder of a diagnosis.")],
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Path of the page.", metavar="DIR", parser=folder_named),

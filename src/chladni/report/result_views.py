@@ -79,7 +79,7 @@ def closing_sections(notes: Sequence[str], files: Sequence[tuple[str, str]]) -> 
     from .blocks import Links
 
     return [
-        Section("What was done, and why", [Items(notes)] if notes else []),
+        Section("Steps and reasons", [Items(notes)] if notes else []),
         Section("Files", [Links(files)] if files else []),
     ]
 
@@ -94,7 +94,7 @@ def _text(parts: PageParts) -> str:
 def _html(title: str, parts: PageParts) -> str:
     from .page import sections_page
 
-    notes = Section("What was done, and why", [Items(parts.notes)] if parts.notes else [])
+    notes = Section("Steps and reasons", [Items(parts.notes)] if parts.notes else [])
     return sections_page(title, [*parts.sections, notes], lead=parts.lead)
 
 
