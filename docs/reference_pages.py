@@ -584,16 +584,17 @@ def python_interface() -> str:
     """Exports of the packages, by autodoc."""
     from importlib import import_module
 
-    out = ["# Python interface\n", BY.format("its docstrings")]
+    out, shown = ["# Python interface\n", BY.format("its docstrings")], set[int]()
     for name, title in _EXPORTS.items():
         module = import_module(name)
         out.append(f"## {title}: `{name}`\n\n{plain(module.__doc__)}\n\n```{{eval-rst}}")
-        out += [f"{directive}\n" for directive in _directives(module)]
+        out += [f"{directive}\n" for directive in _directives(module, shown)]
         out.append("```\n")
     return "\n".join(out)
 
 
-def _directives(module: Any) -> Iterable[str]:
+def _directives(module: Any, shown: set[int]) -> Iterable[str]:
+    """Directives of a module's exports; what another module has shown already is left out."""
     own = [n for n, v in vars(module).items() if getattr(v, "__module__", "") == module.__name__]
     package = hasattr(module, "__path__")
     names = getattr(module, "__all__", None) or [
@@ -601,6 +602,9 @@ def _directives(module: Any) -> Iterable[str]:
     ]
     for name in names:
         value = getattr(module, name)
+        if id(value) in shown:
+            continue
+        shown.add(id(value))
         if inspect.isclass(value):
             yield f".. autoclass:: {module.__name__}.{name}\n   :members:"
         elif callable(value):
