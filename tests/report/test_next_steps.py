@@ -69,3 +69,12 @@ def test_a_structure_that_was_not_weighed_is_weighed():
                  steps(verdict="nothing missing", mass={"model_kg": 2.0, "weighed_kg": kg}))
              for kg in (None, 2.0)]  # fmt: skip
     assert weigh == [True, False]
+
+
+@pytest.mark.parametrize(("doubts", "verb"), [([], "Use"), (["held-out Q grew"], "Do not use")])
+def test_a_deck_is_recommended_only_without_a_doubt(doubts, verb):
+    found = steps(
+        verdict="calibration only", distrust=doubts,
+        files={"deck": "calibrated.bdf"}, deck_changed=True,
+    )  # fmt: skip
+    assert any(s.startswith(f"{verb} calibrated.bdf") for s in found)

@@ -86,6 +86,8 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
     deck = result.files.get("deck")
     if not deck or not result.deck_changed:
         return []
+    if result.distrust:
+        return [f"Do not use {deck} before the reasons for doubt are settled."]
     return [f"Use {deck}: it contains the change."]
 
 
