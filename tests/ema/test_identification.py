@@ -222,7 +222,7 @@ def test_vector_fitting_finds_poles_from_afar() -> None:
 
 def test_a_band_without_lines_is_refused() -> None:
     with pytest.raises(
-        FileError, match=r"0 lines between [\d.]+ and [\d.]+ Hz .* holds 20 to 200 Hz"
+        FileError, match=r"0 lines between [\d.]+ and [\d.]+ Hz .* covers 20 to 200 Hz"
     ):
         identify(a_truth(0, 4, 2).frf(EVEN, "mobility", 0.01), band=(300, 400))
 

@@ -62,7 +62,7 @@ def test_what_ran_out_of_steps_is_fitted_to_the_end(monkeypatch, status, running
 
 
 @pytest.mark.parametrize(("gains", "followed"), [([5.0, 3.0], 3), ([0.5, 9.0], 1), ([5.0], 2)])
-def test_a_leader_goes_on_to_where_its_family_finds_it_closer(monkeypatch, gains, followed):
+def test_a_leader_goes_on_to_where_its_family_finds_it_closer(gains, followed):
     """Until it gains no more, or nothing next to it does; from the base of its own fit."""
     bases, lead = [], hypothesis_at("weld", 50.0)
 
@@ -71,12 +71,11 @@ def test_a_leader_goes_on_to_where_its_family_finds_it_closer(monkeypatch, gains
         return Candidate(effect, x, context.bases[-1]) if len(bases) <= len(gains) + 1 else None
 
     left = iter(50.0 - np.cumsum([*gains, 0.0]))
+    families = (SimpleNamespace(name="weld", closer=closer),)
     problem = SimpleNamespace(
-        base=(), where=None, mean=lambda: np.zeros(0),
+        base=(), where=None, mean=lambda: np.zeros(0), families=families,
         fitted_with=lambda effect, start, base: hypothesis_at("weld", next(left)),
     )  # fmt: skip
-    families = (SimpleNamespace(name="weld", closer=closer),)
-    monkeypatch.setattr(search_round, "families", lambda: families)
     assert len(_closer(problem, NULL, lead)) == followed
     assert len(bases) == followed
     assert _closer(problem, NULL, hypothesis_at("of another family", 50.0)) == []

@@ -16,10 +16,10 @@ from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.mass_patch import MassPatch
 from chladni.effects.point_mass import PointMass
+from chladni.effects.registry import catalogue
 from chladni.effects.search_context import Candidate
 from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
 from chladni.fem.energy import mass_properties
-from chladni.updating import candidates as scanned
 from chladni.updating import diagnosis as diagnosing
 from chladni.updating.candidates import candidates, repeats
 from chladni.updating.deciding import on_its_own_basis
@@ -36,13 +36,7 @@ from chladni.updating.written_hypothesis import as_written
 SENSORS = [1, 7, 57, 63, 25, 39]
 TOP, LINES = 200.0, 30
 HELD = slice(-4, None)  # lines
-FEW = (point_mass.FAMILY, sensor_mass.FAMILY)
-
-
-@pytest.fixture(autouse=True)
-def few_families(monkeypatch):
-    """Two families are enough to go wrong with."""
-    monkeypatch.setattr(scanned, "families", lambda: FEW)
+FEW = (point_mass.FAMILY, sensor_mass.FAMILY)  # two are enough to go wrong with
 
 
 def at(reduced, *xy):
@@ -69,7 +63,7 @@ def problem_of(reduced, hidden, mass=0.0):
     weighed = MassMeasurement(setup.weight + mass, 1e-3 * setup.weight)
     labels = tuple(f"{g}:+Z" for g in SENSORS)
     problem = UpdatingProblem(
-        reduced, empty.rebased(reduced.model), weighed, base, (), setup, labels
+        reduced, empty.rebased(reduced.model), weighed, base, (), setup, labels, families=FEW
     )
     hidden = [(of(problem.where), x) for of, x in hidden]
     article = problem.holding(hidden)
@@ -121,10 +115,8 @@ def two(reduced):
 
 @pytest.fixture(scope="module")
 def found(two):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scanned, "families", lambda: FEW)
-        singles = singles_of(two)
-        return singles, several(two, singles, DUE, False)
+    singles = singles_of(two)
+    return singles, several(two, singles, DUE, False)
 
 
 def test_candidates_side_by_side_end_where_they_end_one_after_the_other(two, found, monkeypatch):
@@ -150,6 +142,7 @@ def test_a_mass_that_no_candidate_was_is_found_where_another_lump_is(reduced, on
     """A scan proposes a lump on a spring alone, or a spread one: the mass leads all the same."""
     weight = 0.06 * mass_properties(reduced.structure.assembly)[0]
     problem = problem_of(reduced, [lump(reduced, HERE, 2.0)], weight)
+    problem = replace(problem, families=catalogue())
     where, k = problem.where, at(reduced, *HERE)
     spread = MassPatch.of_lump(where, where.grids.point[k], 0.5 * weight)
     swings = LocalResonator.near(where, k), np.array([0.5, 0.0, 0.0, 0.5])
@@ -166,7 +159,7 @@ def test_a_mass_that_no_candidate_was_is_found_where_another_lump_is(reduced, on
 @pytest.mark.parametrize(("place", "begun"), [(HERE, 0), (THERE, 2)])
 def test_no_other_lump_is_begun_where_one_was_found(two, place, begun):
     mass, x = PointMass.near(two.where, at(two.reduced, *HERE)), np.zeros(3)
-    held = two.holding([(mass, x)])
+    held = replace(two, families=catalogue()).holding([(mass, x)])
     effect, start = PointMass.of_lump(held.where, np.append(place, 0.0), 0.05)
     fit = SimpleNamespace(of=lambda e: start, effects=())
     lead = SimpleNamespace(effect=effect, effects=(effect,), fit=fit)

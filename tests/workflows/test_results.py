@@ -67,7 +67,7 @@ def test_a_result_explains_itself(case, tmp_path, command):
     assert said.splitlines()[0][:40] in (place / "report.html").read_text()
     found.save(place)  # replaces what the same command wrote
     if command != "modes":
-        with pytest.raises(ChladniError, match="holds the results of chladni"):
+        with pytest.raises(ChladniError, match="has the results of chladni"):
             chladni.modes(case, 8).save(place)
 
 

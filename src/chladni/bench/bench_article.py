@@ -66,7 +66,7 @@ class BenchArticle:
                "hangers": (len(self.hangers), 3, r), "sites": (len(self.laws), r),
                "gains": (n,), "channels": (n,), "masses": (n,)}  # fmt: skip
         if self.on_table:
-            due |= {"base": (r,), "carried": (n,), "mounts_carried": (n, 3)}
+            due |= {"base": (r,), "with_base": (n,), "mounts_with_base": (n, 3)}
         for name, shape in due.items():
             if (found := np.shape(getattr(self, name))) != shape:
                 raise ShapeError(f"{name} is {found}, modes, labels and laws say {shape}")

@@ -29,6 +29,7 @@ RENEWED = {  # words that do not hold for the new recordings, or stand in the de
         *("sensors", "mass", "mass_sd"),
     },
     "held_out": {"band"},
+    "search": set(),
 }
 LEAST_OVERLAP = 0.5  # of a band of the case must be in the test's, or all of the test's in it
 
@@ -115,6 +116,8 @@ def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
     if held is not None or kept:
         lines += ["", "[held_out]", *_words(kept)]
         lines += [f"band = [{held[0]:g}, {held[1]:g}]"] if held is not None else []
+    if search := _kept(case, "search"):
+        lines += ["", "[search]", *_words(search)]
     for section in case.keys.tables.get("parameter", []):
         lines += ["", "[[parameter]]", *_words(section.values)]
     return "\n".join([*lines, ""])
