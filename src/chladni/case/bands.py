@@ -50,7 +50,7 @@ def _inside(
 def held_out(
     keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
 ) -> tuple[int | tuple[str, ...] | None, tuple[float, float] | None]:
-    """Held-out sensors (how many, or which) and band."""
+    """Held-out sensors (a number, or their labels) and band."""
     section = keys.section("held_out", known("held_out"))
     band = section.band("band")
     if band is not None:
@@ -60,7 +60,7 @@ def held_out(
     if value is None:
         return None, band
     if not outputs:
-        raise FileError(f"{section.at('sensors')}: there are no FRFs of which to hold any out")
+        raise FileError(f"{section.at('sensors')}: there are no FRFs to hold out")
     if isinstance(value, list):
         labels = section.list("sensors", str) or []
         for label in labels:
@@ -69,11 +69,11 @@ def held_out(
                     f"{section.at('sensors')}: no output {label!r}; there are {named(outputs, 8)}"
                 )
         if set(labels) >= set(outputs):
-            raise FileError(f"{section.at('sensors')} names every output; none is left to fit")
+            raise FileError(f"{section.at('sensors')} names every output, so none is left to fit")
         return tuple(labels), band
     count = section.number("sensors", low=0, high=max(len(outputs) - 1, 0)) or 0.0
     if count != int(count):
-        raise FileError(f"{section.at('sensors')} = {count:g} is no whole number")
+        raise FileError(f"{section.at('sensors')} = {count:g} is not a whole number")
     return int(count), band
 
 
@@ -96,7 +96,7 @@ def searched_effects(keys: KeyFile, notes: list[str]) -> tuple[str, ...]:
         if name not in there:
             hint = did_you_mean(name, there)
             raise LabelError(
-                f"{section.at('effects')} holds {name!r}; {hint}there are {', '.join(there)}"
+                f"{section.at('effects')} names {name!r}; {hint}there are {', '.join(there)}"
             )
-    notes.append(f"of all effects only {', '.join(wanted)} are tried, as the case says")
+    notes.append(f"the case limits the search to {', '.join(wanted)}")
     return tuple(dict.fromkeys(wanted))

@@ -186,7 +186,7 @@ class ShellSurface:
             )
 
     def cells(self, closest: ClosestPoints) -> list[np.ndarray]:
-        """Nodes of each foot's shell; also of its neighbours if its own nodes lie in a line."""
+        """Nodes of each place's shell; also of its neighbours if its own nodes lie in a line."""
         own = [np.unique(nodes) for nodes in self.nodes[closest.shell]]
         return [self._with_ring(n) if _in_line(self.points[n]) else n for n in own]
 
