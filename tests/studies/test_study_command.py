@@ -14,7 +14,7 @@ from chladni.cli.app import application
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.result_json import to_json
-from chladni.studies import StudySettings
+from chladni_studies import StudySettings
 
 CASE = """
 [model]
@@ -158,7 +158,7 @@ def test_a_bad_option_names_itself(deck, tmp_path, options, named):
 
 
 def test_mostly_failed_is_not_to_be_trusted(deck, tmp_path, monkeypatch):
-    from chladni.studies import sample
+    from chladni_studies import sample
 
     solved, tries = sample.solved, []
 

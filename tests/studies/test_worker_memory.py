@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from chladni.studies.worker_memory import keep_freed_memory
+from chladni_studies.worker_memory import keep_freed_memory
 
 CODE = """
 import resource, sys
