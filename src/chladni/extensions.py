@@ -1,4 +1,4 @@
-"""What installed packages add by entry points: effects and commands."""
+"""Load effects and commands that installed packages offer by entry points."""
 
 from collections.abc import Callable, Container
 from importlib.metadata import EntryPoint, entry_points
