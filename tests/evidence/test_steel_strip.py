@@ -58,7 +58,7 @@ def test_nothing_is_named_and_nothing_is_called_right(strip, exclude):
     assert found.compared == "responses"
     assert not found.effects
     assert found.verdict == "not in catalogue"
-    assert any("cannot support a name" in why for why in found.distrust)
+    assert any("do not separate the explanations" in why for why in found.distrust)
 
 
 def test_its_modes_are_a_cantilevers(strip):

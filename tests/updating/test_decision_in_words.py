@@ -45,7 +45,7 @@ def words(made):
     known = Measured(
         made, fits, tests, refinements=refinements, failed={"crack": "it is no structure"}
     )
-    asked = SimpleNamespace(too_little="2 modes cannot support a name")
+    asked = SimpleNamespace(too_little="2 modes do not separate the explanations")
     return DecisionWords(asked, found, known), found
 
 
@@ -77,9 +77,9 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
             ("crack is refused: the deck with it fits", "; point-mass is next"),
         ),
         (
-            table(row("point-mass", 30.0), row("crack", 10.0), enough=False),
+            table(row("point-mass", 5.0), row("crack", 1.0), enough=False),
             (
-                "2 modes cannot support a name; these explain",
+                "2 modes do not separate the explanations; these explain",
                 "calibration alone, point-mass, crack",
             ),
         ),

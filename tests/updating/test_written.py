@@ -226,7 +226,7 @@ def calibration(base, data, found, changed=0.0):
     )  # fmt: skip
     n = sum(len(e.parameters) for e in base)
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(n))
-    prepared = SimpleNamespace(problem=problem, score=data, too_little="")
+    prepared = SimpleNamespace(problem=problem, score=data, too_little="", numbers=9)
     found = replace(found, table=table)
     return concluded(prepared, found, *decided(prepared, found, lambda hypothesis: 1 / 0))[0]
 

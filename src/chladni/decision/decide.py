@@ -4,7 +4,7 @@ The module computes nothing about a structure and writes no text. If the table l
 decision returns a request for it by name. The caller computes it, adds it and calls again.
 
 1. The leader is named if it reaches the required gain and fits.
-2. Too few data name nothing.
+2. Few data bear a name only if they could contradict it and nothing else is tied with it.
 3. All data together may support a name that the fitted data alone do not.
 4. A set of effects that all reach the required gain precedes one effect.
 5. The leader is fitted again and tested on held-out data. If too much is left, sets that reach
@@ -47,9 +47,16 @@ def called(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | W
 
 def _named(case: JudgedTable) -> Decision:
     """The name, if any, or what refused it."""
+    decision = _decided(case)
+    few = not case.table.enough and case.rules.enough_data
+    contradicted = case.table.contradicted and decision.named
+    alone = contradicted and len(with_ties(case, decision).one_of) < 2
+    return _too_few(case, decision) if few and not alone else decision
+
+
+def _decided(case: JudgedTable) -> Decision:
+    """The name by the odds, if any, or what refused it."""
     decision = _first(case)
-    if not case.table.enough and case.rules.enough_data:
-        return _too_few(case, decision)
     alone = _supported_by_all_data(case, decision)
     sets = case.table.sets if case.rules.sets else ()
     found, refusals = largest_named(case, alone, [s for s in sets if s.pays])
@@ -75,9 +82,10 @@ def _first(case: JudgedTable) -> Decision:
 
 
 def _too_few(case: JudgedTable, decision: Decision) -> Decision:
-    """Name nothing; list the effects that explain the data and cannot be separated by them."""
-    some = [r.name for r in case.rows(decision.order) if case.table.gain(r) > 0]
-    one_of = (ALONE, *some)
+    """Name nothing; list the explanations within ``rules.tied`` of the best, with calibration."""
+    gains = {ALONE: 0.0} | {r.name: case.table.gain(r) for r in case.rows(decision.order)}
+    least = max(gains.values()) - case.rules.tied
+    one_of = tuple(name for name, gain in gains.items() if gain >= least)
     step = Step(Reason.TOO_FEW, names=one_of)
     return replace(
         decision, verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,

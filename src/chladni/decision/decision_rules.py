@@ -39,7 +39,9 @@ class DecisionRules:
     fits_damping: float = _rule(
         0.01, 0.0, "p below which damping follows an elastic change, which is then incomplete"
     )
-    enough_data: bool = _rule(True, False, "too few modes or numbers support no name")
+    enough_data: bool = _rule(
+        True, False, "few modes or numbers name an effect only if no other is tied with it"
+    )
     good_part: float = _rule(
         GOOD_PART, 1.0, "part of the required gain that fitted responses bring if other data agree"
     )

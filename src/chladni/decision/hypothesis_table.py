@@ -211,7 +211,8 @@ class HypothesisTable:
     sets : of several effects, in the order in which they grew
     nominal : -2 ln evidence of the given deck, scatter allowed
     poles : whether natural frequencies are compared
-    enough : whether there are enough data to support a name
+    enough : whether there are data enough to separate explanations as a rule
+    contradicted : whether there are more numbers than any effect has unknowns
     implausible : whether plain calibration has implausible values
     decks : Q of each calibration, with and without the mesh error; () where there is no such fit;
         of ``GIVEN`` that of the given deck
@@ -227,6 +228,7 @@ class HypothesisTable:
     nominal: float = 0.0
     poles: bool = False
     enough: bool = True
+    contradicted: bool = True
     implausible: bool = False
     decks: Mapping[CalibratedDeck, tuple[float, ...]] = field(default_factory=dict)
     off_the_scales: bool = False

@@ -126,11 +126,5 @@ def _on_new_structure(
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
     (first, start), *others = found
     fresh = fresh.holding(others)
-    return fresh, _with_valleys(fresh.fitted_with(first, start, fresh.mean()), hypothesis)
-
-
-def _with_valleys(hypothesis: HypothesisFit, old: HypothesisFit) -> HypothesisFit:
-    """The hypothesis with its earlier local optima, at the same distance in evidence as before."""
-    ahead = hypothesis.neg2_log_evidence - old.neg2_log_evidence
-    optima = (replace(v, neg2_log_evidence=v.neg2_log_evidence + ahead) for v in old.optima)
-    return replace(hypothesis, optima=tuple(optima))
+    refined = fresh.fitted_with(first, start, fresh.mean())
+    return fresh, replace(refined, optima=hypothesis.refitted(refined.fit).optima)

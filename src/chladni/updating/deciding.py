@@ -27,6 +27,7 @@ from .basis_refinement import Refinement
 from .diagnosis import Diagnosis, fit_test
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
+from .least_data import CONTRADICTED
 from .likelihood import Responses
 from .local_damping_test import damping_test_along_effect
 from .map_fit import APART, fit
@@ -103,6 +104,7 @@ def begun(prepared: Prepared, found: Diagnosis) -> Measured:
     fits = {t.effect.name: t for t in found.hypotheses} | {k: s.hypothesis for k, s in sets.items()}
     table = replace(
         found.table, enough=not prepared.too_little,
+        contradicted=prepared.numbers >= CONTRADICTED,
         sets=tuple(_set_row(key, s) for key, s in sets.items()),
     )  # fmt: skip
     rows = [row_of(s.hypothesis, key) for key, s in sets.items()]

@@ -27,11 +27,23 @@ NEARLY = 6.0  # in -2 ln evidence: what explains poles so much worse still has a
 
 @dataclass(frozen=True, eq=False)
 class LocalOptimum:
-    """Another likely place of an effect's parameters (n_p,), with their standard deviations."""
+    """An effect at one optimum of its family: its parameters and standard deviations (n_p,)."""
 
+    effect: Effect
     neg2_log_evidence: float
     x: np.ndarray
     sd: np.ndarray
+
+    def same(self, other: "LocalOptimum") -> bool:
+        """True if both are one optimum: places or parameters agree within their uncertainty."""
+        if self.effect.text == other.effect.text:
+            sd = np.maximum(self.sd, other.sd)
+            return bool((np.abs(self.x - other.x) <= 2 * sd).all())
+        mine, its = (v.effect.located(v.x, v.sd) for v in (self, other))
+        if None in (mine.point_m, its.point_m, mine.radius_m, its.radius_m):
+            return False
+        apart = np.linalg.norm(np.subtract(mine.point_m, its.point_m))  # type: ignore[arg-type]
+        return bool(apart <= max(mine.radius_m, its.radius_m))  # type: ignore[type-var, operator]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +51,9 @@ class HypothesisFit:
     """One hypothesis after its fit: the effect, the fit and the model used for it.
 
     ``found_before`` are effects found earlier; the hypothesis is all of them together.
-    ``optima`` are other values of the effect, from another pairing of the same poles.
+    ``optima`` are other optima of the family: other places, or another pairing of the same poles.
+    The prior of a place is one over the number of places, so that the evidence of the family is the
+    sum over its optima.
     """
 
     effect: Effect
@@ -75,18 +89,32 @@ class HypothesisFit:
         return tuple(c for each in every for c in each) if all(every) else ()
 
     @property
+    def own(self) -> LocalOptimum:
+        """The optimum of the fit."""
+        x, sd = self.fit.of(self.effect), self.fit.sd(self.effect)
+        return LocalOptimum(self.effect, self.fit.neg2_log_evidence, x, sd)
+
+    @property
     def nearly(self) -> tuple[LocalOptimum, ...]:
-        """Other valleys that are nearly as probable."""
-        most = self.neg2_log_evidence + NEARLY
+        """Other optima that are nearly as probable."""
+        most = self.fit.neg2_log_evidence + NEARLY
         return tuple(v for v in self.optima if v.neg2_log_evidence < most)
 
     def among(self, other: "HypothesisFit") -> "HypothesisFit":
-        """Keep the values of another fit of the same effect to the same poles as a valley."""
-        if not isinstance(self.data, Poles) or other.effect.text != self.effect.text:
-            return self
-        own = other.fit.of(other.effect), other.fit.sd(other.effect)
-        optimum = LocalOptimum(other.neg2_log_evidence, *own)
-        return replace(self, optima=(*self.optima, optimum, *other.optima))
+        """Keep the optima of another fit of the same family, each once."""
+        kept = [self.own]
+        for v in sorted(
+            (other.own, *self.optima, *other.optima), key=lambda v: v.neg2_log_evidence
+        ):
+            if not any(v.same(known) for known in kept):
+                kept.append(v)
+        return replace(self, optima=tuple(kept[1:]))
+
+    def refitted(self, fit: Fit) -> "HypothesisFit":
+        """A copy with another fit; the other optima keep their distance in evidence."""
+        shift = fit.neg2_log_evidence - self.fit.neg2_log_evidence
+        optima = (replace(v, neg2_log_evidence=v.neg2_log_evidence + shift) for v in self.optima)
+        return replace(self, fit=fit, optima=tuple(optima))
 
     @property
     def data(self) -> Data:
@@ -95,8 +123,9 @@ class HypothesisFit:
 
     @property
     def neg2_log_evidence(self) -> float:
-        """-2 ln evidence."""
-        return self.fit.neg2_log_evidence
+        """-2 ln evidence of the family, summed over its optima."""
+        each = [self.fit.neg2_log_evidence, *(v.neg2_log_evidence for v in self.optima)]
+        return float(-2 * logsumexp(-np.array(each) / 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +232,7 @@ class UpdatingProblem:
         data = data.allowing_errors(found.state, data.error.delta, data.curved)
         mass = self.mass_measurement
         fit = fitted(hypothesis.model, found.effects, data, mass, found.x, max_steps)
-        return replace(hypothesis, fit=fit)
+        return hypothesis.refitted(fit)
 
     def without(self, effect: Effect) -> list[Effect]:
         """Return the base without the effects that this one replaces; found effects stay."""

@@ -31,7 +31,7 @@ from ..progress import Progress, silent, within
 from .complex_modes import mode_coupling
 from .damping_scatter import modal_damping
 from .hypothesis_fit import UpdatingProblem
-from .least_data import too_little
+from .least_data import numbers, too_little
 from .likelihood import LN10, Responses
 from .map_fit import fit
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
@@ -158,10 +158,10 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     if spreads[1] is not None:
         floor = np.maximum(floor, spreads[1] ** 2)
     supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
-    few = too_little(supporting, int(data[0].use.any(axis=0).sum()))
+    size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
-        problem, data[1], held, what, tuple(notes), nominal, floor, found, few, unseen=unseen,
-        others=tuple(others), levels=studied,
+        problem, data[1], held, what, tuple(notes), nominal, floor, found, too_little(*size),
+        numbers(*size), unseen=unseen, others=tuple(others), levels=studied,
     )  # fmt: skip
 
 
@@ -279,8 +279,11 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepar
     problem = updating_problem(question, reduced, data, nuisance, f_max)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_unscored(question), *_mass_note(question))
-    few = too_little(len(frequency), 0)
-    return Prepared(problem, data, held, what, notes, nominal, None, found, few, ~held, held)
+    size = len(frequency), 0
+    return Prepared(
+        problem, data, held, what, notes, nominal, None, found, too_little(*size), numbers(*size),
+        ~held, held,
+    )  # fmt: skip
 
 
 def _unscored(question: Question) -> list[str]:

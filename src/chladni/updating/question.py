@@ -17,6 +17,7 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
 from .hypothesis_fit import UpdatingProblem
+from .least_data import NUMBERS
 from .likelihood import Responses
 from .map_fit import MassMeasurement
 from .pole_data import Poles
@@ -123,7 +124,8 @@ class Prepared:
     nominal: Modelled
     noise: np.ndarray | None = None
     identified: Identified | None = None
-    too_little: str = ""  # reason why the data are too few to name an effect
+    too_little: str = ""  # reason why data so few rarely separate explanations
+    numbers: int = NUMBERS  # of the fitted modes and channels
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     others: tuple[OtherTest, ...] = ()

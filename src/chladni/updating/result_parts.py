@@ -11,7 +11,7 @@ from ..effects.effect import Effect
 from ..effects.estimate import Estimate, Location
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
-from .hypothesis_fit import HypothesisFit
+from .hypothesis_fit import HypothesisFit, LocalOptimum
 from .joint_fit import JointFit
 from .likelihood import LN10
 from .pole_data import Poles
@@ -52,7 +52,17 @@ def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffec
 
 
 def _located(hypothesis: HypothesisFit, effect: Effect) -> Location:
-    return effect.located(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
+    """The place of an effect; its radius includes all optima that are nearly as probable."""
+    place = effect.located(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
+    if effect is not hypothesis.effect or place.point_m is None or not hypothesis.nearly:
+        return place
+    others = [v.effect.located(v.x, v.sd) for v in hypothesis.nearly]
+    reach = [place.radius_m or 0.0] + [
+        float(np.linalg.norm(np.subtract(o.point_m, place.point_m))) + (o.radius_m or 0.0)
+        for o in others
+        if o.point_m is not None
+    ]
+    return replace(place, radius_m=max(reach) or None)
 
 
 def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]:
@@ -60,11 +70,11 @@ def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]
     rows = effect.reported(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
     if effect is not hypothesis.effect:
         return rows
-    every = [rows, *(effect.reported(v.x, v.sd) for v in hypothesis.nearly)]
+    others = [r for v in hypothesis.nearly for r in v.effect.reported(v.x, v.sd)]
     return tuple(
-        replace(row, low=_reach(min, (r[k].low for r in every)),
-                high=_reach(max, (r[k].high for r in every)))
-        for k, row in enumerate(rows)
+        replace(row, low=_reach(min, (r.low for r in (row, *others) if r.name == row.name)),
+                high=_reach(max, (r.high for r in (row, *others) if r.name == row.name)))
+        for row in rows
     )  # fmt: skip
 
 
@@ -74,27 +84,38 @@ def _reach(pick: Callable[[list[float]], float], values: Iterable[float | None])
 
 
 def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Sentence on other values of the named effect that explain the poles nearly as well."""
+    """Sentences on other optima of the named effect that explain the data nearly as well."""
     found = diagnosis.found
     if found is None or not found.nearly:
         return ()
-    effect, said = found.effect, []
-    own = effect.reported(found.fit.of(effect), found.fit.sd(effect))
-    for optimum in found.nearly:
-        rows = effect.reported(optimum.x, optimum.sd)
-        apart = [
-            f"{new.name} {new.value:.3g} {new.unit}".strip()
-            for new, row in zip(rows, own, strict=True)
-            if row.low is not None and row.high is not None
-            and not row.low <= new.value <= row.high
-        ]  # fmt: skip
-        if apart and (words := ", ".join(apart)) not in said:
-            said.append(words)
-    if not said:
+    rows = found.effect.reported(found.own.x, found.own.sd)
+    values = list(dict.fromkeys(w for v in found.nearly if (w := _values_apart(rows, v))))
+    own = found.effect.located(found.own.x, found.own.sd).text
+    places = [
+        f"{place} ({np.exp((found.own.neg2_log_evidence - v.neg2_log_evidence) / 2):.0%} as likely)"
+        for v in found.nearly
+        if (place := v.effect.located(v.x, v.sd).text) != own
+    ]
+    if isinstance(found.data, Poles) and values:
+        return (
+            f"if other poles are spurious, other values of {found.effect.name} explain the poles "
+            f"nearly as well: {'; or '.join(values)}; the intervals include all of them",
+        )
+    if not places:
         return ()
     return (
-        f"if other poles are spurious, other values of {effect.name} explain the poles nearly as "
-        f"well: {'; or '.join(said)}; the intervals include all of them",
+        f"{found.effect.name} explains the data nearly as well at {'; or at '.join(places)}; the "
+        "intervals include all of these places",
+    )
+
+
+def _values_apart(rows: tuple[Estimate, ...], optimum: LocalOptimum) -> str:
+    """Values of an optimum that lie outside the intervals of the rows, in words."""
+    known = {row.name: row for row in rows if row.low is not None and row.high is not None}
+    return ", ".join(
+        f"{new.name} {new.value:.3g} {new.unit}".strip()
+        for new in optimum.effect.reported(optimum.x, optimum.sd)
+        if (row := known.get(new.name)) and not row.low <= new.value <= row.high  # type: ignore[operator]
     )
 
 

@@ -106,7 +106,7 @@ def by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
         lead = best.get(t.effect.name, t)
         if lead is t:
             best[t.effect.name] = t
-        elif t.neg2_log_evidence < lead.neg2_log_evidence:
+        elif t.fit.neg2_log_evidence < lead.fit.neg2_log_evidence:
             best[t.effect.name] = t.among(lead)
         else:
             best[t.effect.name] = lead.among(t)
@@ -140,7 +140,7 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
         return hypothesis
     model, begun = hypothesis.model, hypothesis.fit
     fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
-    if fit.neg2_log_evidence < hypothesis.neg2_log_evidence:
+    if fit.neg2_log_evidence < hypothesis.fit.neg2_log_evidence:
         return replace(hypothesis, fit=fit)
     return hypothesis
 
@@ -152,7 +152,7 @@ def _settled(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisF
         return hypothesis
     for _ in range(PASSES):
         before, hypothesis = hypothesis, problem.about_itself(hypothesis)
-        if abs(hypothesis.neg2_log_evidence - before.neg2_log_evidence) < 1:
+        if abs(hypothesis.fit.neg2_log_evidence - before.fit.neg2_log_evidence) < 1:
             break
     return hypothesis
 
@@ -172,7 +172,7 @@ def _closer(
         except ModelError:
             break
         out.append(hypothesis)
-        if hypothesis.neg2_log_evidence > lead.neg2_log_evidence - 1:
+        if hypothesis.fit.neg2_log_evidence > lead.fit.neg2_log_evidence - 1:
             break
         lead = hypothesis
     return out

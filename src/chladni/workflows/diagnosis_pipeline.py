@@ -177,7 +177,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         reasons = compensating(found.plain.fit, result, question.mass_measurement)
         distrust = (*distrust, *reasons)
         study = None if study is None else replace(study, compensating=reasons)
-    if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
+    if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen = known.screening
     if diagnosing:
@@ -198,7 +198,7 @@ def _apply_held_out(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[
     decision, known = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, decision, known)
     if decision.named:  # it is compared with what calibrate answers
-        alone = made.found.without_effects
+        prepared, alone = replace(prepared, too_little=""), made.found.without_effects
         calibration = concluded(prepared, alone, *decided(prepared, alone, made.refine))[0]
         found = replace(found, plain=calibration.plain)
     plain = refined(made.question, prepared, found.plain, held=found.as_the_null)
