@@ -18,6 +18,7 @@ from chladni_planning import best_actuators as best_shakers
 
 from .actuator_placement import ActuatorPlacementEnv
 from .calibration_env import STRIDE, CalibrationEnv
+from .parameter_selection import ParameterSelectionEnv
 from .sensor_placement import SensorPlacementEnv
 
 Agent = Callable[[np.ndarray, dict[str, Any]], Any]
@@ -100,6 +101,34 @@ def held_back(threshold: float = 0.1) -> Agent:
         explained = np.where(info["action_mask"][:-1] == 1, observation[2], -np.inf)
         k = first_max(explained)
         return np.int64(k if explained[k] > threshold else len(explained))
+
+    return agent
+
+
+def foretold(env: gym.Env[Any, Any]) -> Agent:
+    """Free the parameter that raises the expected score most, while one does.
+
+    The fitted data alone estimate Q of held-out data, by generalised cross-validation
+    (Golub, Heath and Wahba 1979, Technometrics 21, 215-223): Q/(1 - ν/m)² with ν the effective
+    number of parameters and m that of the residuals.
+    """
+    inner = env.unwrapped
+    if not isinstance(inner, ParameterSelectionEnv):
+        raise ShapeError("this agent frees parameters; make it for ParameterSelection-v0")
+
+    def expected(freed: np.ndarray) -> float:
+        problem = inner.problem
+        r = problem.residual + problem.jacobian @ problem.fitted(freed)
+        known = 1 - problem.unlearned(freed) / max(freed.sum(), 1)
+        Q = np.mean(r**2) / (1 - known * freed.sum() / len(r)) ** 2
+        before = np.mean(problem.residual**2)
+        return float(np.log10(before / Q)) - inner.cost * problem.unlearned(freed)
+
+    def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+        kept, left = info["kept"], np.flatnonzero(info["action_mask"][:-1])
+        more = np.array([expected(kept | (np.arange(inner.p) == k)) for k in left])
+        pays = len(left) > 0 and more.max() > expected(kept)
+        return np.int64(left[more.argmax()] if pays else inner.p)
 
     return agent
 
