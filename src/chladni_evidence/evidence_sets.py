@@ -43,6 +43,7 @@ HOMES = {  # structures of the set outside, by the hidden effect
 JOINED = {  # structures of the set joints, by the hidden effect
     "nothing": ("bonded plates", "lidded box", "bolted bracket"),
     "weld-missing": ("lidded box", "bolted bracket"),
+    "weld-run": ("lidded box", "tailgate"),
     "adhesive-stiffness": ("bonded plates", "tailgate"),
     "hem-contact": ("tailgate",),
     "hem-stretch": ("tailgate",),

@@ -26,17 +26,36 @@ def weld_missing(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     for group, rows in _welds(a):
         if k < len(rows):
             place = a.points[a.solids[group].nodes[rows[k]]].mean(axis=0)
-            kept = np.arange(len(a.solids[group])) != rows[k]
-            solids = list(a.solids)
-            old = solids[group]
-            solids[group] = Solids(old.ids[kept], old.nodes[kept], old.part[kept])
-            made = replace(a, solids=tuple(solids))
+            made = _without(a, group, np.arange(len(a.solids[group])) == rows[k])
             return Hidden(made, {"value": 0.0, "point_m": place.tolist()})
         k -= len(rows)
     kept = np.arange(len(a.beams)) != _screws(a)[k]
     beams = type(a.beams)(**{name: column[kept] for name, column in vars(a.beams).items()})
     place = a.points[a.beams.nodes[~kept][0]].mean(axis=0)
     return Hidden(replace(a, beams=beams), {"value": 0.0, "point_m": place.tolist()})
+
+
+def weld_run(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """Two to four adjacent welds of one row that were never set; more at a larger size."""
+    a = site.article
+    rows = [(group, held) for group, held in _welds(a) if len(held) >= 4]
+    if not rows:
+        raise ModelError("the article has no row of four welds")
+    group, held = rows[int(rng.integers(len(rows)))]
+    places = a.points[a.solids[group].nodes[held]].mean(axis=1)
+    count = int(np.clip(round(rng.integers(2, 5) * size), 2, len(held) - 1))
+    first = places[int(rng.integers(len(held)))]
+    gone = held[np.argsort(np.linalg.norm(places - first, axis=1))[:count]]
+    middle = a.points[a.solids[group].nodes[gone]].mean(axis=(0, 1))
+    made = _without(a, group, np.isin(np.arange(len(a.solids[group])), gone))
+    return Hidden(made, {"value": 0.0, "count": count, "point_m": middle.tolist()})
+
+
+def _without(a: Assembly, group: int, gone: np.ndarray) -> Assembly:
+    """The assembly without some solids of a group (n,) bool."""
+    solids, old = list(a.solids), a.solids[group]
+    solids[group] = Solids(old.ids[~gone], old.nodes[~gone], old.part[~gone])
+    return replace(a, solids=tuple(solids))
 
 
 def _welds(a: Assembly) -> list[tuple[int, np.ndarray]]:
@@ -158,6 +177,7 @@ def _part_at(a: Assembly, rows: np.ndarray) -> str:
 
 JOINTS: dict[str, Kind] = {
     "weld-missing": weld_missing,
+    "weld-run": weld_run,
     "adhesive-stiffness": adhesive,
     "viscoelastic-joint": viscoelastic,
     "hem-contact": hem,

@@ -27,7 +27,8 @@ HEMS = (
     "hem-contact + thickness-distribution + sensor-mass",
     "hem-stretch + thickness-distribution + sensor-mass",
 )
-CALLED = {"hem-stretch": "hem-contact"}  # kinds that are a form of an effect of the catalogue
+# kinds that are a form of an effect of the catalogue
+CALLED = {"hem-stretch": "hem-contact", "weld-run": "weld-missing"}
 
 HIDDEN = {**CATALOGUED, **JOINTS}
 Sized = Callable[[str, list[int]], tuple[Hidden, float, float]]

@@ -23,7 +23,7 @@ from chladni_evidence.hidden_kinds import (
     stiffness_patch,
     thinning,
 )
-from chladni_evidence.joint_kinds import hem, hem_stretch, viscoelastic
+from chladni_evidence.joint_kinds import SOFTEST, hem, hem_stretch, viscoelastic, weld_run
 from chladni_evidence.mesh_transfer import Spots, mesh_transfer, still_there
 from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
 from chladni_evidence.pair_kinds import APART, HEMS, HIDDEN, PAIRS, catalogued, together
@@ -318,6 +318,25 @@ def test_a_hem_holds_where_its_truth_says(hemmed, seed):
             assert away.max() <= length / 2 + 0.01  # as the crow flies, no farther than along it
             assert away.min() < 0.02
             assert 0.2 <= length / line.length <= 0.5
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_run_of_welds_is_gone_and_no_other(hemmed, seed):
+    """About one of them, no weld that stands is nearer than the others that are gone."""
+    a = hemmed.article
+    hidden = weld_run(hemmed, np.random.default_rng(seed), 1.0)
+    (before, after) = next(
+        (old, new) for old, new in zip(a.solids, hidden.article.solids, strict=True)
+        if len(old) != len(new)
+    )  # fmt: skip
+    stays = np.isin(before.ids, after.ids)
+    welds = np.array([a.parts[p].section.material.E > SOFTEST for p in before.part])
+    places = a.points[before.nodes].mean(axis=1)
+    assert (~stays).sum() == hidden.truth["count"] in (2, 3, 4)
+    assert welds[~stays].all()
+    far = np.linalg.norm(places[:, None] - places[~stays], axis=2)
+    assert (far[~stays].max(axis=0) <= far[stays & welds].min(axis=0)).any()
+    np.testing.assert_allclose(hidden.truth["point_m"], places[~stays].mean(axis=0))
 
 
 def test_a_kind_is_called_as_the_catalogue_calls_it():
