@@ -233,7 +233,7 @@ def test_gauss_newton_calibrates():
 def test_agents_are_made_for_their_environment():
     env = gym.make("chladni/Calibration-v0")
     for maker in (agents.exchange, agents.best_actuators, agents.foretold):
-        with pytest.raises(ShapeError, match="this agent .*; make it for"):
+        with pytest.raises(ShapeError, match=r"this agent .*; make it for"):
             maker(env)
 
 
