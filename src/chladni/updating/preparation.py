@@ -279,11 +279,8 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepar
     problem = updating_problem(question, reduced, data, nuisance, f_max)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_unscored(question), *_mass_note(question))
-    size = len(frequency), 0
-    return Prepared(
-        problem, data, held, what, notes, nominal, None, found, too_little(*size), numbers(*size),
-        ~held, held,
-    )  # fmt: skip
+    few = too_little(len(frequency), 0), numbers(len(frequency), 0)
+    return Prepared(problem, data, held, what, notes, nominal, None, found, *few, ~held, held)
 
 
 def _unscored(question: Question) -> list[str]:
