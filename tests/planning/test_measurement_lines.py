@@ -5,11 +5,10 @@ import pytest
 from scipy.linalg import eigh
 
 from chladni.errors import ShapeError
+from chladni_bench import TABLE_3, Stage, stage_lines, stepped_sine_time
 from chladni_planning import (
-    TABLE_3,
     Linearised,
     Rules,
-    Stage,
     annealed,
     auto_mac,
     best_layout,
@@ -25,8 +24,6 @@ from chladni_planning import (
     lines_time,
     loaded_frequency,
     log_det_fisher,
-    stage_lines,
-    stepped_sine_time,
     transient_left,
     visibility,
     with_visible_modes,
