@@ -4,10 +4,9 @@ import ast
 import sys
 import tomllib
 from collections import defaultdict
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
-
-import pytest
 
 from chladni.cli.app import COMMANDS
 
@@ -94,10 +93,16 @@ def package(path):
 MODULES = {module(p) for p in SOURCES}
 
 
+def nodes(path):
+    """The syntax tree of a file, node after node."""
+    return ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+
+
+@cache
 def imports(path):
     """(own modules, outside packages) imported anywhere in a file; own ones stay relative."""
     own, outside = set(), set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and node.level:
             here = package(path)
             base = here[: len(here) - node.level + 1] + tuple(
@@ -117,11 +122,15 @@ def imports(path):
     return own, outside
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: "/".join(module(p)))
-def test_imports_point_down(path):
-    floor, (own, outside) = floor_of(module(path)), imports(path)
-    assert {floor_of(m) for m in own} <= MAY_IMPORT[floor] | {floor}
-    assert outside <= EVERYWHERE | LIBRARIES.get(floor, set())
+def test_imports_point_down():
+    """All offenders at once: the module, the floor or library it must not import."""
+    wrong = []
+    for path in SOURCES:
+        floor, (own, outside) = floor_of(module(path)), imports(path)
+        above = {floor_of(m) for m in own} - MAY_IMPORT[floor] - {floor}
+        foreign = outside - EVERYWHERE - LIBRARIES.get(floor, set())
+        wrong += [f"{'/'.join(module(path))} imports {name}" for name in above | foreign]
+    assert not wrong, "\n".join(sorted(wrong))
 
 
 def test_no_command_imports_another():
@@ -189,7 +198,7 @@ def test_names_stand_once():
         named = path.stem in ("__init__", "__main__") or module(path)[:2] == ("chladni", "cli")
         if not (called or named):
             files[path.stem].append(path)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             if isinstance(node, ast.ClassDef):
                 classes[node.name].append("/".join(module(path)))
     assert not {name: at for name, at in (classes | files).items() if len(at) > 1}
@@ -203,7 +212,7 @@ def test_files_stay_readable():
 def test_names_are_ascii():
     """Greek belongs in docstrings; in code it is spelled (phi, omega), so anyone can type it."""
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             for field in ("id", "arg", "attr", "name"):
                 name = getattr(node, field, None) or ""
                 assert name.isascii(), f"{path}:{node.lineno}: {name}"
@@ -212,7 +221,7 @@ def test_names_are_ascii():
 def test_no_pickle_is_ever_loaded():
     """np.load reads with pickles refused, and nothing imports pickle to read a file."""
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "np.load":
                 assert "allow_pickle=False" in ast.unparse(node), f"{path}:{node.lineno}"
             if isinstance(node, ast.Call):
