@@ -69,7 +69,7 @@ def position(made, id):
     return next(k for k, p in enumerate(made.parts) if p.id == id)
 
 
-KINDS = {  # what is user_parameter, and the cards whose lines change
+KINDS = {  # the free parameter, and the cards whose lines change
     "E of both solids": (dict(field="E", parts=(2, 3)), ["MAT1"]),
     "E of one solid": (dict(field="E", parts=(2,)), ["PSOLID"]),
     "nu of one solid": (dict(field="nu", parts=(3,)), ["PSOLID"]),
