@@ -82,7 +82,7 @@ def with_responses(folder: Path, outputs: int, modes: int) -> Path:
     return case_of(folder, "a.npz", plate_deck())
 
 
-@pytest.mark.parametrize("count", [1, 5])
+@pytest.mark.parametrize("count", [1, pytest.param(5, marks=pytest.mark.slow)])
 def test_few_poles_calibrate_and_name_nothing(tmp_path: Path, count: int) -> None:
     case = load_case(with_poles(tmp_path, plate_deck(), *[11.0, 14.0, 29.0, 33.0, 41.0][:count]))
     assert calibrate(case).verdict
