@@ -15,7 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 import chladni_envs  # noqa: F401
-from chladni.planning import effective_independence, exchange, greedy, independence, log_det_fisher
+from chladni_planning import effective_independence, exchange, greedy, independence, log_det_fisher
 from timing import timed
 
 Shapes = np.ndarray

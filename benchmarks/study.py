@@ -19,12 +19,12 @@ from pathlib import Path
 
 import psutil
 
-from chladni.studies import StudySettings
-from chladni.studies.parameter_study import study
 from chladni.workflows.loaded_model import Model
 from chladni_specimens.plates import folded_panel
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate
+from chladni_studies import StudySettings
+from chladni_studies.parameter_study import study
 
 PANEL = ("t=90%:110%", "E=95%:105%", "rho=95%:105%"), 120
 TAILGATE = ("t of inner=90%:110%", "E of hem adhesive=50%:200%"), 24

@@ -568,8 +568,9 @@ def _definition(found: re.Match[str]) -> str:
 
 _EXPORTS = {
     "chladni": "The names a script starts from",
-    "chladni.planning": "Planning a test",
-    "chladni.studies": "Parameter studies",
+    "chladni_planning": "Planning a test",
+    "chladni_bench": "The virtual bench",
+    "chladni_studies": "Parameter studies",
     "chladni.errors": "Errors",
     "chladni.effects.effect": "To write an effect: the base class",
     "chladni.effects.family": "To write an effect: its family",

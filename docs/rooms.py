@@ -16,7 +16,10 @@ GROUND = {
     "output",
     "progress",
     "parallel",
+    "results",
+    "extensions",
 }
+COLOUR = {False: "#f4efe6", True: "#dfe9f2"}  # a room of chladni; a package that builds on it
 
 
 def room(name: tuple[str, ...]) -> str | None:
@@ -71,7 +74,8 @@ def main() -> None:
             (x0, y0), (x1, y1) = at[name], at[other]
             axes.plot([x0, x1], [y0 - 0.2, y1 + 0.2], color="0.8", lw=0.7, zorder=0)
     for name, (x, y) in at.items():
-        axes.text(x, y, name, ha="center", va="center", bbox={"boxstyle": "round", "fc": "#f4efe6"})
+        box = {"boxstyle": "round", "fc": COLOUR[name.startswith("chladni_")]}
+        axes.text(x, y, name, ha="center", va="center", bbox=box)
     axes.set_axis_off()
     axes.set_ylim(-0.6, max(level.values()) + 0.6)
     figure.savefig(ROOT / "docs" / "rooms.png", dpi=90, bbox_inches="tight")

@@ -8,18 +8,21 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from chladni.cli.app import COMMANDS
+from chladni.cli.app import BUILT_IN
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = {  # every package of ours and where its source is
     "chladni": ROOT / "src",
+    "chladni_planning": ROOT / "src",
+    "chladni_bench": ROOT / "src",
+    "chladni_studies": ROOT / "src",
     "chladni_specimens": ROOT / "src",
     "chladni_evidence": ROOT / "src",
     "chladni_envs": ROOT / "envs",
 }
 GROUND = {
     "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "parallel",
-    "results"
+    "results", "extensions"
 }  # fmt: skip
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
@@ -31,22 +34,23 @@ MAY_IMPORT = {  # floor: the floors it may use, its own aside
     "ema": GROUND | {"dynamics"},
     "fem": GROUND | {"model", "geometry", "sparse", "dynamics"},
     "io": GROUND | {"model", "geometry", "dynamics", "ema"},
-    "bench": GROUND | {"dynamics", "ema"},
     "effects": GROUND | {"model", "geometry", "dynamics", "fem", "ema"},
 }
 MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse", "decision"}
 MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io", "effects"}
-BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
-MAY_IMPORT["planning"] = BELOW | {"view"}
-MAY_IMPORT["workflows"] = BELOW | {"planning", "view"}
-MAY_IMPORT["studies"] = MAY_IMPORT["workflows"] | {"workflows"}
-MAY_IMPORT["report"] = MAY_IMPORT["studies"] | {"studies"}
-MAY_IMPORT["chladni_specimens"] = GROUND | {"model", "geometry"}
-MAY_IMPORT["cli"] = MAY_IMPORT["report"] | {"report", "chladni_specimens", "chladni_evidence"}
-MAY_IMPORT["chladni_evidence"] = MAY_IMPORT["report"] | {"report", "chladni_specimens"}
-MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens"}
+MAY_IMPORT["workflows"] = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "case", "view"}
+MAY_IMPORT["report"] = MAY_IMPORT["workflows"] | {"workflows"}
+MAY_IMPORT["cli"] = MAY_IMPORT["report"] | {"report"}
 MAY_IMPORT["__main__"] = {"cli"}
+CHLADNI = MAY_IMPORT["report"] | {"report"}  # all but its commands
+MAY_IMPORT["chladni_planning"] = MAY_IMPORT["chladni_studies"] = CHLADNI
+MAY_IMPORT["chladni_bench"] = CHLADNI | {"chladni_planning"}
+MAY_IMPORT["chladni_specimens"] = CHLADNI | {"chladni_planning"}
+MAY_IMPORT["chladni_evidence"] = CHLADNI | {
+    "chladni_planning", "chladni_bench", "chladni_specimens"
+}  # fmt: skip
+MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_planning"}
 LIBRARIES = {
     "progress": {"rich"},
     "parallel": {"threadpoolctl"},
@@ -56,8 +60,9 @@ LIBRARIES = {
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},
-    "studies": {"distributed", "SALib", "threadpoolctl"},
     "cli": {"typer", "rich"},
+    "chladni_bench": {"matplotlib"},
+    "chladni_studies": {"distributed", "SALib", "threadpoolctl", "matplotlib"},
     "chladni_evidence": {"threadpoolctl"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
@@ -90,7 +95,26 @@ def package(path):
     return module(path) if path.name == "__init__.py" else module(path)[:-1]
 
 
+def front(name):
+    """Names that other packages may import from a package: the ``__all__`` of its front."""
+    tree = ast.parse((PACKAGES[name] / name / "__init__.py").read_text(encoding="utf-8"))
+    values = {ast.unparse(n.targets[0]): n.value for n in tree.body if isinstance(n, ast.Assign)}
+    return set(ast.literal_eval(values["__all__"])) if "__all__" in values else set()
+
+
+def entry_points():
+    """Modules that pyproject.toml names, by the group of scripts or entry points."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    groups = {"scripts": project.get("scripts", {})} | project.get("entry-points", {})
+    return {
+        group: {tuple(text.split(":")[0].split(".")) for text in named.values()}
+        for group, named in groups.items()
+    }
+
+
 MODULES = {module(p) for p in SOURCES}
+FRONTS = {name: front(name) for name in PACKAGES}
+COMMANDS = {("chladni", "cli", name) for name in BUILT_IN} | entry_points()["chladni.commands"]
 
 
 def nodes(path):
@@ -100,7 +124,10 @@ def nodes(path):
 
 @cache
 def imports(path):
-    """(own modules, outside packages) imported anywhere in a file; own ones stay relative."""
+    """(own modules, outside packages) imported anywhere in a file.
+
+    Own modules are relative; another package than ``chladni`` is used by its front.
+    """
     own, outside = set(), set()
     for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and node.level:
@@ -113,6 +140,12 @@ def imports(path):
         elif isinstance(node, ast.ImportFrom) and node.module.split(".")[0] in PACKAGES:
             base = tuple(node.module.split("."))
             assert base[0] != module(path)[0], f"{path}:{node.lineno}: own modules are relative"
+            if base[0] != "chladni":
+                by = f"{path}:{node.lineno}: only the front of {base[0]} is for others"
+                assert base[1:] == (), by
+                assert {a.name for a in node.names} <= FRONTS[base[0]], by
+                own.add(base)
+                continue
             named = {(*base, alias.name) for alias in node.names}
             own |= {name if name in MODULES else base for name in named}
         elif isinstance(node, ast.ImportFrom):
@@ -123,22 +156,26 @@ def imports(path):
 
 
 def test_imports_point_down():
-    """All offenders at once: the module, the floor or library it must not import."""
+    """All offenders at once: the module, the floor or library it must not import.
+
+    A command, in whichever package, stands on what commands share as well.
+    """
     wrong = []
     for path in SOURCES:
         floor, (own, outside) = floor_of(module(path)), imports(path)
-        above = {floor_of(m) for m in own} - MAY_IMPORT[floor] - {floor}
-        foreign = outside - EVERYWHERE - LIBRARIES.get(floor, set())
+        over = {"cli"} if module(path) in COMMANDS else set()
+        shared = set().union(*(LIBRARIES[room] for room in over))
+        above = {floor_of(m) for m in own} - MAY_IMPORT[floor] - {floor} - over
+        foreign = outside - EVERYWHERE - LIBRARIES.get(floor, set()) - shared
         wrong += [f"{'/'.join(module(path))} imports {name}" for name in above | foreign]
     assert not wrong, "\n".join(sorted(wrong))
 
 
 def test_no_command_imports_another():
     """What commands share is in run.py, or further down; the list of commands imports them all."""
-    commands = {("chladni", "cli", name) for name in COMMANDS}
-    assert commands <= MODULES
-    for path in (p for p in SOURCES if module(p) in commands):
-        assert not imports(path)[0] & commands, path
+    assert COMMANDS <= MODULES
+    for path in SOURCES:
+        assert not imports(path)[0] & COMMANDS, path
 
 
 def test_workflows_touch_no_terminal_and_no_page():
@@ -169,21 +206,12 @@ def reached(roots):
     return found
 
 
-def entry_points():
-    """Modules that pyproject.toml names (scripts, entry points) or ``python -m`` runs."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    groups = [project.get("scripts", {}), *project.get("entry-points", {}).values()]
-    mains = {m for m in MODULES if m[-1] == "__main__"}  # python -m PACKAGE
-    named = {tuple(text.split(":")[0].split(".")) for group in groups for text in group.values()}
-    return named | mains
-
-
 def test_nothing_is_out_of_reach():
     """Commands, environments and public names reach every module, or it waits for something."""
-    commands = {("chladni", "cli", name) for name in COMMANDS}
     environments = {m for m in MODULES if m[0] == "chladni_envs"}
     public = imports(ROOT / "src/chladni/__init__.py")[0]
-    used = reached(commands | environments | public | entry_points())
+    mains = {m for m in MODULES if m[-1] == "__main__"}  # python -m PACKAGE
+    used = reached(COMMANDS | environments | public | mains.union(*entry_points().values()))
     assert {"/".join(m) for m in MODULES - used} == set(WAITING_FOR)
 
 
@@ -194,7 +222,7 @@ def test_names_stand_once():
     """
     classes, files = defaultdict(list), defaultdict(list)
     for path in SOURCES:
-        called = floor_of(module(path)) == "workflows" and path.stem in COMMANDS
+        called = floor_of(module(path)) == "workflows" and path.stem in BUILT_IN
         named = path.stem in ("__init__", "__main__") or module(path)[:2] == ("chladni", "cli")
         if not (called or named):
             files[path.stem].append(path)

@@ -39,6 +39,13 @@ def test_import_is_light(code):
     assert not loaded_by(code) & HEAVY
 
 
+def test_the_package_loads_none_that_builds_on_it():
+    """The names that it holds of them are loaded at their first use."""
+    built = {"chladni_planning", "chladni_bench", "chladni_studies", "chladni_specimens"}
+    assert not loaded_by("import chladni") & (built | {"chladni_evidence", "chladni_envs"})
+    assert loaded_by("import chladni; chladni.study") & built == {"chladni_studies"}
+
+
 def test_nothing_is_printed():
     done = subprocess.run([sys.executable, "-c", "import chladni"], capture_output=True, check=True)
     assert done.stdout == done.stderr == b""

@@ -7,7 +7,7 @@ import numpy as np
 
 from chladni.dynamics.frf import Quantity
 from chladni.errors import ShapeError
-from chladni.planning import best_layout, rattle_margin, shaking
+from chladni_planning import best_layout, rattle_margin, shaking
 
 from . import drawing
 from .reset_first import refuse_before_reset

@@ -12,8 +12,9 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from chladni import planning as pretest
 from chladni.errors import ShapeError
+from chladni_planning import Candidates, Rules, annealed, best_layout, evolved, first_max, first_min
+from chladni_planning import best_actuators as best_shakers
 
 from .actuator_placement import ActuatorPlacementEnv
 from .calibration_env import STRIDE, CalibrationEnv
@@ -24,12 +25,12 @@ Agent = Callable[[np.ndarray, dict[str, Any]], Any]
 
 def efi(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
     """Kammer's method: delete the least independent candidate."""
-    return np.int64(pretest.first_min(np.where(info["action_mask"] == 1, observation, np.inf)))
+    return np.int64(first_min(np.where(info["action_mask"] == 1, observation, np.inf)))
 
 
 def greedy(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
     """Add the candidate of largest present worth."""
-    return np.int64(pretest.first_max(np.where(info["action_mask"] == 1, observation, -np.inf)))
+    return np.int64(first_max(np.where(info["action_mask"] == 1, observation, -np.inf)))
 
 
 def at_random(seed: int = 0) -> Agent:
@@ -56,7 +57,7 @@ def towards(layout: np.ndarray, env: gym.Env[Any, Any]) -> Agent:
     return agent
 
 
-def _problem(env: gym.Env[Any, Any]) -> tuple[pretest.Candidates, int, pretest.Rules]:
+def _problem(env: gym.Env[Any, Any]) -> tuple[Candidates, int, Rules]:
     inner = env.unwrapped
     if not isinstance(inner, SensorPlacementEnv):
         raise ShapeError("this agent places sensors; make it for SensorPlacement-v0")
@@ -69,19 +70,19 @@ def exchange(env: gym.Env[Any, Any], *, pairs: bool = True) -> Agent:
     """Effective independence, then exchange of one and of two sensors."""
     c, n_sensors, rules = _problem(env)
     pairs = pairs and c.rows.shape[2] == 1
-    return towards(pretest.best_layout(c, n_sensors, rules=rules, pairs=pairs), env)
+    return towards(best_layout(c, n_sensors, rules=rules, pairs=pairs), env)
 
 
 def annealing(env: gym.Env[Any, Any], *, seed: int = 0, steps: int = 4000) -> Agent:
     """Simulated annealing over swaps."""
     c, n_sensors, rules = _problem(env)
-    return towards(pretest.annealed(c, n_sensors, seed=seed, steps=steps, rules=rules), env)
+    return towards(annealed(c, n_sensors, seed=seed, steps=steps, rules=rules), env)
 
 
 def genetic(env: gym.Env[Any, Any], *, seed: int = 0, generations: int = 60) -> Agent:
     """Evolution of random keys."""
     c, n, rules = _problem(env)
-    return towards(pretest.evolved(c, n, seed=seed, generations=generations, rules=rules), env)
+    return towards(evolved(c, n, seed=seed, generations=generations, rules=rules), env)
 
 
 def best_actuators(env: gym.Env[Any, Any]) -> Agent:
@@ -89,7 +90,7 @@ def best_actuators(env: gym.Env[Any, Any]) -> Agent:
     inner = env.unwrapped
     if not isinstance(inner, ActuatorPlacementEnv):
         raise ShapeError("this agent places actuators; make it for ActuatorPlacement-v0")
-    return towards(pretest.best_actuators(inner.shaker, inner.n_actuators, inner.allowed), env)
+    return towards(best_shakers(inner.shaker, inner.n_actuators, inner.allowed), env)
 
 
 def held_back(threshold: float = 0.1) -> Agent:
@@ -97,7 +98,7 @@ def held_back(threshold: float = 0.1) -> Agent:
 
     def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
         explained = np.where(info["action_mask"][:-1] == 1, observation[2], -np.inf)
-        k = pretest.first_max(explained)
+        k = first_max(explained)
         return np.int64(k if explained[k] > threshold else len(explained))
 
     return agent

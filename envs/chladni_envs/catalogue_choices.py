@@ -7,7 +7,6 @@ import numpy as np
 
 from chladni.effects.search_context import Candidate
 from chladni.errors import ModelError
-from chladni.planning import Linearised
 from chladni.updating.candidates import candidates
 from chladni.updating.diagnosis import threshold, without_effects
 from chladni.updating.discrepancy import Discrepancy
@@ -17,6 +16,7 @@ from chladni.updating.question import Prepared
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.search_round import taken
 from chladni.updating.several import price
+from chladni_planning import Linearised
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,20 @@ import numpy as np
 from chladni.case import load_case
 from chladni.effects.effect import Effect, Parameter
 from chladni.errors import FileError
-from chladni.planning import Linearised, PlanSettings, find_sensor_candidates
-from chladni.planning.rattle import openings
-from chladni.planning.whole_plan import motion, mounts_at, seen_at, target_modes
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import State, evaluate
 from chladni.workflows.loaded_model import load_model
 from chladni.workflows.question_of_case import prepared
+from chladni_planning import (
+    Linearised,
+    PlanSettings,
+    find_sensor_candidates,
+    motion,
+    mounts_at,
+    openings,
+    seen_at,
+    target_modes,
+)
 
 from .calibration_questions import CalibrationQuestion
 from .catalogue_choices import CatalogueChoices, catalogue_choices
@@ -29,7 +36,7 @@ def specimen(
     """Flat, reachable places found on the mesh and the first flexible modes along their normals.
 
     The choice of a shaker place also needs two properties, which are included.  They are a free
-    line to the place and the clearances of the mesh (:mod:`chladni.planning.rattle`).
+    line to the place and the clearances of the mesh (:mod:`chladni_planning.rattle`).
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from chladni.errors import ShapeError
-from chladni.planning import Linearised
+from chladni_planning import Linearised
 
 from . import drawing
 from .reset_first import refuse_before_reset

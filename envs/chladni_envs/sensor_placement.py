@@ -7,7 +7,7 @@ import gymnasium as gym
 import numpy as np
 
 from chladni.errors import LabelError
-from chladni.planning import Candidates, Rules, Walk, candidates
+from chladni_planning import Candidates, Rules, Walk, candidates
 
 from . import drawing
 from .reset_first import refuse_before_reset
@@ -46,11 +46,11 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     Parameters
     ----------
     phi : (n, p), (n_draws, n, p), (n_draws, n, k, p) or Candidates
-        Target shapes, see :func:`chladni.planning.candidates`; a plate by default.
+        Target shapes, see :func:`chladni_planning.candidates`; a plate by default.
     n_sensors : int               by default five for four modes
     moves : "delete" or "add"
     points : (n, 2) or (n, 3)     places [m], for pictures
-    noise, prior, rules : as in :func:`chladni.planning.effective_independence`
+    noise, prior, rules : as in :func:`chladni_planning.effective_independence`
     unusable : float              share of candidates that are unusable, drawn at each reset
     case : folder or deck         its mesh gives candidates and modes (phi is then None)
     modes : int                   number of target modes of a case

@@ -26,6 +26,9 @@ Data: ``Assembly`` (the structure), ``ModalModel``, ``FRF``; all in SI, frequenc
 as ``412:+Z`` or ``412:n``. An input that is wrong raises a ``ChladniError`` of one sentence.
 """
 
+import typing as _typing
+from importlib import import_module as _import_module
+
 from . import address_space as address_space  # first: NumPy does not start below its limit
 from .errors import ChladniError as ChladniError
 from .model.assembly import Assembly as Assembly
@@ -42,7 +45,6 @@ from .ema.frf_estimate import EstimateSettings as EstimateSettings
 from .ema.setup import PoleTable as PoleTable
 from .ema.setup import Recording as Recording
 from .ema.setup import Sensor as Sensor
-from .planning import PlanSettings as PlanSettings
 from .case import Case as Case
 from .case import load_case as load_case
 from .case.make_case import CaseWords as CaseWords
@@ -54,9 +56,6 @@ from .workflows.map import map_formed as map_formed
 from .workflows.modes import modes as modes
 from .workflows.frf import frf as frf
 from .workflows.case_check import check as check
-from .workflows.plan import plan as plan
-from .workflows.virtual_test import BenchSettings as BenchSettings
-from .workflows.virtual_test import virtual_test as virtual_test
 from .workflows.evaluation import evaluate_recordings as evaluate_recordings
 from .workflows.identify import PoleChoice as PoleChoice
 from .workflows.identify import identify as identify
@@ -64,12 +63,38 @@ from .workflows.correlate import correlate as correlate
 from .workflows.other_modes import other_modes as other_modes
 from .workflows.calibrate import calibrate as calibrate
 from .workflows.diagnose import diagnose as diagnose
-from .studies.study_settings import StudySettings as StudySettings
-from .studies.parameter_study import study as study
 from .report.diagnosis_json import read_diagnosis as read_diagnosis
 from .report.result_views import show_results as _show_results
 
 _show_results()
+
+_LATER = {  # of the packages that build on this one: loaded at the first use
+    "BenchSettings": "chladni_bench",
+    "PlanSettings": "chladni_planning",
+    "StudySettings": "chladni_studies",
+    "plan": "chladni_planning",
+    "study": "chladni_studies",
+    "virtual_test": "chladni_bench",
+}
+if _typing.TYPE_CHECKING:
+    from chladni_bench import BenchSettings as BenchSettings
+    from chladni_bench import virtual_test as virtual_test
+    from chladni_planning import PlanSettings as PlanSettings
+    from chladni_planning import plan as plan
+    from chladni_studies import StudySettings as StudySettings
+    from chladni_studies import study as study
+else:
+
+    def __getattr__(name: str) -> object:
+        """Load a name of ``_LATER`` and keep it."""
+        if name not in _LATER:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return globals().setdefault(name, getattr(_import_module(_LATER[name]), name))
+
+    def __dir__() -> list[str]:
+        """Return all names, also those of ``_LATER``."""
+        return sorted({*globals(), *_LATER})
+
 
 __all__ = [
     "FRF",

@@ -6,7 +6,6 @@ from functools import cache, partial
 
 import numpy as np
 
-from chladni.bench.sine_schedule import TABLE_3, stage_lines
 from chladni.dofs import label
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
@@ -15,13 +14,9 @@ from chladni.geometry.nearest import ShellSurface
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
-from chladni.planning import PlanSettings, plan
-from chladni.planning.measurement_lines import even_lines
-from chladni_specimens.forms import FORMS
-from chladni_specimens.holed_plate import holed_plate
-from chladni_specimens.plates import folded_panel, plate
-from chladni_specimens.tailgate.design import TailgateDesign
-from chladni_specimens.tailgate.tailgate import tailgate
+from chladni_bench import TABLE_3, stage_lines
+from chladni_planning import PlanSettings, even_lines, plan_test
+from chladni_specimens import FORMS, TailgateDesign, folded_panel, holed_plate, plate, tailgate
 
 from .mesh_transfer import Spots
 
@@ -175,7 +170,7 @@ def panel_bench(name: str, seed: int) -> Bench:
 def tailgate_bench() -> Bench:
     """Bench of the tailgate at 20 mm: sensors, shaker and cords as planned, lines of the thesis."""
     deck = tailgate(TailgateDesign(size=0.020))
-    found = plan(deck, PlanSettings(sensors=30))
+    found = plan_test(deck, PlanSettings(sensors=30))
     m = found.mounts
     sheets = tuple(p.name for p in deck.parts if isinstance(p.section, ShellSection))
 

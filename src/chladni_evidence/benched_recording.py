@@ -12,17 +12,23 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.bench_article import BenchArticle
-from chladni.bench.bench_recording import BenchTest, level_for, record
-from chladni.bench.bench_rig import BenchSetup, bench_rig
-from chladni.bench.sine_schedule import dwells_of, stages_for
-from chladni.bench.sine_sweep import swept
 from chladni.dynamics.frf import FRF
 from chladni.fem.energy import mass_properties
 from chladni.geometry.facets import tangents, unit
 from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
+from chladni_bench import (
+    AccelerometerType,
+    BenchArticle,
+    BenchSetup,
+    BenchTest,
+    bench_rig,
+    dwells_of,
+    level_for,
+    record,
+    stages_for,
+    swept,
+)
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import Bench

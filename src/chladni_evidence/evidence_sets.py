@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from chladni.errors import LabelError, did_you_mean
-from chladni_specimens.forms import FORMS
+from chladni_specimens import FORMS
 
 from .bench_of_structure import (
     CLAMPED,

@@ -8,7 +8,7 @@ from chladni.effects.hem_line import HemLine, hem_lines
 from chladni.errors import ModelError
 from chladni.model.assembly import Assembly, Solids
 from chladni.model.properties import Isotropic, SolidSection
-from chladni_specimens.joints.bolts import grip
+from chladni_specimens import grip
 
 from .hidden import Hidden, Site
 from .hidden_kinds import Kind

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from chladni.bench.accelerometers import AccelerometerType, drawn_gains
-from chladni.bench.noisy_frf import MeasurementChain, recorded
 from chladni.dynamics.frf import FRF
 from chladni.effects.calibration_parameters import value
 from chladni.errors import ModelError
@@ -22,6 +20,7 @@ from chladni.model.assembly import Assembly
 from chladni.model.properties import BeamSection, ShellSection
 from chladni.output import write_json, write_text
 from chladni.units import units
+from chladni_bench import AccelerometerType, MeasurementChain, drawn_gains, recorded
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import ZETA, Bench

@@ -28,9 +28,7 @@ from chladni.workflows.calibrate import calibrate
 from chladni.workflows.diagnosis_result import DiagnosisResult
 from chladni.workflows.frf import frf
 from chladni.workflows.loaded_model import load_model
-from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
-from chladni_specimens.joints.bolts import screw
-from chladni_specimens.joints.builders import STEEL, adhesive_bead, spot_welds
+from chladni_specimens import STEEL, adhesive_bead, of_pieces, rectangle, screw, spot_welds, stops
 
 GLUE = Isotropic(20e6, 0.4, 1000.0, id=2)
 HIGH, COARSE, FINE = 1.2e-3, 0.025, 0.0125  # gap of the sheets, mesh of deck and of article [m]

@@ -10,7 +10,6 @@ from functools import cache
 
 import numpy as np
 
-from chladni.bench.noisy_frf import MeasurementChain, recorded
 from chladni.dynamics.frf import FRF
 from chladni.ema.finding import Screening
 from chladni.ema.identification import identify
@@ -19,8 +18,9 @@ from chladni.ema.screening_lines import screening_lines
 from chladni.ema.setup import Recording
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import Modelled, modelled
-from chladni.planning.measurement_lines import even_lines
 from chladni.updating.channel_screening import against_model
+from chladni_bench import MeasurementChain, recorded
+from chladni_planning import even_lines
 
 from .article_modes import ArticleModes, article_modes
 from .bench_of_structure import Bench, form_bench, glue_candidates, panel_bench

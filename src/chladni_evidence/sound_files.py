@@ -26,7 +26,7 @@ from chladni.updating.result import NamedEffect
 from chladni.workflows.diagnosis_result import DiagnosisResult
 from chladni.workflows.frf import frf as evaluated
 from chladni.workflows.loaded_model import Model, load_model
-from chladni_specimens.plates import box, plate
+from chladni_specimens import box, plate
 
 Files = Mapping[str, bytes]
 DECKS = {

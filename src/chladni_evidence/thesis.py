@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from chladni.bench.article_scatter import FREQUENCIES
 from chladni.io.uff.estimate_stamp import stamp
 from chladni.io.uff.write_uff import write_uff
 from chladni.output import run_folder, write_json
 from chladni.report.blocks import Links, Section
 from chladni.report.page import write_sections
+from chladni_bench import FREQUENCIES
 
 from .thesis_bench import Subject, ThesisTest, tailgate_subject, thesis_test
 from .thesis_figures import drawn

@@ -11,32 +11,40 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import eig
 
-from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.article_scatter import DAMPING, drawn_article, fitted
-from chladni.bench.bench_article import BenchArticle
-from chladni.bench.bench_recording import (
-    BenchRecording,
-    BenchTest,
-    Channels,
-    channels_of,
-    level_for,
-    record,
-)
-from chladni.bench.bench_rig import BenchRig, BenchSetup, bench_rig
-from chladni.bench.cords import RUBBER, THESIS, Cord, cord
-from chladni.bench.pole_model import PoleModel
-from chladni.bench.sine_schedule import TABLE_3, Stage, dwells_of
-from chladni.bench.sine_sweep import swept
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
 from chladni.parallel import one_blas_thread
 from chladni.progress import Progress, silent
-from chladni.workflows.benched_article import benched, true_places
-from chladni.workflows.virtual_test import ABOVE_BAND
-from chladni_specimens.tailgate.design import TailgateDesign
-from chladni_specimens.tailgate.skin import Skin
-from chladni_specimens.tailgate.tailgate import tailgate
+from chladni_bench import (
+    ABOVE_BAND,
+    DAMPING,
+    RUBBER,
+    TABLE_3,
+    THESIS,
+    AccelerometerType,
+    BenchArticle,
+    BenchRecording,
+    BenchRig,
+    BenchSetup,
+    BenchTest,
+    Channels,
+    Cord,
+    PoleModel,
+    Stage,
+    bench_rig,
+    benched,
+    channels_of,
+    cord,
+    drawn_article,
+    dwells_of,
+    fitted,
+    level_for,
+    record,
+    swept,
+    true_places,
+)
+from chladni_specimens import Skin, TailgateDesign, tailgate
 
 from .bench_of_structure import tailgate_bench
 from .mesh_transfer import Spots, rows_of_part

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from chladni.bench.bench_recording import BenchRecording
 from chladni.dynamics.frf import UNIT
 from chladni.ema.realisation import realised
 from chladni.view import modal_plots, plots
+from chladni_bench import BenchRecording
 
 from .thesis_bench import FACTORS, ThesisTest
 from .thesis_findings import means

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.bench.bench_recording import BenchRecording
-from chladni.bench.sine_schedule import Stage
 from chladni.ema.correlation import Quality, deviation, quality
 from chladni.ema.mode_pairing import pair
 from chladni.ema.realisation import realised
 from chladni.ema.screening import Homogeneity, homogeneity
 from chladni.ema.shapes import lines_per_bandwidth
+from chladni_bench import BenchRecording, Stage
 
 from .thesis_bench import ThesisTest
 from .thesis_modes import ArticleIdentified, ModesOfArticles, errors, paired, spread

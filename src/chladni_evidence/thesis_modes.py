@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.bench.bench_recording import BenchRecording
 from chladni.dynamics.frf import FRF
 from chladni.ema.correlation import mac
 from chladni.ema.identification import Identified, identify
@@ -12,6 +11,7 @@ from chladni.ema.mode_pairing import pair
 from chladni.ema.shapes import driven_shapes
 from chladni.ema.stabilisation import ghosts, stabilisation
 from chladni.workflows.identify import firm
+from chladni_bench import BenchRecording
 
 BAND = (10.0, 195.0)  # [Hz], section 5.1
 CORDS = (23.0, 27.5)  # [Hz] excluded, section 5.1.1

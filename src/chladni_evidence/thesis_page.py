@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from chladni.bench.article_scatter import DAMPING, FREQUENCIES, WEIGHTS
 from chladni.report.blocks import Block, Facts, PageParts, Picture, Section, Table, Text
 from chladni.report.words import hertz, number
+from chladni_bench import DAMPING, FREQUENCIES, WEIGHTS
 
 from .thesis_bench import ThesisTest
 from .thesis_findings import BANDS, ThesisFindings, dispersion

@@ -1,1 +1,45 @@
 """Generated structures: plates, panels, the open tailgate; their mesher and their joints."""
+
+from .formed_panel import formed_panel as formed_panel
+from .forms import FORMS as FORMS
+from .forms import DrawnForm as DrawnForm
+from .forms.mesh_pieces import of_pieces as of_pieces
+from .forms.mesh_pieces import rectangle as rectangle
+from .forms.mesh_pieces import stops as stops
+from .holed_plate import holed_plate as holed_plate
+from .joints.bolts import grip as grip
+from .joints.bolts import screw as screw
+from .joints.builders import STEEL as STEEL
+from .joints.builders import adhesive_bead as adhesive_bead
+from .joints.builders import spot_welds as spot_welds
+from .plates import box as box
+from .plates import folded_panel as folded_panel
+from .plates import plate as plate
+from .tailgate.design import TailgateDesign as TailgateDesign
+from .tailgate.skin import Skin as Skin
+from .tailgate.tailgate import FormedSpecimen as FormedSpecimen
+from .tailgate.tailgate import tailgate as tailgate
+from .tailgate.tailgate import tailgate_specimen as tailgate_specimen
+
+__all__ = [
+    "FORMS",
+    "STEEL",
+    "DrawnForm",
+    "FormedSpecimen",
+    "Skin",
+    "TailgateDesign",
+    "adhesive_bead",
+    "box",
+    "folded_panel",
+    "formed_panel",
+    "grip",
+    "holed_plate",
+    "of_pieces",
+    "plate",
+    "rectangle",
+    "screw",
+    "spot_welds",
+    "stops",
+    "tailgate",
+    "tailgate_specimen",
+]

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.bench_article import BenchArticle
-from chladni.bench.bench_rig import BenchSetup
-from chladni.bench.front_end import FrontEnd
-from chladni.bench.shaker import ForceGauge, Shaker
+from chladni_bench.accelerometers import AccelerometerType
+from chladni_bench.bench_article import BenchArticle
+from chladni_bench.bench_rig import BenchSetup
+from chladni_bench.front_end import FrontEnd
+from chladni_bench.shaker import ForceGauge, Shaker
 
 R = 16  # modes, six of them rigid
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.bench.article_scatter import (
+from chladni_bench.article_scatter import (
     DAMPING,
     FREQUENCIES,
     components,

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.bench_recording import BenchTest, level_for, record
-from chladni.bench.bench_rig import BenchSetup, bench_rig
-from chladni.bench.drive_signals import ON, burst, multisine, pink_rms
-from chladni.bench.front_end import FrontEnd, digitised, sampling_rate
-from chladni.bench.sine_schedule import TABLE_3, SineLine, dwells_of, stage_lines, stages_for
-from chladni.bench.sine_sweep import swept
 from chladni.ema.frf_estimate import estimate, excitation_of
 from chladni.ema.time_record import overloaded
 from chladni.errors import ModelError
+from chladni_bench.accelerometers import AccelerometerType
+from chladni_bench.bench_recording import BenchTest, level_for, record
+from chladni_bench.bench_rig import BenchSetup, bench_rig
+from chladni_bench.drive_signals import ON, burst, multisine, pink_rms
+from chladni_bench.front_end import FrontEnd, digitised, sampling_rate
+from chladni_bench.sine_schedule import TABLE_3, SineLine, dwells_of, stage_lines, stages_for
+from chladni_bench.sine_sweep import swept
 
 BAND = (15.0, 200.0)
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.bench.accelerometers import AccelerometerType, drawn_gains, shown
-from chladni.bench.bench_rig import BenchSetup, bench_rig
-from chladni.bench.cords import INNER, THESIS, cord, cord_matrices, cords_for
-from chladni.bench.shaker import ForceGauge, Shaker, Stinger
 from chladni.errors import ShapeError
+from chladni_bench.accelerometers import AccelerometerType, drawn_gains, shown
+from chladni_bench.bench_rig import BenchSetup, bench_rig
+from chladni_bench.cords import INNER, THESIS, cord, cord_matrices, cords_for
+from chladni_bench.shaker import ForceGauge, Shaker, Stinger
 
 WEIGHTLESS = AccelerometerType(mass=0.0, gain_sd=0.0, resonance=1e9)
 F = np.linspace(15.0, 200.0, 60)

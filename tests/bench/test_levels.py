@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.bench_recording import BenchTest, channels_of, level_for, record
-from chladni.bench.bench_rig import BenchSetup, bench_rig
-from chladni.bench.drive_signals import pink_rms
-from chladni.bench.local_forces import Clearance, CubicSpring, JenkinsSlider
-from chladni.bench.sine_schedule import SineLine
-from chladni.bench.sine_sweep import swept
 from chladni.ema.recording_screening import screened
 from chladni.ema.screening import homogeneity
 from chladni.ema.setup import Recording
+from chladni_bench.accelerometers import AccelerometerType
+from chladni_bench.bench_recording import BenchTest, channels_of, level_for, record
+from chladni_bench.bench_rig import BenchSetup, bench_rig
+from chladni_bench.drive_signals import pink_rms
+from chladni_bench.local_forces import Clearance, CubicSpring, JenkinsSlider
+from chladni_bench.sine_schedule import SineLine
+from chladni_bench.sine_sweep import swept
 
 BAND = (20.0, 120.0)
 ABOUT = (25.0, 32.0)  # the first elastic mode, at 28 Hz

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from chladni.bench.bench_rig import bench_rig
-from chladni.bench.first_order_hold import HeldRun
-from chladni.bench.local_forces import Clearance, CubicSpring, JenkinsSlider
-from chladni.bench.local_integration import LocalRun
-from chladni.bench.pole_model import by_poles
+from chladni_bench.bench_rig import bench_rig
+from chladni_bench.first_order_hold import HeldRun
+from chladni_bench.local_forces import Clearance, CubicSpring, JenkinsSlider
+from chladni_bench.local_integration import LocalRun
+from chladni_bench.pole_model import by_poles
 
 W, ZETA = 2 * np.pi * 20.0, 0.02
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from chladni.bench.noisy_frf import MeasurementChain, measured
 from chladni.dynamics.frf import transfer
 from chladni.dynamics.modes import ModalModel
+from chladni_bench.noisy_frf import MeasurementChain, measured
 
 F = np.linspace(5.0, 200.0, 4000)
 MODES = ModalModel(

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from chladni.bench.first_order_hold import STRIDE, HeldRun
-from chladni.bench.front_end import PASS, STOP, anti_alias
-from chladni.bench.pole_model import PoleFilter, by_poles, filtered
 from chladni.errors import ShapeError
+from chladni_bench.first_order_hold import STRIDE, HeldRun
+from chladni_bench.front_end import PASS, STOP, anti_alias
+from chladni_bench.pole_model import PoleFilter, by_poles, filtered
 
 
 def matrices(n=5, seed=0):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from chladni.bench.bench_recording import BenchTest, PhysicalRun, record
-from chladni.bench.bench_rig import bench_rig
-from chladni.bench.room import SOURCES
-from chladni.bench.sine_schedule import Stage, dwells_of
-from chladni.bench.sine_sweep import swept
+from chladni_bench.bench_recording import BenchTest, PhysicalRun, record
+from chladni_bench.bench_rig import bench_rig
+from chladni_bench.room import SOURCES
+from chladni_bench.sine_schedule import Stage, dwells_of
+from chladni_bench.sine_sweep import swept
 
 BAND, LOUD, RATE = (15.0, 200.0), 3e-3, 512.0
 

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from chladni.bench.article_scatter import DAMPING, FREQUENCIES
-from chladni.bench.bench_rig import bench_rig
-from chladni.bench.sine_schedule import Stage
 from chladni.ema.identification import Identified
 from chladni.io.tables.read_tables import read_recordings
+from chladni_bench.article_scatter import DAMPING, FREQUENCIES
+from chladni_bench.bench_rig import bench_rig
+from chladni_bench.sine_schedule import Stage
 from chladni_evidence.thesis import written
 from chladni_evidence.thesis_bench import (
     WAYS,

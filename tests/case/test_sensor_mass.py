@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.article_scatter import Scatter
 from chladni.case import load_case
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
@@ -16,16 +14,18 @@ from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.write_tables import write_npz
-from chladni.report.bench_page import _facts
 from chladni.units import UNITS
 from chladni.updating.preparation import prepare
-from chladni.workflows.benched_article import benched, true_places
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.case_model import model_frf
 from chladni.workflows.frf import frf, placed_layout
 from chladni.workflows.loaded_model import as_model
 from chladni.workflows.question_of_case import question_of
-from chladni.workflows.virtual_test import BenchSettings, virtual_test
+from chladni_bench.accelerometers import AccelerometerType
+from chladni_bench.article_scatter import Scatter
+from chladni_bench.bench_page import _facts
+from chladni_bench.bench_workflow import BenchSettings, virtual_test
+from chladni_bench.benched_article import benched, true_places
 
 from .test_case import deck
 

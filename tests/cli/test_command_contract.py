@@ -9,14 +9,14 @@ from tests.builders.cases import write_case
 from tests.builders.commands import ran, refused
 
 import chladni
-from chladni.cli.app import COMMANDS
+from chladni.cli.app import commands
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS
 from chladni_specimens.plates import plate
 
 from .test_cli import deck_text
 
-WITH_FILE = [c for c in COMMANDS if c not in ("demo", "blind")]  # these two take no file
+WITH_FILE = [c for c in commands() if c not in ("demo", "blind")]  # these two take no file
 CASELESS = ("report", "specimen", "init", "map")  # they take no case
 COMPARING = ("diagnose", "calibrate", "correlate")  # a recording with the model
 NEEDED = {  # extra arguments a command cannot do without

@@ -6,7 +6,10 @@ import pytest
 
 import chladni_envs  # noqa: F401
 from chladni.errors import LabelError, ShapeError
-from chladni.planning import (
+from chladni_envs import agents
+from chladni_envs.parameter_selection import drawn
+from chladni_envs.small_specimens import plate
+from chladni_planning import (
     Rules,
     Walk,
     best_layout,
@@ -18,9 +21,6 @@ from chladni.planning import (
     too_near,
     value,
 )
-from chladni_envs import agents
-from chladni_envs.parameter_selection import drawn
-from chladni_envs.small_specimens import plate
 
 SENSORS = "chladni/SensorPlacement-v0"
 

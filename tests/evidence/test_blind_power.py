@@ -63,7 +63,7 @@ def test_an_effect_has_the_size_that_was_ordered(times):
 
 @pytest.mark.parametrize("text", ["1,none", "0", "-1,2"])
 def test_sizes_that_are_no_numbers_are_refused(text):
-    from chladni.cli.blind import _sizes
+    from chladni_evidence.blind_command import _sizes
 
     with pytest.raises(LabelError, match=r"write 0\.5,1,2"):
         _sizes(text)

@@ -8,13 +8,13 @@ robust layout was made for.
 import numpy as np
 import pytest
 
-from chladni import planning as pretest
+import chladni_planning as pretest
 from chladni.fem.assemble import structure
 from chladni.fem.locate import rows_at
 from chladni.geometry.nearest import ShellSurface
-from chladni.planning import PlanSettings, plan
-from chladni.planning.drawn_models import drawn, ensemble
-from chladni.planning.whole_plan import recovered, seen_at, target_modes
+from chladni_planning import PlanSettings, plan_test
+from chladni_planning.drawn_models import drawn, ensemble
+from chladni_planning.whole_plan import recovered, seen_at, target_modes
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate
 
@@ -33,21 +33,21 @@ def deck():
 @pytest.fixture(scope="module")
 def robust(deck):
     assembly, built = deck
-    return plan(assembly, PlanSettings(sensors=30, modes=15, draws=DRAWS), built=built)
+    return plan_test(assembly, PlanSettings(sensors=30, modes=15, draws=DRAWS), built=built)
 
 
 @pytest.fixture(scope="module")
 def plain(deck):
     """By log det alone, on the nominal model alone: what the textbook does."""
     assembly, built = deck
-    return plan(assembly, PlanSettings(sensors=30, modes=15, alike=1.0), built=built)
+    return plan_test(assembly, PlanSettings(sensors=30, modes=15, alike=1.0), built=built)
 
 
 @pytest.fixture(scope="module")
 def told(deck):
     """On the nominal model alone, modes told apart as in the robust plan."""
     assembly, built = deck
-    return plan(assembly, SETTINGS, built=built)
+    return plan_test(assembly, SETTINGS, built=built)
 
 
 def alike(phi):

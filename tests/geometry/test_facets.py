@@ -11,9 +11,9 @@ from chladni.effects.element_groups import element_groups
 from chladni.fem.assemble import structure
 from chladni.geometry.facets import cell_areas, point_normals, tangents, vector_areas
 from chladni.geometry.grid_normals import grid_normals, normals_at
-from chladni.planning import find_sensor_candidates
 from chladni.view.surface import surface
 from chladni.workflows.loaded_model import Model
+from chladni_planning import find_sensor_candidates
 from chladni_specimens.plates import box, folded_panel, plate
 
 PLATE = plate(0.4, 0.3, 8, 6, 1e-3)

@@ -9,8 +9,8 @@ from chladni.errors import ModelError
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.model.assembly import Assembly, Beams, Scalars
 from chladni.model.properties import Part
-from chladni.planning import PlanSettings, find_sensor_candidates, plan, sensors_csv
-from chladni.report.plan_page import notes
+from chladni_planning import PlanSettings, find_sensor_candidates, plan_test, sensors_csv
+from chladni_planning.plan_page import notes
 from chladni_specimens.forms import FORMS
 from chladni_specimens.forms.tube_frame import pipe
 from chladni_specimens.plates import plate, sheet
@@ -23,7 +23,7 @@ def frame():
 
 @pytest.fixture(scope="module")
 def planned(frame):
-    return plan(frame, PlanSettings(sensors=10, modes=6, draws=3))
+    return plan_test(frame, PlanSettings(sensors=10, modes=6, draws=3))
 
 
 def test_places_of_a_frame_lie_across_its_beams(frame):
@@ -66,7 +66,7 @@ def test_solid_bars_have_no_wall_to_draw(frame):
         replace(p, section=replace(p.section, J=0.2 * min(p.section.I1, p.section.I2)))
         for p in frame.parts
     )
-    found = plan(replace(frame, parts=parts), PlanSettings(sensors=6, modes=3, draws=3))
+    found = plan_test(replace(frame, parts=parts), PlanSettings(sensors=6, modes=3, draws=3))
     assert found.settings.draws == 0
     assert not [n for n in notes(found) if "drawn" in n]
 
@@ -89,7 +89,7 @@ def tower():
 
 def test_where_no_shaker_drives_all_modes_the_surest_is_taken():
     """Of two modes of one frequency one force drives one: every condition number is infinite."""
-    found = plan(tower(), PlanSettings(sensors=8, modes=6))
+    found = plan_test(tower(), PlanSettings(sensors=8, modes=6))
     f = found.modal.frequency
     assert np.isclose(f[1:], f[:-1], rtol=1e-6).any()
     assert not np.isfinite(found.actuators.condition).any()
@@ -116,7 +116,7 @@ def test_a_tube_of_flat_strips_has_places_in_their_middle(divisions):
     assert not places.is_grid.any()
     assert (places.side == np.sign(np.einsum("ij,ij->i", places.normals[:, :2],
                                              places.points[:, :2]))).all()  # fmt: skip
-    found = plan(tube, PlanSettings(sensors=8, modes=4))
+    found = plan_test(tube, PlanSettings(sensors=8, modes=4))
     assert "whole base" in " ".join(notes(found))
 
 
@@ -133,6 +133,6 @@ def test_nothing_to_glue_a_sensor_to_is_said(frame):
 
 def test_a_small_structure_takes_as_many_sensors_as_it_has_room_for():
     """Asked for thirty, as by default, it is planned with those that fit."""
-    found = plan(plate(0.1, 0.08, 4, 4, 1e-3), PlanSettings(sensors=30, modes=4))
+    found = plan_test(plate(0.1, 0.08, 4, 4, 1e-3), PlanSettings(sensors=30, modes=4))
     assert len(found.layout) == len(found.places) == found.settings.sensors < 30
     assert any("Every place has a sensor" in note for note in notes(found))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chladni.ema.correlation import auto_mac
-from chladni.planning import (
+from chladni_planning import (
     Rules,
     best_layout,
     candidates,

@@ -5,9 +5,9 @@ import pytest
 
 from chladni.ema.correlation import mac
 from chladni.fem.assemble import structure
-from chladni.planning import PlanSettings
-from chladni.planning.drawn_models import drawn, ensemble, random, with_thickness
-from chladni.planning.whole_plan import target_modes
+from chladni_planning import PlanSettings
+from chladni_planning.drawn_models import drawn, ensemble, random, with_thickness
+from chladni_planning.whole_plan import target_modes
 from chladni_specimens.plates import folded_panel
 
 SPREAD = 0.1

@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from chladni.dynamics.modes import ModalModel
 from chladni.dynamics.statespace import StateSpace, state_space
 from chladni.errors import AccuracyError, ShapeError
-from chladni.planning import (
+from chladni_planning import (
     balanced,
     best_actuators,
     condition,

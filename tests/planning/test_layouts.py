@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chladni.errors import LabelError, ShapeError
-from chladni.planning import (
+from chladni_planning import (
     Rules,
     best_layout,
     candidates,

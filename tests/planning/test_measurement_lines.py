@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import eigh
 
 from chladni.errors import ShapeError
-from chladni.planning import (
+from chladni_planning import (
     TABLE_3,
     Linearised,
     Rules,
@@ -31,7 +31,7 @@ from chladni.planning import (
     visibility,
     with_visible_modes,
 )
-from chladni.planning.layouts.layout_quality import overlap
+from chladni_planning.layouts.layout_quality import overlap
 
 
 def test_constant_number_in_every_half_bandwidth():

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni import planning as pretest
+import chladni_planning as pretest
 from chladni.errors import ModelError, ShapeError
 from chladni.fem.assemble import structure
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.model.assembly import Scalars
-from chladni.planning import PlanSettings, find_sensor_candidates, plan, sensors_csv, summary
-from chladni.planning.whole_plan import target_modes
+from chladni_planning import PlanSettings, find_sensor_candidates, plan_test, sensors_csv, summary
+from chladni_planning.whole_plan import target_modes
 from chladni_specimens.plates import box, folded_panel, plate
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -31,7 +31,7 @@ def built(panel):
 
 @pytest.fixture(scope="module")
 def found(panel, built):
-    return plan(panel, PlanSettings(sensors=14, modes=10, candidates=150), built=built)
+    return plan_test(panel, PlanSettings(sensors=14, modes=10, candidates=150), built=built)
 
 
 def test_places_keep_off_edges_and_folds(panel):
@@ -128,7 +128,7 @@ def test_a_strip_without_inner_grids_has_places_at_its_centres(tmp_path):
     np.testing.assert_allclose(places.points[:, 1], 0.01)
     linear = strip.points @ np.array([1.0, 2.0, 3.0])
     np.testing.assert_allclose(places.moving(linear), places.points @ np.array([1.0, 2.0, 3.0]))
-    planned = plan(strip, PlanSettings(sensors=6, modes=3, floor=0.05))
+    planned = plan_test(strip, PlanSettings(sensors=6, modes=3, floor=0.05))
     (tmp_path / "sensors.csv").write_text(sensors_csv(planned))
     for sensor, i in zip(read_sensors(tmp_path / "sensors.csv"), planned.layout, strict=False):
         assert sensor.grid is None
@@ -146,7 +146,7 @@ def test_a_wide_sheet_has_places_at_grids(panel):
 def test_modes_are_told_apart(panel, built):
     """The AutoMAC at the sensors obeys the ceiling, or is lower than without one."""
     settings = PlanSettings(sensors=12, modes=10, candidates=150)
-    told, plain = (plan(panel, replace(settings, alike=a), built=built) for a in (0.1, 1.0))
+    told, plain = (plan_test(panel, replace(settings, alike=a), built=built) for a in (0.1, 1.0))
     off = [(p.auto_mac - np.eye(10)).max() for p in (told, plain)]
     assert off[0] <= max(0.12, 0.5 * off[1])
     assert "with modes distinguished" not in plain.log_det
@@ -228,7 +228,7 @@ def test_an_in_plane_mode_is_seen_with_a_block():
         damping=np.zeros(4),
     )
     held = replace(sheet, springs=springs)
-    planned = plan(held, PlanSettings(sensors=10, modes=7))
+    planned = plan_test(held, PlanSettings(sensors=10, modes=7))
     due = np.sqrt(4 * 100.0 / (0.4 * 0.3 * 1e-3 * 7850)) / (2 * np.pi)
     assert planned.modal.frequency[0] == pytest.approx(due, rel=1e-3)
     np.testing.assert_array_equal(planned.aimed, 2 * [False] + 5 * [True])  # shift, turn in plane
@@ -255,7 +255,7 @@ def test_hang_points_are_quiet_and_apart(found):
 
 def test_spacing_is_kept(panel, built):
     settings = PlanSettings(sensors=12, modes=8, candidates=120, spacing=0.08)
-    planned = plan(panel, settings, built=built)
+    planned = plan_test(panel, settings, built=built)
     x = planned.mounts.points[planned.layout]
     apart = np.linalg.norm(x[:, None] - x, axis=2)[np.triu_indices(12, 1)]
     assert apart.min() >= 0.08
@@ -264,15 +264,15 @@ def test_spacing_is_kept(panel, built):
 def test_a_layout_for_an_ensemble(panel, built):
     """Drawn models move the layout; it serves their mean better than the nominal one does."""
     settings = PlanSettings(sensors=10, modes=8, candidates=60)
-    nominal = plan(panel, settings, built=built)
-    robust = plan(panel, replace(settings, draws=3, spread=0.2), built=built)
+    nominal = plan_test(panel, settings, built=built)
+    robust = plan_test(panel, replace(settings, draws=3, spread=0.2), built=built)
     assert robust.log_det["with exchange"] != nominal.log_det["with exchange"]
     assert "pivoted QR" not in robust.log_det  # it knows of one model only
 
 
 def test_fewer_sensors_than_modes_is_refused(panel, built):
     with pytest.raises(ShapeError, match="4 sensors cannot distinguish 6 modes"):
-        plan(panel, PlanSettings(sensors=4, modes=6, candidates=60), built=built)
+        plan_test(panel, PlanSettings(sensors=4, modes=6, candidates=60), built=built)
 
 
 def test_the_table_of_sensors_can_be_read_back(found, tmp_path):

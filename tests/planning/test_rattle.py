@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from chladni.model.properties import Isotropic, Part, ShellSection
-from chladni.planning import rattle_margin
-from chladni.planning.rattle import TAKE_UP, all_gaps, first_rattle, openings
+from chladni_planning import rattle_margin
+from chladni_planning.rattle import TAKE_UP, all_gaps, first_rattle, openings
 from chladni_specimens.mesher.flat_regions import grid
 from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.tailgate.tailgate import of_sheets

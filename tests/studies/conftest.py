@@ -5,8 +5,8 @@ import pytest
 
 import chladni
 from chladni.io.nastran import write_assembly
-from chladni.studies import StudySettings
 from chladni_specimens.plates import plate
+from chladni_studies import StudySettings
 
 THREE = ("t=90%:110%", "E=80%:120%", "rho=85%:115%")
 

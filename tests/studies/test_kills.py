@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from chladni.io.package_files import mesh_path
-from chladni.studies.study_store import BEGUN, ROWS, finished
+from chladni_studies.study_store import BEGUN, ROWS, finished
 
 
 @dataclass(frozen=True)

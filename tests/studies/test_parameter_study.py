@@ -9,11 +9,11 @@ import pytest
 import chladni
 from chladni.errors import ChladniError, FileError, LabelError, ModelError
 from chladni.io.nastran import write_assembly
-from chladni.studies import StudySettings, sample
-from chladni.studies.variation import of_parts
-from chladni.studies.vary_text import vary_text
 from chladni.workflows.loaded_model import Model
 from chladni_specimens.plates import plate
+from chladni_studies import StudySettings, sample
+from chladni_studies.variation import of_parts
+from chladni_studies.vary_text import vary_text
 
 from .conftest import THREE, ratio, thin_plate
 

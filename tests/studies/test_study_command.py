@@ -13,7 +13,7 @@ import chladni
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.result_json import to_json
-from chladni.studies import StudySettings
+from chladni_studies import StudySettings
 
 CASE = """
 [model]
@@ -149,7 +149,7 @@ def test_a_bad_option_names_itself(deck, tmp_path, options, named):
 
 
 def test_mostly_failed_is_not_to_be_trusted(deck, tmp_path, monkeypatch):
-    from chladni.studies import sample
+    from chladni_studies import sample
 
     solved, tries = sample.solved, []
 

@@ -8,8 +8,8 @@ import pytest
 import chladni
 from chladni.errors import FileError, Interrupted
 from chladni.output import write_json
-from chladni.studies import StudySettings, parameter_study
-from chladni.studies.study_store import BEGUN, ROWS
+from chladni_studies import StudySettings, parameter_study
+from chladni_studies.study_store import BEGUN, ROWS
 
 from .conftest import THREE
 
@@ -31,7 +31,7 @@ def calls(monkeypatch):
         return computed(study, number, values)
 
     monkeypatch.setattr(parameter_study, "computed", counted)
-    monkeypatch.setattr("chladni.studies.workers.computed", counted)
+    monkeypatch.setattr("chladni_studies.workers.computed", counted)
     return seen
 
 

@@ -13,14 +13,14 @@ from chladni.effects.points import with_masses
 from chladni.errors import FileError
 from chladni.fem.assemble import structure
 from chladni.model.ground_springs import with_ground_bushes
-from chladni.studies import StudySettings
-from chladni.studies.parameter_study import _varied, study
-from chladni.studies.varied_effects import of_effect
-from chladni.studies.vary_text import vary_text
 from chladni.units import UNITS
 from chladni.workflows.loaded_model import Model
 from chladni_specimens.forms import FORMS
 from chladni_specimens.plates import plate
+from chladni_studies import StudySettings
+from chladni_studies.parameter_study import _varied, study
+from chladni_studies.varied_effects import of_effect
+from chladni_studies.vary_text import vary_text
 
 GRID = 12
 

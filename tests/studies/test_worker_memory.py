@@ -6,12 +6,12 @@ import sys
 
 import pytest
 
-from chladni.studies.worker_memory import keep_freed_memory
+from chladni_studies.worker_memory import keep_freed_memory
 
 CODE = """
 import resource, sys
 import numpy as np
-from chladni.studies.worker_memory import keep_freed_memory
+from chladni_studies.worker_memory import keep_freed_memory
 
 if sys.argv[1] == "kept":
     assert keep_freed_memory()

@@ -18,10 +18,10 @@ from distributed import Client
 
 import chladni
 from chladni.errors import FileError
-from chladni.studies import StudySettings, local_workers
-from chladni.studies.local_workers import ENDED, local_results
-from chladni.studies.study_store import ROWS
-from chladni.studies.workers import _AHEAD, NO_WORKER
+from chladni_studies import StudySettings, local_workers
+from chladni_studies.local_workers import ENDED, local_results
+from chladni_studies.study_store import ROWS
+from chladni_studies.workers import _AHEAD, NO_WORKER
 
 RANGES = ["t=90%:110%", "E=80%:120%"]
 SETTINGS = StudySettings(samples=40, modes=3)
@@ -199,7 +199,7 @@ def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x:1", ""])
 def test_no_scheduler_is_one_sentence_and_leaves_nothing(model, address, monkeypatch, tmp_path):
-    monkeypatch.setattr("chladni.studies.workers.PATIENCE", 1)
+    monkeypatch.setattr("chladni_studies.workers.PATIENCE", 1)
     with pytest.raises(FileError, match="no Dask scheduler answers at"):
         chladni.study(model, RANGES, SETTINGS, scheduler=address, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()

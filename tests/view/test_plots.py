@@ -11,7 +11,9 @@ from matplotlib.text import Text
 from PIL import Image
 
 from chladni.errors import ShapeError
-from chladni.view import bench_plots, level_plots, modal_plots, plots, study_plots
+from chladni.view import level_plots, modal_plots, plots
+from chladni_bench import bench_plots
+from chladni_studies import study_plots
 
 F = np.linspace(10, 200, 400)
 H = sum(1 / ((f0**2 - F**2) + 0.02j * f0 * F) for f0 in (30.0, 80.0, 150.0))

@@ -10,8 +10,8 @@ from tests.builders.commands import ran, refused
 import chladni
 from chladni.case.schema import SCHEMA
 from chladni.io.package_files import mesh_path
-from chladni.report.bench_folder import RENEWED
 from chladni.workflows.question_of_case import prepared
+from chladni_bench.bench_folder import RENEWED
 
 QUICK = ("--resolution", "1", "--averages", "2", "--exact")
 

@@ -9,16 +9,16 @@ from numpy.testing import assert_allclose
 from tests.builders.commands import ran, refused
 
 import chladni
-from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.article_scatter import fitted
-from chladni.bench.bench_recording import BenchTest, record
-from chladni.bench.bench_rig import BenchSetup, bench_rig
-from chladni.bench.front_end import FrontEnd
-from chladni.bench.shaker import Shaker
 from chladni.errors import FileError, ModelError
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
-from chladni.workflows.benched_article import benched, true_places
+from chladni_bench.accelerometers import AccelerometerType
+from chladni_bench.article_scatter import fitted
+from chladni_bench.bench_recording import BenchTest, record
+from chladni_bench.bench_rig import BenchSetup, bench_rig
+from chladni_bench.benched_article import benched, true_places
+from chladni_bench.front_end import FrontEnd
+from chladni_bench.shaker import Shaker
 from chladni_specimens.plates import plate
 
 PLACES = [(0.09, 0.05), (0.12, 0.2), (0.24, 0.0), (0.3, 0.05), (0.3, 0.175)]
@@ -105,9 +105,9 @@ def test_what_a_table_has_not(case, article):
             bench_rig(article, setup()), BenchTest("hammer", BAND, 1.0), np.random.default_rng(1)
         )
     for words in ({"excitation": "hammer"}, {"local": ("clearance",)}, {"keep_time": True}):
-        asked = chladni.workflows.virtual_test.BenchSettings(**words)
+        asked = chladni.BenchSettings(**words)
         with pytest.raises(FileError, match="shaker table, which has no --"):
-            chladni.workflows.virtual_test.virtual_test(case, asked)
+            chladni.virtual_test(case, asked)
 
 
 def test_the_command_leaves_a_case_that_identifies(case, tmp_path):

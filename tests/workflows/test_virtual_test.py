@@ -13,7 +13,7 @@ from chladni.effects import registry
 from chladni.ema.frf_estimate import estimate
 from chladni.errors import FileError, LabelError, ModelError
 from chladni.io.package_files import mesh_path
-from chladni.workflows.virtual_test import BenchSettings, virtual_test
+from chladni_bench.bench_workflow import BenchSettings, virtual_test
 
 QUICK = BenchSettings(band=(15.0, 120.0), resolution=0.5, averages=4, sweeps=2)
 

@@ -19,9 +19,11 @@ import typer
 from typer.core import TyperGroup
 
 from ..errors import AccuracyError, ChladniError, FileError
+from ..extensions import installed
 from .console import console, opened_console, say
 
-COMMANDS = (  # each a module here with a function ``run``, or ``STEPS`` of a command with several
+GROUP = "chladni.commands"
+BUILT_IN = (  # each a module here with a function ``run``, or ``STEPS`` of a command with several
     "diagnose",
     "init",
     "check",
@@ -29,16 +31,11 @@ COMMANDS = (  # each a module here with a function ``run``, or ``STEPS`` of a co
     "calibrate",
     "correlate",
     "test",
-    "bench",
     "identify",
     "modes",
     "frf",
     "map",
     "render",
-    "plan",
-    "study",
-    "specimen",
-    "blind",
     "report",
 )
 DONE, FAILED, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -105,13 +102,44 @@ def application() -> typer.Typer:
         pretty_exceptions_enable=False,
     )
     app.callback()(_version)
-    for name in COMMANDS:
-        module = import_module(f".{name}", __package__)
+    for name, module in commands().items():
         if hasattr(module, "STEPS"):
             app.add_typer(_stepped(module), name=name, short_help=module.HELP)
         else:
             app.command(name, short_help=_first_sentence(module.run))(guarded(module.run))
     return app
+
+
+def commands() -> dict[str, ModuleType]:
+    """All commands by name: those of this package, then those of installed packages.
+
+    A package adds a command by an entry point, without any change of chladni::
+
+        [project.entry-points."chladni.commands"]
+        fatigue = "my_package.fatigue_command"
+
+    Raises
+    ------
+    ExtensionError
+        If an installed package offers a command that cannot be used.
+    """
+    own = {name: import_module(f".{name}", __package__) for name in BUILT_IN}
+    return own | installed(
+        GROUP,
+        "command",
+        "a module with a function run, or with STEPS and HELP",
+        lambda module: callable(getattr(module, "run", None)) or hasattr(module, "STEPS"),
+        own,
+    )
+
+
+def main() -> None:
+    """Run the command line; a package whose command cannot be used is one sentence."""
+    try:
+        run = application()
+    except ChladniError as error:
+        raise SystemExit(_said(error, AT_FAULT)) from None
+    run()
 
 
 def _stepped(module: ModuleType) -> typer.Typer:

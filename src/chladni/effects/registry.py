@@ -8,9 +8,9 @@ A package adds a family by an entry point, without any change of chladni::
 
 from collections.abc import Sequence
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 
 from ..errors import ExtensionError, LabelError
+from ..extensions import installed
 from . import (
     adhesive_stiffness,
     compliant_support,
@@ -115,33 +115,12 @@ def unregister(name: str) -> None:
 @cache
 def _installed() -> tuple[Family, ...]:
     """Families of the installed packages, in the order of their names."""
-    out: dict[str, Family] = {}
-    for entry in sorted(entry_points(group=GROUP), key=lambda e: (e.name, e.value)):
-        found = _loaded(entry)
-        if found.name in out or any(found.name == own.name for own in BUILT_IN):
-            raise ExtensionError(
-                f"{_whose(entry)} offers the effect {found.name!r}, but another effect has this "
-                "name; rename or uninstall one of them"
-            )
-        out[found.name] = found
-    return tuple(out.values())
-
-
-def _loaded(entry: EntryPoint) -> Family:
-    try:
-        found = entry.load()
-    except Exception as error:
-        raise ExtensionError(
-            f"{_whose(entry)} offers the effect {entry.name!r}, but {entry.value} cannot be loaded "
-            f"({type(error).__name__}: {' '.join(str(error).split())}); repair or uninstall it"
-        ) from error
-    if not isinstance(found, Family):
-        raise ExtensionError(
-            f"{_whose(entry)} offers the effect {entry.name!r}, but {entry.value} is a "
-            f"{type(found).__name__}, not a chladni.effects.family.Family; repair or uninstall it"
-        )
-    return found
-
-
-def _whose(entry: EntryPoint) -> str:
-    return f"the package {entry.dist.name}" if entry.dist is not None else "a package"
+    found = installed(
+        GROUP,
+        "effect",
+        "a chladni.effects.family.Family",
+        lambda offered: isinstance(offered, Family),
+        {own.name for own in BUILT_IN},
+        lambda _, family: family.name,
+    )
+    return tuple(found.values())

@@ -5,9 +5,6 @@ from typing import Any
 
 from ..ema.level_table import level_tables
 from ..ema.shapes import shape_spread, shapes
-from ..planning import Plan, summary
-from ..studies.parameter_study import ParameterStudy
-from ..updating.detectable import Detectable
 from ..workflows.case_check import CaseCheck
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
@@ -16,37 +13,27 @@ from ..workflows.identify import Identification, RecordingModes
 from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
-from ..workflows.virtual_test import BenchResult
-from .bench_page import bench_json
 from .check_page import check_json
-from .detectable_page import detectable_json
 from .diagnosis_json import diagnosis_json
 from .level_blocks import level_json
 from .map_page import map_json
 from .other_modes_page import other_modes_json
-from .plan_json import plan_json
 from .screening_blocks import screening_json
-from .study_page import study_json
 
 
 @singledispatch
 def to_json(result: Any) -> dict[str, Any]:
-    """Convert a result of :mod:`chladni.workflows` to the JSON that its command writes."""
+    """Convert a result of a workflow to the JSON that its command writes.
+
+    Another package registers the function of its own results: ``to_json.register``.
+    """
     raise TypeError(f"{type(result).__name__} is no result of a workflow")
 
 
 to_json.register(DiagnosisResult, diagnosis_json)
 to_json.register(OtherModes, other_modes_json)
-to_json.register(Detectable, detectable_json)
 to_json.register(MappedDeck, map_json)
-to_json.register(ParameterStudy, study_json)
 to_json.register(CaseCheck, check_json)
-to_json.register(BenchResult, bench_json)
-
-
-@to_json.register
-def _(result: Plan) -> dict[str, Any]:
-    return plan_json(summary(result))
 
 
 @to_json.register

@@ -8,9 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from ..output import write_json
-from ..planning import Plan
 from ..results import View, show_by
-from ..studies.parameter_study import ParameterStudy
 from ..workflows.case_check import CaseCheck
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
@@ -20,17 +18,18 @@ from ..workflows.identify import Identification
 from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
-from ..workflows.virtual_test import BenchResult
 from .blocks import Items, Live, PageParts, Picture, Section
 
 
 @dataclass(frozen=True)
-class _Paged:
+class Paged:
     """A result whose command writes one page of sections.
+
+    ``show_by(kind, Paged(...).view)`` shows results of a type of another package.
 
     Attributes
     ----------
-    module : of this room, with ``in_words`` and a function that draws the page
+    module : with ``in_words`` and a function that draws the page; ``.name``: one of this room
     page : (module, folder, result) -> PageParts
     json : name of the file with the result as plain data; "": none
     files : writes more files into the folder and returns (name, what it is) of each
@@ -47,7 +46,7 @@ class _Paged:
         """The view of such results."""
         from importlib import import_module
 
-        module = import_module(f".{self.module}", __package__)
+        module = import_module(self.module, __package__)
         words: Callable[[Any], PageParts] = module.in_words
         return View(
             self.command,
@@ -163,19 +162,6 @@ def _responses(module: ModuleType, folder: Path, found: FrequencyResponses) -> P
     )
 
 
-def _bench(found: BenchResult, folder: Path) -> Sequence[tuple[str, str]]:
-    from .bench_folder import write_bench
-
-    return write_bench(folder, found.origin, found)
-
-
-def _tables(found: ParameterStudy, folder: Path) -> Sequence[tuple[str, str]]:
-    from ..studies.study_tables import write_csv
-
-    write_csv(folder / "samples.csv", found)
-    return [("samples.csv", "one line per sample")]
-
-
 def _arrays(found: FrequencyResponses, folder: Path) -> Sequence[tuple[str, str]]:
     from ..io.tables.write_tables import write_csv, write_npz
 
@@ -188,56 +174,44 @@ def _arrays(found: FrequencyResponses, folder: Path) -> Sequence[tuple[str, str]
     return files
 
 
-_PAGES: Mapping[type, _Paged] = {
-    NormalModes: _Paged(
-        "modes", "modes_page", lambda m, at, x: m.modes_page(at, x.origin, x), "modes.json"
+_PAGES: Mapping[type, Paged] = {
+    NormalModes: Paged(
+        "modes", ".modes_page", lambda m, at, x: m.modes_page(at, x.origin, x), "modes.json"
     ),
-    Correlation: _Paged(
+    Correlation: Paged(
         "correlate",
-        "correlation_page",
+        ".correlation_page",
         lambda m, at, x: m.correlation_page(at, x.origin, x),
         "correlation.json",
     ),
-    OtherModes: _Paged(
+    OtherModes: Paged(
         "correlate",
-        "other_modes_page",
+        ".other_modes_page",
         lambda m, at, x: m.other_modes_page(at, x.origin, x),
         "correlation.json",
     ),
-    Identification: _Paged(
+    Identification: Paged(
         "identify",
-        "identification_page",
+        ".identification_page",
         lambda m, at, x: m.identification_page(at, x),
         "identified.json",
         needs_origin=False,
     ),
-    Evaluation: _Paged(
+    Evaluation: Paged(
         "test",
-        "evaluation_page",
+        ".evaluation_page",
         lambda m, at, x: m.evaluation_page(at, x),
         "test.json",
         needs_origin=False,
     ),
-    Plan: _Paged("plan", "plan_page", lambda m, at, x: m.plan_page(at, x.origin, x), "plan.json"),
-    MappedDeck: _Paged(
-        "map", "map_page", lambda m, at, x: m.map_page(at, x), "mapping.json", _mapped
+    MappedDeck: Paged(
+        "map", ".map_page", lambda m, at, x: m.map_page(at, x), "mapping.json", _mapped
     ),
-    CaseCheck: _Paged(
-        "check", "check_page", lambda m, at, x: m.check_page(at, x.origin, x), "check.json"
+    CaseCheck: Paged(
+        "check", ".check_page", lambda m, at, x: m.check_page(at, x.origin, x), "check.json"
     ),
-    BenchResult: _Paged(
-        "bench", "bench_page", lambda m, at, x: m.bench_page(at, x), "bench.json", _bench
-    ),
-    ParameterStudy: _Paged(
-        "study",
-        "study_page",
-        lambda m, at, x: m.study_page(at, x),
-        "study.json",
-        _tables,
-        needs_origin=False,
-    ),
-    FrequencyResponses: _Paged(
-        "frf", "response_page", _responses, files=_arrays, needs_origin=False
+    FrequencyResponses: Paged(
+        "frf", ".response_page", _responses, files=_arrays, needs_origin=False
     ),
 }
 

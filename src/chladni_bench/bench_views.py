@@ -1,0 +1,20 @@
+"""How virtual tests are shown, saved and written as JSON; importing this module registers it."""
+
+from chladni.report.result_json import to_json
+from chladni.report.result_views import Paged
+from chladni.results import show_by
+
+from .bench_folder import write_bench
+from .bench_page import bench_json
+from .bench_workflow import BenchResult
+
+_PAGED = Paged(
+    "bench",
+    f"{__package__}.bench_page",
+    lambda m, at, found: m.bench_page(at, found),
+    "bench.json",
+    lambda found, at: write_bench(at, found.origin, found),
+)
+
+show_by(BenchResult, _PAGED.view)
+to_json.register(BenchResult, bench_json)

@@ -1,0 +1,117 @@
+"""``chladni plan``: where to put sensors and shakers, and which lines to measure."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chladni.cli.run import Allow, DeckOrCase, Out, Units, started
+from chladni.errors import FileError
+from chladni.progress import within
+from chladni.report.result_json import to_json
+from chladni.workflows.loaded_model import Model, is_case, load_deck, load_model
+from chladni.workflows.unit_guess import guessed_units
+
+from . import PlanSettings
+from .plan_summary import durations
+from .plan_workflow import plan
+from .smallest_findings import smallest_findings
+
+
+def run(
+    source: DeckOrCase,
+    sensors: Annotated[int, typer.Option(help="Number of sensors.", min=1)] = 30,
+    modes: Annotated[
+        int | None,
+        typer.Option(help="Number of elastic modes to distinguish; default: by --top.", min=1),
+    ] = None,
+    top: Annotated[
+        float | None, typer.Option(help="Highest frequency of interest [Hz].", min=0.0)
+    ] = None,
+    shakers: Annotated[int, typer.Option(help="Number of simultaneous shakers.", min=1)] = 1,
+    candidates: Annotated[int, typer.Option(help="Number of candidate places.", min=2)] = 300,
+    spacing: Annotated[
+        float, typer.Option(help="Minimum distance between sensors [m].", min=0.0)
+    ] = 0.0,
+    damping: Annotated[float, typer.Option(help="Expected damping ratio.", min=1e-6)] = 0.01,
+    force: Annotated[
+        float, typer.Option(help="Shaker force without rattling [N].", min=1e-9)
+    ] = 5.0,
+    alike: Annotated[
+        float, typer.Option(help="Largest similarity of two modes (AutoMAC).", min=0.0, max=1.0)
+    ] = 0.15,
+    mass: Annotated[float, typer.Option(help="Mass of one sensor [kg].", min=0.0)] = 0.005,
+    drawn: Annotated[
+        int,
+        typer.Option(
+            "--drawn",
+            "--ensemble",
+            help="Number of models with random thickness that the layout must serve.",
+            min=0,
+            max=1000,
+        ),
+    ] = 20,
+    detect: Annotated[
+        bool,
+        typer.Option(
+            "--detect",
+            help="Predict the smallest mass, softening and thinning that the layout finds.",
+        ),
+    ] = False,
+    noise: Annotated[
+        float, typer.Option(help="Expected noise relative to |H|, for --detect.", min=1e-5, max=0.5)
+    ] = 0.01,
+    units: Units = None,
+    allow: Allow = None,
+    out: Out = None,
+) -> None:
+    """Plan a test: sensors by effective independence and exchange, shaker, cords, duration."""
+    settings = PlanSettings(
+        sensors=sensors,
+        modes=modes,
+        f_max=top,
+        damping=damping,
+        candidates=candidates,
+        spacing=spacing,
+        actuators=shakers,
+        force=force,
+        alike=alike,
+        mass=mass,
+        draws=drawn,
+    )
+    from .detectable_page import detectable_section
+    from .plan_page import plan_page
+
+    with started("plan", source, out) as job:
+        job.progress("reading the model", 0.0)
+        model, said = _model(source, units, allow or ())
+        job.note(model.notes)
+        if said:
+            job.say(said)
+        found = plan(model, settings, progress=within(job.progress, 0.1, 0.6))
+        job.json("plan.json", to_json(found))
+        job.progress("pictures", 0.7)
+        parts = plan_page(job.folder, model, found)
+        if detect:
+            band, stage = durations(found).band_hz, within(job.progress, 0.8, 1.0)
+            smallest = smallest_findings(model, job.folder / "plan.json", band, noise, stage)
+            job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
+            section = detectable_section(job.folder, model, smallest, noise)
+            picture = ("smallest_mass.png", "smallest mass that a diagnosis finds")
+            parts = replace(
+                parts, sections=[*parts.sections, section], files=[*parts.files, picture]
+            )
+        job.show(parts)
+
+
+def _model(source: Path, units: str | None, allow: Sequence[str]) -> tuple[Model, str]:
+    """The model, and what its units were taken for: metres, kilograms and newtons are planned."""
+    if units is not None or not source.is_file() or is_case(source):
+        return load_model(source, units, allow, command="plan"), ""
+    bare = load_deck(source, None, allow)
+    guess = guessed_units(bare.model().assembly, source.name)
+    if not guess.sure:
+        raise FileError(f"{source}: {guess.why}; state it by --units")
+    return replace(bare, units=guess.units).model(), f"units = {guess.units.name}: {guess.why}"

@@ -1,0 +1,386 @@
+"""Test plan of a structure: sensors with direction, shaker, bungee cords, spectral lines.
+
+The method is that of Echaniz Granado (2015), section 4.1.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from chladni.dofs import label
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.modes import ModalModel, rigid_modes
+from chladni.effects.calibration_parameters import thickness_of
+from chladni.ema.correlation import auto_mac
+from chladni.errors import ModelError, ShapeError
+from chladni.fem.assemble import Structure, structure
+from chladni.model.assembly import Assembly
+from chladni.progress import Progress, silent, within
+from chladni.results import Result
+
+from .actuator_ranking import ActuatorRanking, best_actuators, ranked_actuators, shaking
+from .drawn_models import drawn, ensemble
+from .gramians import gramian_quotient, modal_rank, observability_gramian
+from .layouts.deletion import deletion, effective_independence, greedy, qr_ranking
+from .layouts.distinct import distinct
+from .layouts.exchange import exchange
+from .layouts.information import candidates, value
+from .layouts.layout_quality import Move, loaded_frequency, overlap, visibility, with_visible_modes
+from .layouts.layout_rules import Rules, too_near
+from .rattle import Openings, Rattle, first_rattle, openings
+from .sensor_candidates import SensorCandidates, find_sensor_candidates
+
+SPARE = 6  # modes computed beyond the target modes, for the sweep over more modes
+BLIND = 0.25  # of the floor: a mode that no place sees better is no target of the layout
+TANGENT = 0.6  # a direction this far off the normal (cosine) needs a mounting block
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """Settings of a test plan; lengths in metres.
+
+    Attributes
+    ----------
+    sensors : number of uniaxial accelerometers
+    modes : target modes; None: modes below ``f_max``, or 24, or 4/5 of the sensors
+    f_max : highest frequency of interest [Hz]
+    damping : expected damping ratio of every mode
+    candidates : number of candidate places
+    spacing : least distance between two sensors [m]
+    alike : highest AutoMAC of two modes at the sensors; 1: no limit
+    actuators : number of shakers that work together
+    force : amplitude of a shaker at which nothing may rattle [N]
+    floor : least visibility of a mode: largest motion a sensor sees over the largest anywhere
+    mass : of one sensor [kg]
+    draws, spread : number of models drawn, and standard deviation of ln of every part's thickness;
+                    the layout then serves all of them
+    seed : of the draws
+    """
+
+    sensors: int = 30
+    modes: int | None = None
+    f_max: float | None = None
+    damping: float = 0.01
+    candidates: int = 300
+    spacing: float = 0.0
+    alike: float = 0.15
+    actuators: int = 1
+    force: float = 5.0
+    floor: float = 0.2
+    mass: float = 0.005
+    draws: int = 0
+    spread: float = 0.1
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Mount:
+    """A place and a direction in which a sensor may measure: rows of ``phi`` of a :class:`Plan`.
+
+    Attributes
+    ----------
+    ids : (m,) int          grids, or numbers of centres as in :class:`SensorCandidates`
+    place : (m,) int        position among the places
+    points, directions : (m, 3)
+    labels : tuple of str   412:+Z along an axis, else 412:n
+    normal : (m,) bool      glued flat; False: on a block, along the sheet
+    side : (m,)             +1, -1: side of the surface normal
+    """
+
+    ids: np.ndarray
+    place: np.ndarray
+    points: np.ndarray
+    directions: np.ndarray
+    labels: tuple[str, ...]
+    normal: np.ndarray
+    side: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
+    """A test plan; arrays over modes are over the flexible target modes.
+
+    Attributes
+    ----------
+    places : SensorCandidates
+    modal : ModalModel            target modes, damping as in the settings
+    first : int                   number of the first of them in the deck (rigid modes before it)
+    mounts : Mount                every candidate: normals first, then directions on blocks
+    phi : (m, r)                  target shapes at the mounts
+    aimed : (r,) bool             modes visible to a sensor glued flat: the layout is for them
+    layout : (n_sensors,) int     mounts, the most informative first
+    moves : tuple of Move         sensors moved so that a mode is seen
+    visible_before, visible : (r,)  before and after the moves
+    log_det : {method: value}     of the layouts of several methods, before the moves
+    sweep : ((modes, overlap), ...)  share of the layout kept when the sweep takes more modes
+    actuators : ActuatorRanking   over the normals, each alone; vetoed without a free line to the
+                                  place, or where it rattles below the force of the settings
+    rattle : Rattle               at the normals
+    openings : Openings           where sheets may meet
+    together : (k,) int           the shakers that drive all modes most evenly together
+    observable : (rank, states)
+    quotient : float              of the observability gramian (Echaniz Granado 2015, section 4.1.1)
+    auto_mac : (r, r)             at the sensors
+    loaded : (r,)                 frequencies with the sensors' mass on [Hz]
+    hangers : (k,) int            grids, the quietest first
+    quiet : (k,)                  their rms motion over the first modes, of the largest anywhere
+    """
+
+    settings: PlanSettings
+    places: SensorCandidates
+    modal: ModalModel
+    first: int
+    mounts: Mount
+    phi: np.ndarray
+    aimed: np.ndarray
+    layout: np.ndarray
+    moves: tuple[Move, ...]
+    visible_before: np.ndarray
+    visible: np.ndarray
+    log_det: dict[str, float]
+    sweep: tuple[tuple[int, float], ...]
+    actuators: ActuatorRanking
+    rattle: Rattle
+    openings: Openings
+    together: np.ndarray
+    observable: tuple[int, int]
+    quotient: float
+    auto_mac: np.ndarray
+    loaded: np.ndarray
+    hangers: np.ndarray
+    quiet: np.ndarray
+
+
+def plan_test(
+    assembly: Assembly,
+    settings: PlanSettings | None = None,
+    *,
+    built: Structure | None = None,
+    unit: str = "m",
+    progress: Progress = silent,
+) -> Plan:
+    """Plan a test: candidates on the mesh, effective independence, exchange, shaker and cords.
+
+    Parameters
+    ----------
+    built : the assembled structure, if it exists already
+    unit : "" where the deck's unit of length is not known
+    """
+    settings = settings or PlanSettings()
+    if not any(map(thickness_of, assembly.parts)):
+        settings = replace(settings, draws=0)  # nothing to draw
+    progress("places for sensors", 0.05)
+    places = find_sensor_candidates(assembly, settings.candidates, unit=unit)
+    settings = replace(settings, sensors=min(settings.sensors, len(places)))
+    progress("modes", 0.2)
+    built = built or structure(assembly)
+    modal, above, first = target_modes(built, settings)
+    mounts = mounts_at(places)
+    moving = motion(built, above)
+    phi = seen_at(places, mounts, moving)
+    progress("sensors", 0.6)
+    r, normal = len(modal), mounts.normal
+    largest = np.linalg.norm(moving, axis=1).max(axis=0)
+    visible = visibility(phi[normal], largest) >= BLIND * settings.floor
+    aimed, largest = visible[:r], largest[:r]
+    flat = phi[normal, :r][:, aimed]
+    draws = flat
+    if settings.draws:
+        stage = within(progress, 0.6, 0.75)
+        models = ensemble(built, float(modal.frequency[-1]), settings.spread, stage)
+        basis = seen_at(places, mounts, recovered(built, models.basis))[normal]
+        _, draws = drawn(models, basis, r, settings.draws, settings.spread, settings.seed)
+        draws = draws[:, :, aimed]
+    ranked, log_det = _layout(draws, mounts, settings)
+    layout, moves = with_visible_modes(
+        phi[:, :r], ranked, largest, floor=settings.floor, rules=_near(mounts, settings)
+    )
+    progress("shaker and cords", 0.8)
+    f, zeta, seen = modal.frequency, modal.damping, phi[layout, :r]
+    shaker = shaking(f[aimed], zeta[aimed], seen[:, aimed], flat)
+    observed = observability_gramian(f, zeta, seen)
+    gaps = openings(assembly, moving[:, :, :r])
+    rattle = first_rattle(f, zeta, phi[normal, :r], gaps)
+    ranking = ranked_actuators(
+        shaker, f[aimed], flat, margin=rattle.force / settings.force, access=places.straight
+    )
+    enough = ranking.allowed.sum() >= settings.actuators
+    together = best_actuators(shaker, settings.actuators, ranking.allowed if enough else None)
+    if not np.isfinite(shaker.condition(together)):
+        together = np.sort(ranking.order[: settings.actuators])
+    hangers, quiet = hang_points(moving[:, :, :r], places)
+    three = places.moving(moving, mounts.place[layout])[..., :r]
+    return Plan(
+        settings,
+        places,
+        modal,
+        first,
+        mounts,
+        phi[:, :r],
+        aimed,
+        layout,
+        moves,
+        visibility(phi[ranked, :r], largest),
+        visibility(seen, largest),
+        log_det,
+        mode_sweep(phi[normal][:, visible], settings.sensors, int(aimed.sum())),
+        ranking,
+        rattle,
+        gaps,
+        together,
+        (modal_rank(f, seen), 2 * r),
+        gramian_quotient(observed, f),
+        auto_mac(seen),
+        loaded_frequency(f, three, settings.mass),
+        hangers,
+        quiet,
+    )
+
+
+def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, ModalModel, int]:
+    """Target modes, target modes plus some above, and the number of rigid modes before them."""
+    due = settings.modes or min(24, 4 * settings.sensors // 5)
+    n = len(built.system.dofs)
+    where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
+    modal = normal_modes(built.system, min(n, due + SPARE + 6), points=where)
+    rigid = int(rigid_modes(modal).sum())
+    above = modal.sel(slice(rigid, None)).with_damping(settings.damping)
+    below = np.flatnonzero(
+        above.frequency <= (np.inf if settings.f_max is None else settings.f_max)
+    )
+    if not len(below):
+        raise ModelError(
+            f"no flexible mode below {settings.f_max:g} Hz; the first is at "
+            f"{above.frequency[0]:.4g} Hz"
+        )
+    return above.sel(slice(0, min(due, len(below)))), above, rigid
+
+
+def motion(built: Structure, modal: ModalModel) -> np.ndarray:
+    """Translation of every point (n_points, 3, r)."""
+    return recovered(built, modal.shapes)
+
+
+def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
+    """Translation of every point (n_points, 3, k) in vectors over the free dofs (n_free, k)."""
+    u = built.T @ vectors
+    return u.reshape(len(built.assembly.points), 6, -1)[:, :3]
+
+
+def seen_at(places: SensorCandidates, mounts: Mount, moving: np.ndarray) -> np.ndarray:
+    """Motion along the mounts' directions (m, r), from that of all points (n_points, 3, r)."""
+    at = places.moving(moving, mounts.place)
+    return np.einsum("mir,mi->mr", at, mounts.directions)
+
+
+def mounts_at(places: SensorCandidates) -> Mount:
+    """Normals of all places, then the two axes of the basic frame most along each sheet."""
+    place, directions = [np.arange(len(places))], [places.normals]
+    across = np.argsort(np.abs(places.normals), axis=1)[:, :2]
+    for k in range(2):
+        axes = np.eye(3)[across[:, k]]
+        good = np.abs(np.einsum("ij,ij->i", axes, places.normals)) < TANGENT
+        place.append(np.flatnonzero(good))
+        directions.append(axes[good])
+    at, along = np.concatenate(place), np.concatenate(directions)
+    labels = _labels(places.ids[at], along)
+    once = np.sort(np.unique(labels, return_index=True)[1])  # beams already have both directions
+    at, along, labels = at[once], along[once], [labels[k] for k in once]
+    ids = places.ids[at]
+    return Mount(
+        ids,
+        at,
+        places.points[at],
+        along,
+        tuple(labels),
+        np.arange(len(at)) < len(places),
+        places.side[at],
+    )
+
+
+def _labels(ids: np.ndarray, directions: np.ndarray) -> list[str]:
+    """412:+Z where the direction is an axis, else 412:n."""
+    axis = np.abs(directions).argmax(axis=1)
+    value = directions[np.arange(len(ids)), axis]
+    return [
+        label(int(i), int(a) + 1, 1 if v > 0 else -1) if abs(v) > 1 - 1e-6 else f"{i}:n"
+        for i, a, v in zip(ids, axis, value, strict=True)
+    ]
+
+
+def _near(mounts: Mount, settings: PlanSettings) -> Rules:
+    """Rules that sensors keep their distance and a grid has one sensor at most."""
+    near = too_near(mounts.points, max(settings.spacing, 1e-9))
+    return Rules(near=near)
+
+
+def _layout(
+    phi: np.ndarray, mounts: Mount, settings: PlanSettings
+) -> tuple[np.ndarray, dict[str, float]]:
+    """The layout, ranked, and log det of the layouts of several methods."""
+    c = candidates(phi)
+    rules = Rules(near=too_near(mounts.points[mounts.normal], settings.spacing))
+    rules = rules if settings.spacing > 0 else Rules()
+    efi = deletion(c, settings.sensors, rules=rules).ranked
+    best = kept = exchange(c, efi, rules=rules)
+    layouts = {
+        "greedy": greedy(c, settings.sensors, rules=rules),
+        "effective independence": efi,
+        "with exchange": kept,
+    }
+    if settings.alike < 1:
+        layouts["with modes distinguished"] = best = distinct(
+            c, kept, ceiling=settings.alike, rules=rules
+        )
+    if settings.spacing == 0 and c.rows.shape[0] == 1:
+        layouts = {"pivoted QR": qr_ranking(c.rows[0])[: settings.sensors], **layouts}
+    ranked = deletion(c, settings.sensors, rules=_only(best, len(c))).ranked
+    return ranked, {name: value("D", c.fisher(k)) for name, k in layouts.items()}
+
+
+def _only(kept: np.ndarray, n: int) -> Rules:
+    """Rules that forbid all candidates except the kept ones."""
+    forbidden = np.ones(n, bool)
+    forbidden[kept] = False
+    return Rules(forbidden=forbidden)
+
+
+def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int, float], ...]:
+    """Share of the layout that stays when more modes are targeted.
+
+    Echaniz Granado (2015), section 4.1 and figure 8.
+
+    Each entry is (modes, overlap of its layout with that of the entry before). The list ends where
+    the places cannot distinguish more modes.
+    """
+    most = min(n_sensors, phi.shape[1])
+    counts = sorted({*np.linspace(max(2, target // 3), most, 7).astype(int).tolist(), target})
+    layouts = {}
+    for count in counts:
+        try:
+            layouts[count] = effective_independence(phi[:, :count], n_sensors)
+        except ShapeError:
+            break
+    pairs = pairwise(layouts)
+    return tuple((b, overlap(layouts[b], layouts[a])) for a, b in pairs)
+
+
+def hang_points(
+    moving: np.ndarray, places: SensorCandidates, count: int = 4, first: int = 5
+) -> tuple[np.ndarray, np.ndarray]:
+    """Grids that move least in the first modes, well apart: cords add least near nodes.
+
+    Returns the grids and their rms motion, where each mode is scaled to its largest motion;
+    ``moving`` is the motion of all points (n_points, 3, r).
+    """
+    size = np.linalg.norm(moving[:, :, :first], axis=1)
+    quiet = np.sqrt(((places.moving(size) / size.max(axis=0)) ** 2).mean(axis=1))
+    quiet[~places.is_grid] = np.inf  # a case names hangers by grid
+    reach = 0.3 * float(np.linalg.norm(np.ptp(places.points, axis=0)))
+    chosen: list[int] = []
+    for k in np.argsort(quiet, kind="stable"):
+        away = np.linalg.norm(places.points[chosen] - places.points[k], axis=1)
+        if len(chosen) < count and np.all(away >= reach) and np.isfinite(quiet[k]):
+            chosen.append(int(k))
+    return places.ids[chosen], quiet[chosen]

@@ -1,0 +1,214 @@
+"""A parameter study as a page: influences, parallel coordinates, results over parameters."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chladni.output import plain
+from chladni.report.blocks import Block, Code, Facts, Items, PageParts, Picture, Section, Table
+from chladni.report.words import number, quantity, unit_text
+
+from .parameter_study import ParameterStudy
+from .sensitivity import Sensitivity
+
+_SHOWN = 4  # results drawn over the parameters
+_AXES = 5  # parameters drawn
+_LAW = 0.8  # share of the variance a power law explains where its slopes are drawn
+_LONGEST = 36  # letters of a name on an axis
+_LISTED = 12  # failed samples on the page; all are in the table
+READ = (
+    'pandas.read_csv("samples.csv")',
+    'pandas.read_json("samples.jsonl", lines=True)   # while it runs',
+    'xarray.open_dataset("study.nc")',
+)
+
+
+def study_json(found: ParameterStudy) -> dict[str, Any]:
+    """``study.json``: ranges, provenance, sensitivities, what failed."""
+    return {
+        **found.provenance,
+        "taken": len(found.rows),
+        "finished_before": found.kept,
+        "failed": [{"sample": k, "why": why} for k, why in found.failed],
+        "nominal": found.nominal,
+        "range": {c: _range(found.column(c)) for c in found.columns},
+        "sensitivities": {s.result: _measures(s, found.names) for s in found.sensitivities},
+        "notes": [*found.notes, *_notes(found)],
+    }
+
+
+def _measures(s: Sensitivity, names: list[str]) -> dict[str, Any]:
+    by_name = {
+        key: dict(zip(names, getattr(s, key).tolist(), strict=True))
+        for key in ("log_slope", "standardised", "first", "first_interval", "total",
+                    "total_interval", "mu_star", "sigma")
+        if np.isfinite(getattr(s, key)).any()
+    }  # fmt: skip
+    return {"samples": s.used, "r2": s.r2, **by_name}
+
+
+def _range(y: np.ndarray) -> dict[str, float] | None:
+    y = y[np.isfinite(y)]
+    if not len(y):
+        return None
+    return {"low": y.min(), "mean": y.mean(), "high": y.max(), "sd": y.std()}
+
+
+def study_page(folder: Path, found: ParameterStudy) -> PageParts:
+    """Sections of the page; its pictures are written into the folder."""
+    said = in_words(found)
+    files: list[tuple[str, str]] = []
+    sections = list(said.sections)
+    if len(found.rows) > len(found.failed):
+        sections += [
+            Section("Sensitivities", _sensitivities(folder, found, files)),
+            Section("Results over parameters", _pictures(folder, found, files)),
+        ]
+    if found.failed:
+        why_not = [f"sample {k}: {why}" for k, why in found.failed[:_LISTED]]
+        sections.append(Section(f"{len(found.failed)} samples failed", [Items(why_not)]))
+    sections.append(Section("Read it", [Code(READ)]))
+    return PageParts(said.lead, sections, said.notes, files)
+
+
+def in_words(found: ParameterStudy) -> PageParts:
+    """The page without its pictures."""
+    done = len(found.rows) - len(found.failed)
+    lead = f"{done} of {len(found.rows)} samples of {', '.join(found.names)} were solved"
+    first = found.column("f1_hz")
+    if np.isfinite(first).any():
+        span = number(np.nanmin(first)), number(np.nanmax(first))
+        lead += f"; the first elastic mode lies between {span[0]} and {span[1]} Hz"
+    sections = [Section("Varied parameters", [_ranges(found)])]
+    return PageParts(f"{lead}.", sections, [*found.notes, *_notes(found)])
+
+
+def _notes(found: ParameterStudy) -> list[str]:
+    out = []
+    if found.kept:
+        out.append(f"{found.kept} samples were finished by an earlier run and were not repeated.")
+    lost = [c.replace("f", "mode ").replace("_hz", "") for c in found.columns
+            if c.startswith("f") and c.endswith("_hz")
+            and np.isnan(found.column(c)).sum() > len(found.failed)]  # fmt: skip
+    if lost:
+        out.append(
+            f"{', '.join(lost)}: in some samples no mode matches that of the deck (MAC below 0.5, "
+            "or beyond the solved modes); its frequency is left out there."
+        )
+    return out
+
+
+def _ranges(found: ParameterStudy) -> Block:
+    rows = [
+        (v.name, *(quantity(value, v.unit) for value in (v.nominal, v.low, v.high)),
+         "logarithmic" if v.log else "even")
+        for v in found.varied
+    ]  # fmt: skip
+    s = found.settings
+    caption = (
+        f"{len(found.rows)} samples, {s.sampler}, seed {s.seed}. Mode 1 is the first elastic one; "
+        "`chladni modes` counts rigid motions too."
+    )
+    heads = ("parameter", "deck", "from", "to", "steps")
+    return Table(heads, rows, words=("parameter", "steps"), caption=caption)
+
+
+def _sensitivities(
+    folder: Path, found: ParameterStudy, files: list[tuple[str, str]]
+) -> list[Block]:
+    from . import study_plots
+
+    lawful = [s for s in found.sensitivities if np.isfinite(s.log_slope).any() and s.r2 >= _LAW]
+    blocks: list[Block] = []
+    if lawful:
+        path = folder / "slopes.png"
+        values = np.stack([s.log_slope for s in lawful])
+        study_plots.slope_map(
+            path,
+            values,
+            [label(s.result) for s in lawful],
+            [_drawable(name) for name in found.names],
+            "d ln result / d ln parameter",
+        )
+        files.append((path.name, "logarithmic slopes"))
+        blocks.append(
+            Picture(path, "1: a parameter one per cent higher gives a result one per cent higher.")
+        )
+    for measure, title in (("total", "Total Sobol' index"), ("mu_star", "mean |effect|")):
+        rows = [_row(s, measure) for s in found.sensitivities]
+        if kept := [r for r in rows if any(cell != "–" for cell in r[1:])]:
+            caption = f"{title}; ± is half the 95 % interval." if measure == "total" else title
+            blocks.append(Table(("result", *found.names), kept, words=("result",), caption=caption))
+    facts = [
+        (label(s.result), f"R² {number(s.r2, 3)} of a power law, {s.used} samples")
+        for s in found.sensitivities
+        if np.isfinite(s.r2) and s.r2 < 0.95
+    ]
+    return [*blocks, Facts(facts)] if facts else blocks
+
+
+def _row(s: Sensitivity, measure: str) -> tuple[str, ...]:
+    values = getattr(s, measure)
+    if measure != "total":
+        return (label(s.result), *(number(v, 3) for v in values))
+    spread = (
+        f"{number(v, 2)} ± {number(w, 1)}" if np.isfinite(v) else "–"
+        for v, w in zip(values, s.total_interval, strict=True)
+    )  # fmt: skip
+    return (label(s.result), *spread)
+
+
+def label(column: str) -> str:
+    """A column in words.
+
+    >>> label("f3_hz"), label("mass_kg"), label("Q")
+    ('mode 3 [Hz]', 'mass [kg]', 'Q')
+    """
+    if column.endswith("_hz") and column[1:-3].isdigit():
+        return f"mode {column[1:-3]} [Hz]"
+    return "mass [kg]" if column == "mass_kg" else column
+
+
+def _pictures(folder: Path, found: ParameterStudy, files: list[tuple[str, str]]) -> list[Block]:
+    from . import study_plots
+
+    parameters = {_with_unit(v.name, v.unit): found.column(v.name) for v in found.varied[:_AXES]}
+    labels = {v.name: _with_unit(v.name, v.unit) for v in found.varied}
+    results = {label(c): found.column(c) for c in _drawn(found)}
+    labels |= {c: label(c) for c in found.columns}
+    results = {c: y for c, y in results.items() if np.isfinite(y).any()}
+    if not results:
+        return []
+    decades = [_with_unit(v.name, v.unit) for v in found.varied if v.log]
+    whole, colour = {**parameters, **results}, next(iter(results))
+    nominal = {labels.get(k, k): v for k, v in plain(found.nominal).items()
+               if isinstance(v, float)}  # fmt: skip
+    blocks: list[Block] = []
+    if np.isfinite(np.stack(list(whole.values()))).all(axis=0).sum() > 1:
+        path = study_plots.parallel_coordinates(folder / "parallel.png", whole, colour, decades)
+        files.append((path.name, "parallel coordinates"))
+        blocks.append(Picture(path, f"Each line is a sample; colour: {colour}."))
+    path = study_plots.response_plots(
+        folder / "responses.png", results, parameters, nominal, decades
+    )
+    files.append((path.name, "results over parameters"))
+    blocks.append(Picture(path, "Dots: samples; dashed: the deck's own values."))
+    return blocks
+
+
+def _with_unit(name: str, unit: str) -> str:
+    """Label of an axis."""
+    return f"{_drawable(name)} [{unit_text(unit)}]" if unit_text(unit) else _drawable(name)
+
+
+def _drawable(name: str) -> str:
+    """Shorten a user's name for a label, and prevent its reading as a formula."""
+    shown = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 12]}…{name[-11:]}"
+    return shown.replace("$", r"\$")
+
+
+def _drawn(found: ParameterStudy) -> list[str]:
+    """Q first, then the lowest modes."""
+    modes = [c for c in found.columns if c.startswith("f") and c.endswith("_hz")]
+    return (["Q"] if "Q" in found.columns else []) + modes[: _SHOWN - ("Q" in found.columns)]

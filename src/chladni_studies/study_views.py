@@ -1,0 +1,30 @@
+"""How studies are shown, saved and written as JSON; importing this module registers it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from chladni.report.result_json import to_json
+from chladni.report.result_views import Paged
+from chladni.results import show_by
+
+from .parameter_study import ParameterStudy
+from .study_page import study_json
+from .study_tables import write_csv
+
+
+def _tables(found: ParameterStudy, folder: Path) -> Sequence[tuple[str, str]]:
+    write_csv(folder / "samples.csv", found)
+    return [("samples.csv", "one line per sample")]
+
+
+_PAGED = Paged(
+    "study",
+    f"{__package__}.study_page",
+    lambda m, at, found: m.study_page(at, found),
+    "study.json",
+    _tables,
+    needs_origin=False,
+)
+
+show_by(ParameterStudy, _PAGED.view)
+to_json.register(ParameterStudy, study_json)
