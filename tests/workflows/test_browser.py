@@ -12,8 +12,9 @@ from urllib.error import URLError
 from urllib.request import Request, urlopen
 
 import pytest
-from tests.builders.commands import ran
+from typer.testing import CliRunner
 
+from chladni.cli.app import application
 from chladni.report.diagnosis_folder import shown, write_diagnosis
 from chladni.report.live_diagnosis import drawings
 from chladni.report.page import write_page
@@ -337,7 +338,8 @@ def test_every_command_draws_its_page(window, folder, tmp_path, command, names):
     """With the same layout; at both widths, without a word on the console."""
     name, *options = command
     out = tmp_path / "out"
-    ran(name, folder, *options, "--out", out)
+    done = CliRunner().invoke(application(), [name, str(folder), *options, "--out", str(out)])
+    assert done.exit_code == 0, done.output
     for width in (1280, 390):
         window.size(width, 900)
         window.open(out / "report.html")
