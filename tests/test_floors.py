@@ -8,8 +8,6 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-import pytest
-
 from chladni.cli.app import BUILT_IN
 
 ROOT = Path(__file__).parents[1]
@@ -119,6 +117,11 @@ FRONTS = {name: front(name) for name in PACKAGES}
 COMMANDS = {("chladni", "cli", name) for name in BUILT_IN} | entry_points()["chladni.commands"]
 
 
+def nodes(path):
+    """The syntax tree of a file, node after node."""
+    return ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+
+
 @cache
 def imports(path):
     """(own modules, outside packages) imported anywhere in a file.
@@ -126,7 +129,7 @@ def imports(path):
     Own modules are relative; another package than ``chladni`` is used by its front.
     """
     own, outside = set(), set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and node.level:
             here = package(path)
             base = here[: len(here) - node.level + 1] + tuple(
@@ -152,14 +155,20 @@ def imports(path):
     return own, outside
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: "/".join(module(p)))
-def test_imports_point_down(path):
-    """A command, in whichever package, stands on what commands share as well."""
-    floor, (own, outside) = floor_of(module(path)), imports(path)
-    over = {"cli"} if module(path) in COMMANDS else set()
-    assert {floor_of(m) for m in own} <= MAY_IMPORT[floor] | {floor} | over
-    shared = set().union(*(LIBRARIES[room] for room in over))
-    assert outside <= EVERYWHERE | LIBRARIES.get(floor, set()) | shared
+def test_imports_point_down():
+    """All offenders at once: the module, the floor or library it must not import.
+
+    A command, in whichever package, stands on what commands share as well.
+    """
+    wrong = []
+    for path in SOURCES:
+        floor, (own, outside) = floor_of(module(path)), imports(path)
+        over = {"cli"} if module(path) in COMMANDS else set()
+        shared = set().union(*(LIBRARIES[room] for room in over))
+        above = {floor_of(m) for m in own} - MAY_IMPORT[floor] - {floor} - over
+        foreign = outside - EVERYWHERE - LIBRARIES.get(floor, set()) - shared
+        wrong += [f"{'/'.join(module(path))} imports {name}" for name in above | foreign]
+    assert not wrong, "\n".join(sorted(wrong))
 
 
 def test_no_command_imports_another():
@@ -217,7 +226,7 @@ def test_names_stand_once():
         named = path.stem in ("__init__", "__main__") or module(path)[:2] == ("chladni", "cli")
         if not (called or named):
             files[path.stem].append(path)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             if isinstance(node, ast.ClassDef):
                 classes[node.name].append("/".join(module(path)))
     assert not {name: at for name, at in (classes | files).items() if len(at) > 1}
@@ -231,7 +240,7 @@ def test_files_stay_readable():
 def test_names_are_ascii():
     """Greek belongs in docstrings; in code it is spelled (phi, omega), so anyone can type it."""
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             for field in ("id", "arg", "attr", "name"):
                 name = getattr(node, field, None) or ""
                 assert name.isascii(), f"{path}:{node.lineno}: {name}"
@@ -240,7 +249,7 @@ def test_names_are_ascii():
 def test_no_pickle_is_ever_loaded():
     """np.load reads with pickles refused, and nothing imports pickle to read a file."""
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "np.load":
                 assert "allow_pickle=False" in ast.unparse(node), f"{path}:{node.lineno}"
             if isinstance(node, ast.Call):

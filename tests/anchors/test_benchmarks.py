@@ -5,14 +5,12 @@ the commercial code's figures where the publication gives them. Limits are the e
 behind the target or the digits printed; where they are wide the reason is said.
 """
 
-import json
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.published import benchmarks
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
@@ -20,17 +18,9 @@ from chladni.fem.solve import static
 from chladni.model.assembly import Assembly, Beams, Masses, RigidBody, Solids
 from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
 
-FILE = Path(__file__).resolve().parents[2] / "../shared/anchors/benchmarks.json"
 NAFEMS = Isotropic(200e9, 0.3, 8000.0)
 CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 EVERY = (1, 2, 3, 4, 5, 6)
-
-
-@cache
-def published():
-    if not FILE.exists():
-        pytest.skip(f"no reference values at {FILE}")
-    return {entry["id"]: entry for entry in json.loads(FILE.read_text())["benchmarks"]}
 
 
 def bricks(n, place):
@@ -178,7 +168,7 @@ def expected(entry):
 
 @pytest.mark.parametrize("name", CASES)
 def test_published(name):
-    case, entry = CASES[name], published()[name.split()[0]]
+    case, entry = CASES[name], benchmarks()[name.split()[0]]
     assert entry["status"] == "verified"
     target, found = expected(entry), case.compute()
     if case.keep:
@@ -200,7 +190,7 @@ def test_fv5_torsion_and_extension():
 @pytest.mark.parametrize("modes", [9, 21])
 def test_fine_meshes_approach_the_targets(modes):
     """Refined, both bricks come within half a percent of the twisted beam, nearer than before."""
-    target = expected(published()["MH_twisted_beam"])
+    target = expected(benchmarks()["MH_twisted_beam"])
     fine = twisted_beam(modes, (36, 4, 2))
     assert_allclose(fine, target, rtol=5e-3)
     assert np.abs(fine / target - 1).max() <= np.abs(twisted_beam(modes) / target - 1).max()

@@ -6,11 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran
 
 from chladni.case import load_case
 from chladni.case.files_of_source import files_of
-from chladni.cli.app import application
 from chladni.errors import ChladniError, FileError
 
 from .test_case import deck
@@ -75,8 +74,7 @@ def test_init_allows_what_it_points_to(tmp_path: Path) -> None:
     (tmp_path / "plate.bdf").write_text(deck())
     for out, climbs in ((tmp_path / "case", True), (tmp_path, False)):
         words = ["init", str(tmp_path / "plate.bdf"), "--out", str(out), "--units", "mm-t-s"]
-        done = CliRunner().invoke(application(), words)
-        assert done.exit_code == 0, done.output
+        ran(*words)
         assert ("outside = true" in (out / "case.toml").read_text()) is climbs
         assert load_case(out).deck.path.samefile(tmp_path / "plate.bdf")
 
@@ -101,10 +99,8 @@ def test_a_case_is_never_written_over(folder: Path, tmp_path: Path, command: str
     (case / "frf.npz").write_bytes((case / "a.npz").read_bytes())
     (case / "report.html").write_text("mine")
     before = {p.name: p.read_bytes() for p in case.iterdir()}
-    done = CliRunner().invoke(application(), [command, str(case), "--out", str(case)])
-    assert done.exit_code == 2
-    said = re.search(r"report\.html|frf\.npz", done.stderr)
-    assert said, done.stderr
+    said = ran(command, case, "--out", case, code=2).stderr
+    assert re.search(r"report\.html|frf\.npz", said), said
     assert {p.name: p.read_bytes() for p in case.iterdir() if p.is_file()} == before
     (kept,) = (p for p in case.iterdir() if p.is_dir())
     assert json.loads((kept / "run.json").read_text())["command"] == command

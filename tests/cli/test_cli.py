@@ -3,29 +3,29 @@
 import inspect
 import json
 import re
+import shutil
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import call, ran, refused
 
 import chladni
 from chladni.case import load_case
-from chladni.cli.app import application, commands, guarded
+from chladni.cli.app import commands, guarded
 from chladni.errors import AccuracyError, FileError
 from chladni.fem.modelled import modelled
 from chladni.io.formed_files import read_formed
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS
+from chladni.view import scene
 from chladni.workflows.diagnosis_pipeline import _deck
 from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import box, folded_panel, plate
 from chladni_specimens.tailgate.design import TailgateDesign
 
-NEEDED = {  # extra arguments a command cannot do without
-    "frf": ["--input", "1:+Z", "--output", "9:+Z"],
-    "map": ["formed.k"],
-}
 OSCILLATOR = """SOL 108
 CEND
 DLOAD = 5
@@ -68,16 +68,11 @@ def deck(tmp_path):
     return path
 
 
-def call(*arguments):
-    return CliRunner().invoke(application(), [str(a) for a in arguments])
-
-
 def test_modes(tmp_path):
     """Six rigid modes, then f = λ²/(2π a²) √(D/ρt) with λ² = 13.47 (Leissa 1973, free square)."""
     deck = tmp_path / "plate.bdf"
     deck.write_text(deck_text(14))
-    done = call("modes", deck, "--count", 8, "--units", "SI", "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
+    done = ran("modes", deck, "--count", 8, "--units", "SI", "--out", tmp_path / "out")
     result = json.loads((tmp_path / "out" / "modes.json").read_text())
     assert result["mass_kg"] == pytest.approx(7850 * 1e-3 * 0.09)
     np.testing.assert_allclose(result["centre_of_gravity_m"], [0.15, 0.15, 0], atol=1e-9)
@@ -99,8 +94,7 @@ def test_rigid_motions_are_told_where_no_other_mode_is_asked_for(tmp_path, count
     """Among the six alone rounding would pass for elastic modes, with shares of an energy of 0."""
     deck = tmp_path / "plate.bdf"
     deck.write_text(deck_text(6))
-    done = call("modes", deck, "--count", count, "--units", "SI", "--out", tmp_path / "out")
-    assert done.exit_code == 0, (done.output, done.stderr)
+    done = ran("modes", deck, "--count", count, "--units", "SI", "--out", tmp_path / "out")
     result = json.loads((tmp_path / "out" / "modes.json").read_text())
     assert len(result["frequency_hz"]) == count
     (share,) = (part["strain_energy"] for part in result["parts"].values())
@@ -111,8 +105,7 @@ def test_rigid_motions_are_told_where_no_other_mode_is_asked_for(tmp_path, count
 def test_frf_peaks_at_its_modes(deck, tmp_path):
     out = tmp_path / "out"
     ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "49:n"]
-    done = call("frf", deck, *ends, "--band", "20:60", "--units", "SI", "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("frf", deck, *ends, "--band", "20:60", "--units", "SI", "--out", out)
     call("modes", deck, "--count", 7, "--units", "SI", "--out", tmp_path / "modes")
     first = json.loads((tmp_path / "modes" / "modes.json").read_text())["frequency_hz"][6]
     with np.load(out / "frf.npz", allow_pickle=False) as held:
@@ -131,7 +124,7 @@ def test_frf_holds_what_higher_modes_contribute(deck, tmp_path):
     ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "30:+Z"]
     band = ["--band", "5:30", "--lines", 6, "--damping", 0.0]
     options = [*ends, *band, "--units", "SI", "--quantity", "receptance", "--out", out]
-    assert call("frf", deck, *options).exit_code == 0
+    ran("frf", deck, *options)
     system = load_model(deck, "SI").structure.system
     rows = [system.dofs.tolist().index([grid, 3]) for grid in (1, 30)]
     exact = direct_frf(system, np.array(rows), np.array(rows[:1]), np.linspace(5, 30, 6)).values
@@ -143,8 +136,7 @@ def test_frf_runs_what_the_deck_asks_for(tmp_path):
     """One mass: u = F / (k - ω² m + i ω c), as SOL 108 has it."""
     deck, out = tmp_path / "one.bdf", tmp_path / "out"
     deck.write_text(OSCILLATOR)
-    done = call("frf", deck, "--quantity", "receptance", "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("frf", deck, "--quantity", "receptance", "--out", out)
     with np.load(out / "frf.npz", allow_pickle=False) as held:
         w = 2 * np.pi * held["frequency_hz"]
         assert held["outputs"].tolist() == ["1:+X"]
@@ -158,8 +150,7 @@ def test_transmissibility_of_a_base(tmp_path):
     deck, out = tmp_path / "one.bdf", tmp_path / "out"
     deck.write_text(OSCILLATOR.replace("CDAMP2,2,2.0,1,1,2,1\n", ""))
     ends = ["--input", "base:+X", "--output", "1:+X", "--band", "5:20", "--lines", 4]
-    done = call("frf", deck, *ends, "--damping", 0.0, "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("frf", deck, *ends, "--damping", 0.0, "--out", out)
     with np.load(out / "frf.npz", allow_pickle=False) as held:
         assert str(held["quantity"]) == "transmissibility"
         f, f0 = held["frequency_hz"], np.sqrt(4000 / 0.1) / (2 * np.pi)
@@ -169,24 +160,24 @@ def test_transmissibility_of_a_base(tmp_path):
 def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
     """On a plate in z = 0 the normal is Z up to sign, and H is reciprocal."""
     labels = ["--input", "1:+Z", "--input", "9:n", "--output", "1:+Z", "--output", "9:n"]
-    assert call("frf", deck, *labels, "--out", tmp_path / "out").exit_code == 0
+    ran("frf", deck, *labels, "--out", tmp_path / "out")
     with np.load(tmp_path / "out" / "frf.npz", allow_pickle=False) as held:
         H = held["values"]
     np.testing.assert_allclose(H, H.swapaxes(1, 2), rtol=1e-6, atol=1e-9 * np.abs(H).max())
 
 
-def test_render(deck, tmp_path):
+def test_render(deck, tmp_path, monkeypatch):
     """Modes are counted with the rigid ones, as everywhere, so the plate's seventh is elastic."""
+    monkeypatch.setattr(scene, "mode_gif", partial(scene.mode_gif, frames=3))  # twenty take long
     out = tmp_path / "out"
     options = ["--modes", "7-9", "--gif", 7, "--thickness", "--energy", 8]
-    done = call("render", deck, *options, "--units", "SI", "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("render", deck, *options, "--units", "SI", "--out", out)
     due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
     assert {p.name for p in out.iterdir()} == due | {"report.html", "run.json"}
     assert "the first elastic is 7" in (out / "report.html").read_text()
-    done = call("render", deck, "--energy", 3, "--units", "SI", "--out", tmp_path / "rigid")
-    assert (done.exit_code, (tmp_path / "rigid").exists()) == (2, False)
-    assert "mode 3 is a rigid motion" in done.output
+    assert "mode 3 is a rigid motion" in refused(
+        "render", deck, "--energy", 3, "--units", "SI", "--out", tmp_path / "rigid"
+    )
 
 
 def plates(heights):
@@ -209,8 +200,7 @@ def test_clearance_of_two_plates(tmp_path):
     deck, out = tmp_path / "two.bdf", tmp_path / "out"
     deck.write_text(plates([0.0, 0.003]))
     options = ["--clearance", "--modes", 7, "--units", "SI", "--out", out]
-    done = call("render", deck, *options)
-    assert done.exit_code == 0, done.output
+    ran("render", deck, *options)
     (pair,) = json.loads((out / "clearance.json").read_text())
     assert pair["least"] == pytest.approx(2e-3, abs=1e-6)
     assert not pair["touching"]
@@ -221,8 +211,7 @@ def test_a_rigid_motion_closes_no_gap_and_stops_no_picture(tmp_path):
     """Modes 1 to 8: all are drawn, contacts are of the two elastic ones."""
     deck, out = tmp_path / "two.bdf", tmp_path / "out"
     deck.write_text(plates([0.0, 0.003]))
-    done = call("render", deck, "--clearance", "--modes", "1-8", "--units", "SI", "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("render", deck, "--clearance", "--modes", "1-8", "--units", "SI", "--out", out)
     page = (out / "report.html").read_text()
     assert "A rigid motion closes no gap" in page
     table = page.split("first contact")[1].split("</table>")[0]
@@ -232,9 +221,7 @@ def test_a_rigid_motion_closes_no_gap_and_stops_no_picture(tmp_path):
 def test_one_plate_has_no_clearance(tmp_path):
     deck, out = tmp_path / "one.bdf", tmp_path / "out"
     deck.write_text(plates([0.0]))
-    done = call("render", deck, "--clearance", "--out", out)
-    assert (done.exit_code, out.exists()) == (2, False)
-    assert "no two parts" in done.output
+    assert "no two parts" in refused("render", deck, "--clearance", "--out", out)
 
 
 CASE = """
@@ -249,21 +236,39 @@ fit = [25.0, 180.0]
 """
 
 
-@pytest.fixture
-def case(deck, tmp_path):
-    """A test of the model itself: six sensors, one shaker, 1 % damping."""
+SENSORS = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
+RECORDED = ["--input", "2:+Z", *SENSORS, "--band", "20:200", "--units", "SI"]
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    """A test of the model itself: six sensors, one shaker, 1 % damping; nothing is written here."""
+    folder = tmp_path_factory.mktemp("case")
+    deck = folder / "plate.bdf"
     deck.write_text(deck_text(6, width=0.22))  # no two modes alike, none with a node at the shaker
-    ends = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
-    options = ["--input", "2:+Z", *ends, "--band", "20:200", "--units", "SI", "--out", tmp_path]
-    assert call("frf", deck, *options).exit_code == 0
-    (tmp_path / "case.toml").write_text(CASE)
-    return tmp_path
+    ran("frf", deck, *RECORDED, "--out", folder)
+    (folder / "case.toml").write_text(CASE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def identified(case, tmp_path_factory):
+    """The folder of what is identified, and its only recording."""
+    out = tmp_path_factory.mktemp("identified") / "out"
+    ran("identify", case, "--out", out)
+    (entry,) = json.loads((out / "identified.json").read_text())["recordings"]
+    return out, entry
+
+
+@pytest.fixture
+def copied(case, tmp_path):
+    """The case, to be changed."""
+    return Path(shutil.copytree(case, tmp_path / "case"))
 
 
 def test_a_model_correlates_with_itself(case, tmp_path):
     """Every mode finds itself, Q is nothing; MAC is 1 but for faintly driven modes."""
-    done = call("correlate", case, "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
+    ran("correlate", case, "--out", tmp_path / "out")
     found = json.loads((tmp_path / "out" / "correlation.json").read_text())
     assert len(found["modes"]) >= 4
     assert found["alone_test_hz"] == []
@@ -277,22 +282,18 @@ def test_a_model_correlates_with_itself(case, tmp_path):
 
 def test_frf_of_a_case_is_what_its_recording_holds(case, tmp_path):
     """The recording was made of the same model: its lines, its labels, its values."""
-    done = call("frf", case, "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
+    ran("frf", case, "--out", tmp_path / "out")
     here, there = np.load(tmp_path / "out" / "frf.npz"), np.load(case / "frf.npz")
     assert here["outputs"].tolist() == there["outputs"].tolist()
     H, due = here["values"], there["values"]
     np.testing.assert_allclose(H, due, atol=1e-4 * np.abs(due).max())
 
 
-def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
-    out = tmp_path / "out"
-    done = call("identify", case, "--out", out)
-    assert done.exit_code == 0, done.output
-    assert call("modes", case, "--count", 12, "--out", tmp_path / "modes").exit_code == 0
+def test_identify_finds_the_modes_and_damping_of_the_model(case, identified, tmp_path):
+    out, entry = identified
+    ran("modes", case, "--count", 12, "--out", tmp_path / "modes")
     page = (out / "report.html").read_text()
     assert all(word in page for word in ("MPC", "orders [%]", "state_space.mat"))
-    (entry,) = json.loads((out / "identified.json").read_text())["recordings"]
     f = np.array(json.loads((tmp_path / "modes" / "modes.json").read_text())["frequency_hz"])
     f = f[(f > 25) & (f < 180)]
     found = np.array(entry["frequency_hz"])[entry["firm"]]
@@ -305,35 +306,28 @@ def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
     assert not any(entry["struck_out"])
 
 
-def test_a_pole_is_dropped_by_its_frequency_and_only_a_pole(case, tmp_path):
-    whole, out = tmp_path / "whole", tmp_path / "out"
-    assert call("identify", case, "--out", whole).exit_code == 0
-    (entry,) = json.loads((whole / "identified.json").read_text())["recordings"]
+def test_a_pole_is_dropped_by_its_frequency_and_only_a_pole(case, identified, tmp_path):
+    """The recording still shows the mode, so that the exit code is 3."""
+    (_, entry), out = identified, tmp_path / "out"
     f = entry["frequency_hz"][2]
-    done = call("identify", case, "--drop", f"{f:.4g}", "--out", out)
-    assert done.exit_code == 3, done.output  # what it stood for is no noise
+    ran("identify", case, "--drop", f"{f:.4g}", "--out", out, code=3)
     (left,) = json.loads((out / "identified.json").read_text())["recordings"]
     assert len(left["frequency_hz"]) == len(entry["frequency_hz"]) - 1
     assert "Taken out by hand" in (out / "report.html").read_text()
-    refused = call("identify", case, "--drop", 1e4, "--out", tmp_path / "no")
-    assert refused.exit_code == 2
-    assert not (tmp_path / "no").exists()
+    refused("identify", case, "--drop", 1e4, "--out", tmp_path / "no")
 
 
 def test_how_to_estimate_is_known_and_told_where_nothing_is_estimated(case, tmp_path):
-    refused = call("test", case / "frf.uff", "--excitation", "shock", "--out", tmp_path / "no")
-    assert (refused.exit_code, (tmp_path / "no").exists()) == (2, False)
-    done = call("test", case / "frf.uff", "--excitation", "hammer", "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
+    refused("test", case / "frf.uff", "--excitation", "shock", "--out", tmp_path / "no")
+    done = ran("test", case / "frf.uff", "--excitation", "hammer", "--out", tmp_path / "out")
     assert "Nothing was estimated" in done.output
     assert "Nothing was estimated" not in call("test", case, "--out", tmp_path / "plain").output
 
 
-def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):
+def test_a_recording_of_the_model_itself_lacks_nothing(copied, tmp_path):
     """The model's own responses are explained by the model; the answer is whole and readable."""
-    (case / "case.toml").write_text(CASE.replace("fit = [25.0, 180.0]", "fit = [20.0, 170.0]"))
-    done = call("diagnose", case, "--out", tmp_path / "answer")
-    assert done.exit_code == 0, done.output
+    (copied / "case.toml").write_text(CASE.replace("fit = [25.0, 180.0]", "fit = [20.0, 170.0]"))
+    ran("diagnose", copied, "--out", tmp_path / "answer")
     d = json.loads((tmp_path / "answer" / "diagnosis.json").read_text())
     assert d["verdict"] in ("nothing missing", "calibration only")
     assert d["effects"] == []
@@ -341,50 +335,46 @@ def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):
     names = {p.name for p in (tmp_path / "answer").iterdir()}
     assert {"report.html", "updated.bdf", "diagnosis.json", "evidence.png", "setup.png"} < names
     options = ["--units", "SI", "--count", 14, "--out", tmp_path / "modes"]
-    modes = call("modes", tmp_path / "answer" / "updated.bdf", *options)
-    assert modes.exit_code == 0, modes.output
+    ran("modes", tmp_path / "answer" / "updated.bdf", *options)
 
 
 LAMINATE = "PCOMP,1,,,,,,,SYM\n,1,2.5e-4,0.,,1,2.5e-4,45."
 
 
-def calibrated(case, out, factor=1.21):
+def calibrated(case, out):
     """A laminated plate calibrated to the recording of one so much stiffer."""
     out.mkdir()
     text = deck_text(6, width=0.22)
-    (case / "plate.bdf").write_text(text.replace("2.1+11", f"{2.1e11 * factor:.4e}"))
-    ends = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
-    options = ["--input", "2:+Z", *ends, "--band", "20:200", "--units", "SI", "--out", case]
-    assert call("frf", case / "plate.bdf", *options).exit_code == 0
+    (case / "plate.bdf").write_text(text.replace("2.1+11", f"{2.1e11 * 1.21:.4e}"))
+    ran("frf", case / "plate.bdf", *RECORDED, "--out", case)
     (case / "plate.bdf").write_text(text.replace("PSHELL,1,1,0.001,1,,1", LAMINATE))
-    done = call("calibrate", case, "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("calibrate", case, "--out", out)
     return json.loads((out / "diagnosis.json").read_text())
 
 
 def first_elastic(deck, folder):
-    assert call("modes", deck, "--units", "SI", "--count", 8, "--out", folder / "m").exit_code == 0
+    ran("modes", deck, "--units", "SI", "--count", 8, "--out", folder / "m")
     return json.loads((folder / "m" / "modes.json").read_text())["frequency_hz"][6]
 
 
-def test_calibrated_laminate_is_written_into_its_layers(case, tmp_path):
+def test_calibrated_laminate_is_written_into_its_layers(copied, tmp_path):
     """Stiffness over mass of the plies moves by what was concealed; the deck is read again."""
     out = tmp_path / "answer"
-    d = calibrated(case, out)
+    d = calibrated(copied, out)
     assert d["files"]["deck"] == "calibrated.bdf"
     assert any("of 12 starts of a Latin hypercube ended in the best" in n for n in d["notes"])
     assert "missing physics was not searched" in (out / "report.html").read_text()
     f, before = (
-        first_elastic(deck, tmp_path) for deck in (out / "calibrated.bdf", case / "plate.bdf")
+        first_elastic(deck, tmp_path) for deck in (out / "calibrated.bdf", copied / "plate.bdf")
     )
     assert f / before == pytest.approx(1.1, rel=0.01)
 
 
-def test_answer_stands_where_no_card_holds_the_change(case, tmp_path):
+def test_answer_stands_where_no_card_holds_the_change(copied, tmp_path):
     """One element of a laminate cannot be thinner than the rest: no deck, and a note says why."""
     text = deck_text(6, width=0.22).replace("PSHELL,1,1,0.001,1,,1", LAMINATE)
-    (case / "plate.bdf").write_text(text)
-    opened = load_case(case)
+    (copied / "plate.bdf").write_text(text)
+    opened = load_case(copied)
     shells = opened.assembly.shells
     thickness = shells.thickness * np.where(np.arange(len(shells)) == 3, 0.9, 1.0)[:, None]
     final = replace(opened.assembly, shells=replace(shells, thickness=thickness))
@@ -400,10 +390,9 @@ def test_specimen_comes_back_as_a_deck(tmp_path):
     """What is written weighs what the generator says: ρ t (a b) of a plate."""
     out = tmp_path / "out"
     sides = ["--set", "length=0.4", "--set", "width=0.2", "--set", "t=0.002"]
-    assert call("specimen", "plate", "--size", 50, *sides, "--out", out).exit_code == 0
+    ran("specimen", "plate", "--size", 50, *sides, "--out", out)
     modes = tmp_path / "modes"
-    done = call("modes", out / "plate.bdf", "--count", 7, "--units", "mm-t-s", "--out", modes)
-    assert done.exit_code == 0, done.output
+    ran("modes", out / "plate.bdf", "--count", 7, "--units", "mm-t-s", "--out", modes)
     mass = json.loads((modes / "modes.json").read_text())["mass_kg"]
     assert mass == pytest.approx(7850 * 0.002 * 0.08, rel=1e-5)
 
@@ -411,8 +400,7 @@ def test_specimen_comes_back_as_a_deck(tmp_path):
 def test_plan_sees_every_mode(deck, tmp_path):
     """As many sensors as modes or more, no label twice, no mode unseen."""
     out = tmp_path / "out"
-    done = call("plan", deck, "--modes", 5, "--sensors", 8, "--units", "SI", "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("plan", deck, "--modes", 5, "--sensors", 8, "--units", "SI", "--out", out)
     result = json.loads((out / "plan.json").read_text())
     labels = [s["label"] for s in result["sensors"]]
     assert len(set(labels)) == 8
@@ -425,8 +413,7 @@ def test_a_plan_without_units_says_what_it_took_the_deck_for(deck, tmp_path):
     made = chladni.load(deck, "SI").assembly
     for name in ("SI", "mm-t-s"):
         path = write_assembly(made, tmp_path / f"{name}.bdf", UNITS[name])
-        done = call("plan", path, *words, "--out", tmp_path / name)
-        assert done.exit_code == 0, done.output
+        done = ran("plan", path, *words, "--out", tmp_path / name)
         assert f"units = {name}: " in done.output
     a, b = (json.loads((tmp_path / n / "plan.json").read_text()) for n in ("SI", "mm-t-s"))
     assert [m["frequency_hz"] for m in a["modes"]] == pytest.approx(
@@ -436,48 +423,6 @@ def test_a_plan_without_units_says_what_it_took_the_deck_for(deck, tmp_path):
     np.testing.assert_allclose(*at, atol=1e-6)
     deck.write_text(deck.read_text().replace("7850.", ""))
     assert "--units" in call("plan", deck, *words, "--out", tmp_path / "x").stderr
-
-
-WITH_FILE = [c for c in commands() if c not in ("demo", "blind")]  # these two take no file
-BAD = {
-    "missing": None,
-    "empty": b"",
-    "binary": bytes(range(256)) * 20,
-    "text": "one fine day\n" * 30,
-    "no grids": "BEGIN BULK\nMAT1,1,2.1+11,,0.3,7850.\nENDDATA\n",
-    "no elements": "BEGIN BULK\nGRID,1,,0.,0.,0.\nENDDATA\n",
-    "unknown property": deck_text().replace("PSHELL,1,", "PSHELL,7,"),
-    "unknown grid": deck_text().replace("CQUAD4,1,1,1,", "CQUAD4,1,1,999,"),
-    "no thickness": deck_text().replace("PSHELL,1,1,0.001,", "PSHELL,1,1,,"),
-}
-
-
-@pytest.mark.parametrize(
-    ("command", "fault"),
-    [("modes", fault) for fault in BAD]
-    + [(c, f) for c in WITH_FILE if c != "modes" for f in ("missing", "binary", "no grids")],
-)
-def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
-    path, content = tmp_path / "bad.bdf", BAD[fault]
-    if content is not None:
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    done = call(command, path, *NEEDED.get(command, []), "--out", tmp_path / "runs" / "x")
-    assert done.exit_code == 2, (done.output, done.exception)
-    said = done.stderr.strip()
-    assert said.startswith("chladni: ")
-    assert "\n" not in said
-    assert "Traceback" not in said
-    assert not list(tmp_path.glob("runs/*")), "half a run was left"
-
-
-DECKLESS = ("report", "specimen", "init", "map")  # they take no case
-
-
-@pytest.mark.parametrize("command", [c for c in WITH_FILE if c not in DECKLESS])
-def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
-    done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
-    assert done.exit_code == 2, (done.output, done.exception)
-    assert "no case.toml in the folder" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -506,10 +451,7 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
 )
 def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
     command, *options = arguments
-    done = call(command, deck, *options, "--out", tmp_path / "x")
-    assert done.exit_code == 2, (done.output, done.exception)
-    assert named in done.stderr
-    assert not (tmp_path / "x").exists()
+    assert named in refused(command, deck, *options, "--out", tmp_path / "x")
 
 
 @pytest.mark.parametrize(
@@ -527,9 +469,7 @@ def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
     ],
 )
 def test_a_wrong_specimen_names_the_right_ones(tmp_path, arguments, named):
-    done = call("specimen", *arguments, "--out", tmp_path / "x")
-    assert done.exit_code == 2, (done.output, done.exception)
-    assert named in done.stderr
+    assert named in refused("specimen", *arguments, "--out", tmp_path / "x") + "\n"
 
 
 def test_every_setting_of_a_specimen_is_in_its_help():
@@ -541,8 +481,7 @@ def test_every_setting_of_a_specimen_is_in_its_help():
 
 def test_the_panel_comes_with_its_formed_thickness(tmp_path):
     """Forming thins: nowhere above the gauge, thinnest in the folds; its parts are the deck's."""
-    done = call("specimen", "panel", "--size", 60, "--set", "t=0.8e-3", "--out", tmp_path)
-    assert done.exit_code == 0, done.output
+    ran("specimen", "panel", "--size", 60, "--set", "t=0.8e-3", "--out", tmp_path)
     formed = read_formed(tmp_path / "formed_thickness.k", "mm-t-s")
     assert formed.names == {1: "panel", 2: "flanges"}
     assert formed.nodal.max() <= 0.8e-3 + 1e-7
@@ -556,7 +495,7 @@ def test_the_panel_comes_with_its_formed_thickness(tmp_path):
 
 
 def test_out_must_be_a_folder(deck):
-    assert call("modes", deck, "--out", deck).exit_code == 2
+    ran("modes", deck, "--out", deck, code=2)
 
 
 @pytest.mark.parametrize(
@@ -585,6 +524,5 @@ def test_help_lists_every_command():
 
 
 def test_version_is_printed():
-    done = call("--version")
-    assert done.exit_code == 0
+    done = ran("--version")
     assert done.output.startswith("chladni ")

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 import typer
-from typer.testing import CliRunner
+from tests.builders.commands import call, ran, refused, spoken
 
 from chladni.cli import console
-from chladni.cli.app import application, guarded
+from chladni.cli.app import guarded
 from chladni.cli.console import opened_console, plain_line, say, table_lines, watched
 from chladni.errors import FileError, Interrupted
 from chladni.output import run_folder, write_text
@@ -31,19 +31,10 @@ def deck(tmp_path):
     return path
 
 
-def call(*words):
-    return CliRunner().invoke(application(), [str(w) for w in words])
-
-
 def code_of(command):
     with pytest.raises(typer.Exit) as caught:
         guarded(command)()
     return caught.value.exit_code
-
-
-def spoken(stderr: str) -> list[str]:
-    """Lines of standard error, without those of a run that takes long on a busy machine."""
-    return [line for line in stderr.splitlines() if not re.match(r"\[\d+ s\] .*, \d+ %$", line)]
 
 
 def test_tables_are_said_with_all_their_numbers():
@@ -92,10 +83,9 @@ def test_a_page_is_opened_only_where_that_is_asked_for(deck, tmp_path, monkeypat
     """The page in its place, not in the scratch folder; without a browser a note says so."""
     opened, out = [], tmp_path / "out"
     monkeypatch.setattr("webbrowser.open", lambda uri: opened.append(uri) or there)
-    assert call("modes", deck, "--out", out).exit_code == 0
+    ran("modes", deck, "--out", out)
     assert opened == []
-    done = call("modes", deck, "--out", out, "--open")
-    assert done.exit_code == 0
+    done = ran("modes", deck, "--out", out, "--open")
     assert opened == [(out / "report.html").as_uri()]
     assert ("no browser opened" in done.stderr) != there
 
@@ -127,24 +117,6 @@ def test_who_asks_for_nothing_is_shown_the_help(words):
     assert (done.stdout + done.stderr).startswith("Usage: ")
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        *(["modes", "no.bdf"], ["frf", "no.bdf"], ["render", "no.bdf"], ["plan", "no.bdf"]),
-        *(["bench", "no.bdf"], ["test", "no.uff"], ["identify", "no.uff"], ["map", "no", "f.k"]),
-        *(["diagnose", "no"], ["calibrate", "no"], ["correlate", "no"], ["check", "no"]),
-        *(["study", "no.bdf"], ["init", "no.bdf"], ["specimen", "plate", "--set", "t=x"]),
-    ],
-)
-def test_what_is_refused_leaves_no_folder(words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    done = call(*words)
-    assert done.exit_code == 2, done.output
-    assert len(done.stderr.splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
-    assert " runs" not in done.stderr  # nor is what went again recommended
-
-
 def test_what_is_beside_the_missing_is_what_could_be_meant(tmp_path, monkeypatch):
     """Files and cases; no folder of results, though it has the nearest name."""
     monkeypatch.chdir(tmp_path)
@@ -155,10 +127,8 @@ def test_what_is_beside_the_missing_is_what_could_be_meant(tmp_path, monkeypatch
 
 
 def test_a_log_that_cannot_be_written_is_a_sentence(deck, tmp_path):
-    done = call("modes", deck, "--log", tmp_path / "no" / "folder.log", "--out", tmp_path / "o")
-    assert done.exit_code == 2
-    assert done.stderr.startswith("chladni: --log ")
-    assert not (tmp_path / "o").exists()
+    said = refused("modes", deck, "--log", tmp_path / "no" / "folder.log", "--out", tmp_path / "o")
+    assert said.startswith("chladni: --log ")
 
 
 FULL = Path("/dev/full")
@@ -166,9 +136,8 @@ FULL = Path("/dev/full")
 
 @pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
 def test_a_log_on_a_full_disk_is_refused_at_once_and_ends_no_run(deck, tmp_path, capsys):
-    done = call("modes", deck, "--log", FULL, "--out", tmp_path / "o")
-    assert done.exit_code == 2
-    assert done.stderr == f"chladni: --log {FULL} cannot be written: No space left on device\n"
+    said = refused("modes", deck, "--log", FULL, "--out", tmp_path / "o")
+    assert said == f"chladni: --log {FULL} cannot be written: No space left on device"
     with opened_console(log=tmp_path / "log") as one:
         one.log.close()
         one.log = FULL.open("a", encoding="utf-8")  # from here on the disk is full
@@ -192,29 +161,24 @@ def test_memory_that_a_library_lacks_is_no_fault_of_ours(capsys):
 @pytest.mark.parametrize("words", [["--out", ""], ["--out="]])
 def test_an_empty_folder_is_not_the_current_one(words, deck, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = call("modes", deck, *words)
-    assert done.exit_code == 2
+    done = ran("modes", deck, *words, code=2)
     assert "'--out': the name is empty" in done.stderr
     assert list(tmp_path.iterdir()) == [deck]
 
 
 @pytest.mark.parametrize("x", ["nan", "inf", "1e400"])
 def test_numbers_of_options_are_finite(deck, tmp_path, x):
-    done = call("identify", deck, "--pick", 3.0, "--pick", x, "--out", tmp_path / "o")
-    assert done.exit_code == 2
-    assert done.stderr == f"chladni: --pick {float(x):g} is not a finite number\n"
+    said = refused("identify", deck, "--pick", 3.0, "--pick", x, "--out", tmp_path / "o")
+    assert said == f"chladni: --pick {float(x):g} is not a finite number"
 
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="names of files are UTF-8 there")
 def test_a_deck_whose_name_is_no_text(deck, tmp_path):
     odd = deck.rename(os.fsdecode(os.fsencode(tmp_path) + b"/d\xff.bdf"))
     for k, words in enumerate((["modes", odd], ["frf", odd])):
-        done = call(*words, "--out", tmp_path / f"o{k}")
-        assert done.exit_code == 0, done.output
-    done = call("init", odd, "--units", "SI", "--out", tmp_path / "case")
-    assert done.exit_code == 2
-    assert done.stderr.endswith("rename this file or its folder\n")
-    assert not (tmp_path / "case").exists()
+        ran(*words, "--out", tmp_path / f"o{k}")
+    said = refused("init", odd, "--units", "SI", "--out", tmp_path / "case")
+    assert said.endswith("rename this file or its folder")
 
 
 @pytest.mark.parametrize("words", [[], ["blind"]])
@@ -316,7 +280,7 @@ def test_who_reads_may_leave(deck, tmp_path):
 def test_a_full_disk_is_a_sentence_and_the_earlier_results_stay(deck, tmp_path):
     """The largest file allowed is smaller than a picture: a write fails half way."""
     out = tmp_path / "out"
-    assert call("modes", deck, "--out", out).exit_code == 0
+    ran("modes", deck, "--out", out)
     before = {p.name: p.read_bytes() for p in out.iterdir()}
 
     def small() -> None:
@@ -335,8 +299,7 @@ def test_a_place_that_cannot_be_written_is_a_sentence(deck):
     """No user, root included, makes a folder in /proc."""
     if not Path("/proc").is_dir():
         pytest.skip("no /proc here")
-    done = call("modes", deck, "--out", "/proc/chladni")
-    assert done.exit_code == 2
-    assert done.stderr.startswith("chladni: /proc/chladni: ")
+    said = refused("modes", deck, "--out", "/proc/chladni")
+    assert said.startswith("chladni: /proc/chladni: ")
     with pytest.raises(FileError), run_folder("/proc/self/task", "modes"):
         pass

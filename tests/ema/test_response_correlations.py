@@ -88,10 +88,10 @@ def ringing(strengths, seconds, seed, noise=0.01, offset=0.3, quiet=40):
 @pytest.mark.parametrize("strengths", [[(1.0, 0.8, 0.6)], [(1.0, 0.1, 0.4), (0.2, 1.0, 0.7)]])
 def test_free_decays_have_their_poles_at_once(strengths):
     """Of one block or of several, frequency and damping; what the window added is taken off."""
-    held_out_votes = ringing(np.array(strengths), 12.0, 3)
-    assert free_decays(responses(held_out_votes))
-    known, found = frequencies(held_out_votes)
-    frf, sigma = one_sided(held_out_votes)
+    decays = ringing(np.array(strengths), 12.0, 3)
+    assert free_decays(responses(decays))
+    known, found = frequencies(decays)
+    frf, sigma = one_sided(decays)
     assert frf.values.shape[1:] == (3, len(strengths))
     for f, zeta in zip(F, ZETA, strict=True):
         k = np.abs(known - f).argmin()

@@ -8,6 +8,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from numpy.testing import assert_array_equal
+from tests.builders.environments import story
 
 import chladni_envs
 
@@ -29,13 +31,13 @@ def legal(env, info):
 def rollout(env, seed, steps=300, act=legal):
     obs, info = env.reset(seed=seed)
     env.action_space.seed(seed)
-    story = [(obs, 0.0, info)]
+    steps_made = [(obs, 0.0, info)]
     for _ in range(steps):
         obs, reward, terminated, truncated, info = env.step(act(env, info))
-        story.append((obs, reward, info))
+        steps_made.append((obs, reward, info))
         if terminated or truncated:
             break
-    return story
+    return steps_made
 
 
 @pytest.mark.parametrize("id", IDS)
@@ -108,7 +110,7 @@ def test_illegal_actions_change_nothing_and_end(id, options):
         wrong = np.flatnonzero(info["action_mask"] == 0)
         again, reward, terminated, truncated, info = env.step(wrong[0])
         assert reward == 0
-        np.testing.assert_array_equal(again, obs)
+        assert_array_equal(again, obs)
         over = terminated or truncated
     raise AssertionError("the episode never ended")
 
@@ -122,9 +124,9 @@ def test_masks_agree(id, options):
         assert info["action_mask"].shape == (env.action_space.n,)
     masks = env.unwrapped.action_masks()
     assert masks.dtype == bool
-    np.testing.assert_array_equal(masks, info["action_mask"].astype(bool))
+    assert_array_equal(masks, info["action_mask"].astype(bool))
     masks[:] = False  # the caller's own copy
-    np.testing.assert_array_equal(env.unwrapped.action_masks(), info["action_mask"].astype(bool))
+    assert_array_equal(env.unwrapped.action_masks(), info["action_mask"].astype(bool))
 
 
 @pytest.mark.parametrize(("id", "options"), VARIANTS)
@@ -146,19 +148,7 @@ def test_pictures(id, options):
 
 @pytest.mark.parametrize(("id", "options"), VARIANTS)
 def test_sync_and_async_vectors_are_identical(id, options):
-    stories = []
-    for mode in ("sync", "async"):
-        envs = gym.make_vec(id, num_envs=2, vectorization_mode=mode, **options)
-        obs, _ = envs.reset(seed=5)
-        envs.action_space.seed(5)
-        story = [obs.copy()]
-        for _ in range(12):
-            obs, reward, *_ = envs.step(envs.action_space.sample())
-            story += [obs.copy(), reward.copy()]
-        envs.close()
-        stories.append(story)
-    for a, b in zip(*stories, strict=True):
-        np.testing.assert_array_equal(a, b)
+    assert_array_equal(story("sync", 12, id, **options), story("async", 12, id, **options))
 
 
 @pytest.mark.parametrize("id", IDS)

@@ -6,6 +6,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from numpy.testing import assert_array_equal
+from tests.builders.environments import story
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
@@ -93,19 +95,8 @@ def test_contracts_with_a_case(ready, case, id):
 
 @pytest.mark.parametrize("id", [i for i in IDS if "Placement" in i])
 def test_vectors_with_a_case_are_identical(case, id):
-    stories = []
-    for mode in ("sync", "async"):
-        envs = gym.make_vec(id, num_envs=2, vectorization_mode=mode, case=case, modes=8)
-        obs, _ = envs.reset(seed=5)
-        envs.action_space.seed(5)
-        story = [obs.copy()]
-        for _ in range(5):
-            obs, reward, *_ = envs.step(envs.action_space.sample())
-            story += [obs.copy(), reward.copy()]
-        envs.close()
-        stories.append(story)
-    for a, b in zip(*stories, strict=True):
-        np.testing.assert_array_equal(a, b)
+    options = {"case": case, "modes": 8}
+    assert_array_equal(story("sync", 5, id, **options), story("async", 5, id, **options))
 
 
 def test_shakers_of_a_case_are_vetoed_by_its_mesh(case):

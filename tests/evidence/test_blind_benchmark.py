@@ -6,9 +6,8 @@ import subprocess
 import sys
 
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import call, ran, refused
 
-from chladni.cli.app import application
 from chladni.errors import AccuracyError, FileError, LabelError
 from chladni_evidence import blind_make, blind_run
 from chladni_evidence.__main__ import main
@@ -38,10 +37,6 @@ TRUTH = {
     "effect": "nothing", "structure": "plate", "mesh": "fine", "values": {}, "part_mass_kg": {},
     "mass_kg": 1.0, "unweighed_kg": 0.0,
 }  # fmt: skip
-
-
-def call(*arguments):
-    return CliRunner().invoke(application(), ["blind", *map(str, arguments)])
 
 
 def sealed(out, seeds=(560, 561), why="tune"):
@@ -106,8 +101,7 @@ def test_some_of_a_set():
 
 @pytest.mark.parametrize("step", ["make", "run", "score", "power"])
 def test_every_step_explains_itself(step):
-    done = call(step, "--help")
-    assert done.exit_code == 0
+    done = ran("blind", step, "--help")
     assert "DIR" in done.output
 
 
@@ -125,9 +119,9 @@ def test_seeds_that_tune_never_report(tmp_path):
     with pytest.raises(LabelError, match="a run has one purpose"):
         purpose([599, 600])
     for option in (("--seeds", "600"), ("--seeds", "560", "--purpose", "report")):
-        done = call("make", "--set", "panels", *option, "--out", tmp_path / "run")
-        assert done.exit_code == 2
-        assert "must differ" in done.stderr
+        assert "must differ" in refused(
+            "blind", "make", "--set", "panels", *option, "--out", tmp_path / "run"
+        )
     assert not (tmp_path / "run").exists()
 
 
@@ -177,8 +171,8 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
     with pytest.raises(FileError, match="other files"):
         make([NULL], tmp_path, "tune", "forms", 1, str)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
-    assert call("run", tmp_path).exit_code == 2
-    assert "blind make" in call("score", tmp_path).stderr
+    ran("blind", "run", tmp_path, code=2)
+    assert "blind make" in call("blind", "score", tmp_path).stderr
 
 
 def test_answers_are_given_once_and_scored_after_all(tmp_path, calls):
@@ -279,8 +273,7 @@ def test_tuning_and_report_are_never_scored_together(tmp_path, calls):
     wrong = sealed(tmp_path / "c", (560, 600))
     for place in (one, other, wrong):
         run(place.out, 1, str)
-    done = call("score", one.out, other.out)
-    assert done.exit_code == 2
+    done = ran("blind", "score", one.out, other.out, code=2)
     assert "never scored together" in done.stderr
     assert not one.opened.exists()
     with pytest.raises(LabelError, match="would count twice"):
@@ -313,8 +306,7 @@ def test_a_truth_of_another_version_is_named(tmp_path, calls, monkeypatch):
 )
 def test_seals_that_are_none_are_refused(tmp_path, text):
     (tmp_path / "seals.json").write_text(text)
-    done = call("run", tmp_path)
-    assert done.exit_code == 2
+    done = ran("blind", "run", tmp_path, code=2)
     assert "seals.json" in done.stderr
 
 

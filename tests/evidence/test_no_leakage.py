@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.workflows.conftest import write_case as plate_case
+from tests.builders.cases import write_case as plate_case
 
 from chladni_evidence.blind_folder import BlindFolder, Seals, hash_of, hash_of_case
 from chladni_evidence.blind_run import run

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran
 
 from chladni.case import load_case
-from chladni.cli.app import application
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import identify
 from chladni.io.nastran import write_assembly
@@ -65,8 +64,7 @@ fit = [20.0, 400.0]
 def test_the_grain_of_a_spruce_plate(name, tmp_path, evidence):
     out = tmp_path / "answer"
     source = case(name, tmp_path)
-    done = CliRunner().invoke(application(), ["diagnose", str(source), "--out", str(out)])
-    assert done.exit_code == 0, done.output
+    ran("diagnose", source, "--out", out)
     d = json.loads((out / "diagnosis.json").read_text())
 
     assert d["verdict"] == "missing physics"
@@ -84,7 +82,7 @@ def test_the_grain_of_a_spruce_plate(name, tmp_path, evidence):
 
     modes = ["modes", str(out / "updated.bdf"), "--units", "SI", "--count", "20"]
     there = tmp_path / "modes"
-    assert CliRunner().invoke(application(), [*modes, "--out", str(there)]).exit_code == 0
+    ran(*modes, "--out", there)
     f = json.loads((there / "modes.json").read_text())["frequency_hz"]
     for row in d["frequencies"]:
         if row["after_hz"] is not None:

@@ -4,13 +4,12 @@ A target from a series or thin-plate theory is met to the error of that theory a
 both are stated case by case. Where a published value is known to be wrong the file says so.
 """
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
+from tests.builders.published import benchmarks, held
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
@@ -18,25 +17,9 @@ from chladni.model.assembly import Beams
 from chladni.model.properties import BeamSection, Isotropic, Part
 from chladni_specimens.plates import grid, merged, plate, sheet
 
-FILE = Path(__file__).resolve().parents[2] / "../shared/anchors/benchmarks.json"
 NAFEMS = Isotropic(E=200e9, nu=0.3, rho=8000.0)
 VPCS = Isotropic(E=2.1e11, nu=0.3, rho=7800.0)
 EVERY_IN_PLANE, CLAMPED = (1, 2, 6), (1, 2, 3, 4, 5, 6)
-
-
-@pytest.fixture(scope="module")
-def published():
-    if not FILE.exists():
-        pytest.skip(f"no reference values at {FILE}")
-    return {entry["id"]: entry for entry in json.loads(FILE.read_text())["benchmarks"]}
-
-
-def held(assembly, *groups):
-    """The assembly with components held at the rows each mask selects."""
-    supports = [
-        [row, c] for mask, components in groups for row in np.flatnonzero(mask) for c in components
-    ]
-    return replace(assembly, supports=np.unique(supports, axis=0))
 
 
 def frequencies(assembly, count, rigid=0):
@@ -78,56 +61,56 @@ def annulus(inner, outer, n_r, n_phi, t, material):
     return sheet(points, nodes, t, material)
 
 
-def test_fv12_free_thin_square_plate(published):
+def test_fv12_free_thin_square_plate():
     """Target is a Ritz series: an upper bound, 0.6 % high at the pair (35.02 for 34.80)."""
     shape = plate(10, 10, 24, 24, 0.05, NAFEMS)
     f = frequencies(held(shape, (flat(shape), EVERY_IN_PLANE)), 6, rigid=3)
-    assert deviation(f, published["NAFEMS_FV12"]["target_hz"]) < 0.015
+    assert deviation(f, benchmarks()["NAFEMS_FV12"]["target_hz"]) < 0.015
 
 
-def test_fv13_simply_supported_thin_square_plate(published):
+def test_fv13_simply_supported_thin_square_plate():
     """Three half waves over 32 elements: (3 pi / 32)² / 12 = 0.7 % of dispersion."""
     shape = plate(10, 10, 32, 32, 0.05, NAFEMS)
     west, east, south, north = edges(shape)
     hard = [(west | east, (3, 4)), (south | north, (3, 5))]
     f = frequencies(held(shape, (flat(shape), EVERY_IN_PLANE), *hard), 8)
-    assert deviation(f, published["NAFEMS_FV13_SS"]["target_hz"]) < 0.007
+    assert deviation(f, benchmarks()["NAFEMS_FV13_SS"]["target_hz"]) < 0.007
 
 
 @pytest.mark.parametrize(
     ("name", "t", "tolerance"), [("NAFEMS_FV15", 0.05, 0.015), ("NAFEMS_FV22", 1.0, 0.02)]
 )
-def test_clamped_rhombic_plates(published, name, t, tolerance):
+def test_clamped_rhombic_plates(name, t, tolerance):
     """45 degrees, thin and t/a = 0.1; the sharp corners limit every reference to about 1 %."""
     shape = rhombus(10.0, t, 36, 45)
     n = 37
     border = np.ones((n, n), bool)
     border[1:-1, 1:-1] = False
     f = frequencies(held(shape, (flat(shape), EVERY_IN_PLANE), (border.ravel(), CLAMPED)), 6)
-    assert deviation(f, published[name]["target_hz"]) < tolerance
+    assert deviation(f, benchmarks()[name]["target_hz"]) < tolerance
 
 
-def test_fv16_cantilevered_thin_square_plate(published):
+def test_fv16_cantilevered_thin_square_plate():
     """Barton's series lies above; converged results are 0.3 to 0.8 % below it."""
     shape = plate(10, 10, 24, 24, 0.05, NAFEMS)
     root = edges(shape)[0]
     f = frequencies(held(shape, (root, CLAMPED)), 6)
-    target = np.array(published["NAFEMS_FV16"]["target_hz"])
+    target = np.array(benchmarks()["NAFEMS_FV16"]["target_hz"])
     assert deviation(f, target) < 0.012
 
 
-def test_fv32_cantilevered_tapered_membrane(published):
+def test_fv32_cantilevered_tapered_membrane():
     points, nodes = grid(np.linspace(0, 10, 49), np.linspace(-1, 1, 25))
     points[:, 1] *= 2.5 - 0.2 * points[:, 0]
     shape = sheet(points, nodes, 0.05, NAFEMS)
     root = np.isclose(points[:, 0], 0)
     f = frequencies(held(shape, (flat(shape), (3, 4, 5)), (root, CLAMPED)), 6)
-    assert deviation(f, published["NAFEMS_FV32"]["target_hz"]) < 0.005
+    assert deviation(f, benchmarks()["NAFEMS_FV32"]["target_hz"]) < 0.005
 
 
-def test_r0015_33_free_annular_membrane(published):
+def test_r0015_33_free_annular_membrane():
     """The published 129.24 Hz of the first pair is known to be 125.9 (two converged codes)."""
-    entry = published["NAFEMS_R0015_T33"]
+    entry = benchmarks()["NAFEMS_R0015_T33"]
     shape = annulus(1.8, 6.0, 20, 96, 0.06, NAFEMS)
     f = frequencies(held(shape, (flat(shape), (3, 4, 5))), 11, rigid=3)
     target = np.array(entry["target_hz"])
@@ -135,18 +118,18 @@ def test_r0015_33_free_annular_membrane(published):
     assert deviation(f, target) < 0.01
 
 
-def test_r0016_21_thick_simply_supported_plate(published):
+def test_r0016_21_thick_simply_supported_plate():
     """t/a = 0.1, hard support; the target is a thick-plate series."""
     shape = plate(10, 10, 32, 32, 1.0, NAFEMS)
     west, east, south, north = edges(shape)
     hard = [(west | east, (3, 4)), (south | north, (3, 5))]
     f = frequencies(held(shape, (flat(shape), EVERY_IN_PLANE), *hard), 4)
-    assert deviation(f, published["NAFEMS_R0016_T21"]["target_hz"][:4]) < 0.02
+    assert deviation(f, benchmarks()["NAFEMS_R0016_T21"]["target_hz"][:4]) < 0.02
 
 
-def test_vpcs_square_plates(published):
+def test_vpcs_square_plates():
     """SDLS01, two Ritz series: cantilever, and free (0.6 % high at the pair as in FV12)."""
-    entry = published["VPCS_SDLS01"]
+    entry = benchmarks()["VPCS_SDLS01"]
     shape = plate(1, 1, 24, 24, 0.01, VPCS)
     f = frequencies(held(shape, (edges(shape)[0], CLAMPED)), 6)
     assert deviation(f, entry["target_hz_case1"]) < 0.012
@@ -154,35 +137,35 @@ def test_vpcs_square_plates(published):
     assert deviation(f, entry["target_hz_case2"]) < 0.015
 
 
-def test_vpcs_rhombic_cantilever(published):
+def test_vpcs_rhombic_cantilever():
     """SDLS02, whose own tolerance is 1.5 %: sides 1 m, 30 degrees off the normal of the root."""
     shape = rhombus(1.0, 0.01, 24, 60, VPCS)
     root = np.isclose(shape.points[:, 1], 0)
     f = frequencies(held(shape, (root, CLAMPED)), 2)
-    assert deviation(f, published["VPCS_SDLS02"]["target_hz"]) < 0.015
+    assert deviation(f, benchmarks()["VPCS_SDLS02"]["target_hz"]) < 0.015
 
 
-def test_vpcs_rectangular_plate(published):
+def test_vpcs_rectangular_plate():
     """SDLS03: Navier's closed form."""
     shape = plate(1.5, 1.0, 36, 24, 0.01, VPCS)
     west, east, south, north = edges(shape)
     hard = [(west | east, (3, 4)), (south | north, (3, 5))]
     f = frequencies(held(shape, (flat(shape), EVERY_IN_PLANE), *hard), 6)
-    assert deviation(f, published["VPCS_SDLS03"]["target_hz"]) < 0.005
+    assert deviation(f, benchmarks()["VPCS_SDLS03"]["target_hz"]) < 0.005
 
 
-def test_vpcs_annular_plate_clamped_inside(published):
+def test_vpcs_annular_plate_clamped_inside():
     """SDLS04: Vogel and Skinner's factors, given to three digits."""
     shape = annulus(0.1, 0.2, 12, 72, 0.001, Isotropic(2e11, 0.3, 7800.0))
     root = np.isclose(np.linalg.norm(shape.points, axis=1), 0.1)
     f = frequencies(held(shape, (flat(shape), EVERY_IN_PLANE), (root, CLAMPED)), 30)
-    target = np.array(published["VPCS_SDLS04"]["target_hz"])
+    target = np.array(benchmarks()["VPCS_SDLS04"]["target_hz"])
     np.testing.assert_allclose(f[:7], target[:7], rtol=0.01)
     nearest = f[np.argmin(np.abs(f[:, None] - target[7:]), axis=0)]
     np.testing.assert_allclose(nearest, target[7:], rtol=0.01)
 
 
-def test_thin_ring_as_a_shell(published):
+def test_thin_ring_as_a_shell():
     """SDLS109: n = 2 of a thin ring; h/R = 0.13, so shear and rotary inertia take 1 %."""
     points, nodes = grid(np.linspace(0, 2 * np.pi, 73), np.linspace(0, 0.05, 5))
     phi, z = points[:, 0], points[:, 1]
@@ -190,11 +173,11 @@ def test_thin_ring_as_a_shell(published):
     points, nodes = merged(points, nodes, 1e-6)
     shape = sheet(points, nodes, 0.048, Isotropic(1.85e11, 0.3, 7800.0))
     f = frequencies(shape, 4, rigid=6)
-    target = published["SDLS109_ring"]["target_hz"][0]
+    target = benchmarks()["SDLS109_ring"]["target_hz"][0]
     assert min(abs(f / target - 1)) < 0.015
 
 
-def test_ring_of_beams(published):
+def test_ring_of_beams():
     """NAFEMS T6: solid round ring, R = 1 m, d = 0.1 m, thin-ring theory without shear."""
     n, d = 60, 0.1
     phi = np.arange(n) * 2 * np.pi / n
@@ -218,10 +201,10 @@ def test_ring_of_beams(published):
         ),
     )
     f = frequencies(ring, 10, rigid=6)
-    assert deviation(f, published["NAFEMS_T6_ring"]["target_hz"]) < 0.015
+    assert deviation(f, benchmarks()["NAFEMS_T6_ring"]["target_hz"]) < 0.015
 
 
-def test_plunkett_tapered_cantilever(published):
+def test_plunkett_tapered_cantilever():
     """A wedge of corner thicknesses against experiment, which scatters by 5 %.
 
     The deck the values come with tapers across the width, from nothing at y = 0 to I = 3.5101e-4
@@ -235,12 +218,12 @@ def test_plunkett_tapered_cantilever(published):
     shape = held(shape, (flat(shape), EVERY_IN_PLANE), (edges(shape)[0], CLAMPED))
     D = E * t_0**3 / 12 / (1 - nu**2)
     parameter = 2 * np.pi * frequencies(shape, 7) * a**2 * np.sqrt(rho * t_0 / D)
-    assert deviation(parameter, published["plunkett_tapered"]["experiment"][:7]) < 0.05
+    assert deviation(parameter, benchmarks()["plunkett_tapered"]["experiment"][:7]) < 0.05
 
 
-def test_plate_frf_against_closed_form(published):
+def test_plate_frf_against_closed_form():
     """Quarter of a plate under a cosine pressure: w = P / K (1 - f²/f₁₁²), Kirchhoff."""
-    entry = published["n95_plate_frf"]
+    entry = benchmarks()["n95_plate_frf"]
     shape = plate(10, 10, 20, 20, 2.0, Isotropic(3e7, 0.3, 0.0))
     section = replace(shape.parts[0].section, nonstructural=13.55715, rigid_shear=True)
     shape = replace(shape, parts=(replace(shape.parts[0], section=section),))

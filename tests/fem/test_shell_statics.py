@@ -4,34 +4,16 @@ Targets are read from ../shared/anchors; meshes are MacNeal and Harder's or fine
 tolerances are what good commercial quadrilaterals reach on the same meshes.
 """
 
-import json
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
+from tests.builders.published import benchmarks, held
 
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
 from chladni_specimens.plates import grid, merged, sheet
 
-FILE = Path(__file__).resolve().parents[2] / "../shared/anchors/benchmarks.json"
 ALL = (1, 2, 3, 4, 5, 6)
-
-
-@pytest.fixture(scope="module")
-def published():
-    if not FILE.exists():
-        pytest.skip(f"no reference values at {FILE}")
-    return {entry["id"]: entry for entry in json.loads(FILE.read_text())["benchmarks"]}
-
-
-def held(assembly, *groups):
-    supports = [
-        [row, c] for mask, components in groups for row in np.flatnonzero(mask) for c in components
-    ]
-    return replace(assembly, supports=np.unique(supports, axis=0))
 
 
 def deflection(assembly, forces, **options):
@@ -65,7 +47,7 @@ def ends(line):
 
 
 @pytest.mark.parametrize(("n", "tolerance"), [(8, 0.03), (24, 0.012)])
-def test_scordelis_lo_roof(published, n, tolerance):
+def test_scordelis_lo_roof(n, tolerance):
     """Quarter of the roof; deep-shell theory converges to 0.3006 to 0.3019."""
     points, nodes = grid(np.linspace(0, 25, n + 1), np.linspace(0, 40, n + 1))
     x, phi = points[:, 0], np.deg2rad(points[:, 1])
@@ -75,12 +57,12 @@ def test_scordelis_lo_roof(published, n, tolerance):
     roof = held(roof, (wall, (2, 3)), (middle, (1, 5, 6)), (crown, (2, 4, 6)))
     u = deflection(roof, weight(roof, 90.0))
     assert -u[free & middle, 2][0] == pytest.approx(
-        published["MH_scordelis_lo"]["target"], rel=tolerance
+        benchmarks()["MH_scordelis_lo"]["target"], rel=tolerance
     )
 
 
 @pytest.mark.parametrize(("n_x", "n_y"), [(12, 2), (36, 6)])
-def test_twisted_beam(published, n_x, n_y):
+def test_twisted_beam(n_x, n_y):
     """All elements are warped; too little drilling stiffness softens it without bound."""
     points, nodes = grid(np.linspace(0, 12, n_x + 1), np.linspace(-0.55, 0.55, n_y + 1))
     x, s = points[:, 0], points[:, 1]
@@ -88,16 +70,16 @@ def test_twisted_beam(published, n_x, n_y):
     points = np.column_stack([x, s * np.cos(turn), s * np.sin(turn)])
     root, tip = ends(x)
     beam = held(sheet(points, nodes, 0.32, Isotropic(29e6, 0.22)), (root, ALL))
-    target = published["MH_twisted_beam"]["target"]
+    target = benchmarks()["MH_twisted_beam"]["target"]
     for k, name in ((1, "along root-wide direction"), (2, "along root-thin direction")):
         force = np.eye(3)[k]
         u = deflection(beam, nodal(beam, (tip, force)))
         assert u[tip, k].mean() == pytest.approx(target[name], rel=0.02)
 
 
-def test_curved_beam(published):
+def test_curved_beam():
     """Radii 4.12 and 4.32, quarter circle; 6 x 1 is MacNeal-Harder's mesh, 48 x 4 converged."""
-    target = published["MH_curved_beam"]["target"]
+    target = benchmarks()["MH_curved_beam"]["target"]
     for n, m, tolerance in ((6, 1, 0.13), (48, 4, 0.02)):
         points, nodes = grid(np.linspace(np.pi / 2, 0, n + 1), np.linspace(4.12, 4.32, m + 1))
         phi, r = points[:, 0], points[:, 1]
@@ -110,7 +92,7 @@ def test_curved_beam(published):
 
 
 @pytest.mark.parametrize(("n", "tolerance"), [(8, 0.03), (16, 0.015)])
-def test_hemisphere_with_a_hole(published, n, tolerance):
+def test_hemisphere_with_a_hole(n, tolerance):
     """Quarter with 18 degrees hole, unit loads at the equator; converges to 0.0934."""
     points, nodes = grid(np.linspace(0, 90, n + 1), np.linspace(0, 72, n + 1))
     lon, lat = np.deg2rad(points[:, :2]).T
@@ -124,7 +106,7 @@ def test_hemisphere_with_a_hole(published, n, tolerance):
     dome = held(dome, (at_x, (2, 4, 6)), (at_y, (1, 5, 6)), (one, (3,)))
     F = nodal(dome, (one, (1, 0, 0)), (equator & at_y, (0, -1, 0)))
     u = deflection(dome, F)
-    assert u[one, 0][0] == pytest.approx(published["MH_hemisphere18"]["target"], rel=tolerance)
+    assert u[one, 0][0] == pytest.approx(benchmarks()["MH_hemisphere18"]["target"], rel=tolerance)
 
 
 @pytest.mark.parametrize("shape", ["rectangle", "parallelogram"])

@@ -31,3 +31,11 @@ def responses(reduced):
         reduced.model, [calibration_parameter(reduced.groups, "E", [0])], np.array([0.04])
     )
     return replace(empty, values=empty.model(stiffer))
+
+
+@pytest.fixture(scope="session")
+def damped(reduced, responses):
+    """The places of the recording at 24 lines, 8 % damping; E and rho free."""
+    s = 2 * np.pi * np.linspace(25, TOP, 24) * (0.08 + 1j)
+    empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
+    return empty, [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho")]

@@ -3,11 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import binom, kstest
 
-from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect
 from chladni.updating.adequacy import _drawn, _Linear, adequacy, at_least, of_poles, ranked
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
@@ -18,26 +16,14 @@ from chladni.updating.reduced_model import State, evaluate
 SCALES = MassMeasurement(1.413, 1.4e-3)
 
 
-@pytest.fixture(scope="module")
-def seen(reduced, responses):
-    """A plate seen with 8 % damping, and E and rho free."""
-    s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
-    empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
-    effects = [
-        calibration_parameter(reduced.groups, "E", [0]),
-        calibration_parameter(reduced.groups, "rho", [0]),
-    ]
-    return empty, effects
-
-
 def answered(reduced, data, effects):
     state = evaluate(reduced.model, effects, np.zeros(2))
     fit = fitted(reduced.model, effects, data.allowing_errors(state), SCALES, np.zeros(2))
     return adequacy(HypothesisFit(Effect(), fit, reduced.model), SCALES, tuple("abcd"), 100)
 
 
-def test_draws_of_the_model_itself_have_uniform_p(reduced, seen):
-    data, effects = seen
+def test_draws_of_the_model_itself_have_uniform_p(reduced, damped):
+    data, effects = damped
     state = evaluate(reduced.model, effects, np.zeros(2))
     data = replace(data, values=data.model(state)).allowing_errors(state)
     _, J = data.scaled(state, True)
@@ -49,14 +35,14 @@ def test_draws_of_the_model_itself_have_uniform_p(reduced, seen):
     assert kstest(p, "uniform").statistic < 1.63 * np.sqrt(2 / 300)  # 1 %, both samples random
 
 
-def test_a_model_that_is_right_fits(reduced, seen):
-    data, effects = seen
+def test_a_model_that_is_right_fits(reduced, damped):
+    data, effects = damped
     truth = evaluate(reduced.model, effects, np.array([0.03, 0.0]))
     assert answered(reduced, replace(data, values=data.model(truth)), effects).passes
 
 
-def test_a_channel_of_another_structure_does_not_fit_and_is_named(reduced, seen):
-    data, effects = seen
+def test_a_channel_of_another_structure_does_not_fit_and_is_named(reduced, damped):
+    data, effects = damped
     H = data.model(evaluate(reduced.model, effects, np.zeros(2)))
     H[:, 2] *= np.exp(2j * np.sin(np.arange(24)))[:, None]
     found = answered(reduced, replace(data, values=H), effects)
@@ -64,8 +50,8 @@ def test_a_channel_of_another_structure_does_not_fit_and_is_named(reduced, seen)
     assert found.where.endswith("on c")
 
 
-def test_without_errors_of_form_there_is_nothing_to_test(reduced, seen):
-    data, effects = seen
+def test_without_errors_of_form_there_is_nothing_to_test(reduced, damped):
+    data, effects = damped
     data = replace(data, values=data.model(evaluate(reduced.model, effects, np.zeros(2))))
     fit = fitted(reduced.model, effects, data, SCALES, np.zeros(2))
     assert adequacy(HypothesisFit(Effect(), fit, reduced.model), SCALES, ()) is None

@@ -32,45 +32,53 @@ def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effec
     assert basis_refinement.refined(None, prepared, begun).hypothesis.structure == structure
 
 
-def a_hypothesis():
-    data = SimpleNamespace(rebased=lambda model: model)
-    fit = SimpleNamespace(effects=(), x=np.zeros(0), data=data)
-    return HypothesisFit(Effect(), fit, "narrow")
+PREPARED = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
+FIT = SimpleNamespace(effects=(), x=np.zeros(0), data=SimpleNamespace(rebased=lambda model: model))
+NARROW = HypothesisFit(Effect(), FIT, "narrow")
+
+
+@pytest.fixture
+def errors(monkeypatch):
+    """Set the errors that are measured one after the other; the fits made in between."""
+    fits = []
+    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
+    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: fits.append(given) or FIT)
+
+    def measured(*values):
+        left = iter(values)
+        monkeypatch.setattr(
+            basis_refinement, "_accuracy",
+            lambda *given: Accuracy(np.ones(1), np.array([next(left)]), np.zeros((3, 1))),
+        )  # fmt: skip
+        return fits
+
+    return measured
 
 
 @pytest.mark.parametrize(("error", "model"), [(4e-4, "narrow"), (2e-3, "wide")])
-def test_is_fitted_again_only_beyond_the_limit(monkeypatch, error, model):
+def test_is_fitted_again_only_beyond_the_limit(errors, error, model):
     """0.05 % is the limit: under it the hypothesis stays, above it a wider basis carries it."""
-    found = Accuracy(np.array([10.0]), np.array([error]), np.zeros((3, 1)))
-    monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: found)
-    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
-    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: a_hypothesis().fit)
-    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
-    done = basis_refinement.refined(None, prepared, a_hypothesis())
+    errors(error, error, error, error)
+    done = basis_refinement.refined(None, PREPARED, NARROW)
     assert done.hypothesis.model == model
     assert f"{error:.2%}" in done.note
     assert bool(done.distrust) == (model == "wide")
 
 
-def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(monkeypatch, reduced):
+def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(errors, monkeypatch, reduced):
     """They are not fitted again; their state is that of the wider model."""
-    errors = iter([2e-3, 2e-4])
-    monkeypatch.setattr(
-        basis_refinement, "_accuracy",
-        lambda *given: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
-    )  # fmt: skip
-    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: pytest.fail("fitted again"))
+    fits = errors(2e-3, 2e-4)
     E = calibration_parameter(reduced.groups, "E", [0])
-    fits = fit(reduced.model, [E], Still(), None, np.array([0.1]), max_steps=0)
+    own = fit(reduced.model, [E], Still(), None, np.array([0.1]), max_steps=0)
     wide = reduced.model.with_components()
     monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: wide)
-    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
-    begun = HypothesisFit(Effect(), fits, reduced.model)
-    done = basis_refinement.refined(None, prepared, begun, held=True).hypothesis
+    begun = HypothesisFit(Effect(), own, reduced.model)
+    done = basis_refinement.refined(None, PREPARED, begun, held=True).hypothesis
+    assert fits == []
     assert done.model is wide
     assert done.fit.x == pytest.approx([0.1])
-    assert done.fit.state is not fits.state
-    assert done.fit.state.lam[6:] == pytest.approx(fits.state.lam[6:])
+    assert done.fit.state is not own.state
+    assert done.fit.state.lam[6:] == pytest.approx(own.state.lam[6:])
 
 
 class Still:
@@ -83,36 +91,24 @@ class Still:
         return np.zeros(1), np.zeros((1, 1))
 
 
-def test_is_widened_until_it_serves(monkeypatch):
+def test_is_widened_until_it_serves(errors):
     """Two times too narrow, then wide enough: fitted twice, and trusted."""
-    errors = iter([2e-2, 2e-3, 2e-4])
-    fits = []
-    monkeypatch.setattr(
-        basis_refinement, "_accuracy",
-        lambda *given: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
-    )  # fmt: skip
-    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
-    kept = a_hypothesis().fit
-    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: fits.append(given) or kept)
-    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
-    done = basis_refinement.refined(None, prepared, a_hypothesis())
+    fits = errors(2e-2, 2e-3, 2e-4)
+    done = basis_refinement.refined(None, PREPARED, NARROW)
     assert len(fits) == 2
     assert done.worst == 2e-4
     assert done.distrust == ()
 
 
-def test_a_basis_that_bears_the_fit_no_longer_is_said_and_not_trusted(monkeypatch):
+def test_a_basis_that_bears_the_fit_no_longer_is_said_and_not_trusted(errors, monkeypatch):
     """What the narrow basis could not feel may be negative stiffness: no crash, no trust."""
-    found = Accuracy(np.array([10.0]), np.array([2e-2]), np.zeros((3, 1)))
-    monkeypatch.setattr(basis_refinement, "_accuracy", lambda *given: found)
-    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
+    errors(2e-2)
 
     def refuse(*given):
         raise ModelError("an effect left negative stiffness")
 
     monkeypatch.setattr(basis_refinement, "fitted", refuse)
-    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
-    done = basis_refinement.refined(None, prepared, a_hypothesis())
+    done = basis_refinement.refined(None, PREPARED, NARROW)
     assert done.hypothesis.model == "narrow"
     assert "negative stiffness" in done.note
     assert done.distrust

@@ -27,7 +27,7 @@ def light(rng):
     return np.diag(2 * 0.006 * OMEGA * np.exp(0.3 * rng.normal(size=MODES)))
 
 
-def held_out_votes(B, seed):
+def screened(B, seed):
     coupling = mode_coupling(identify(recorded(B, seed)), 15.0, 120.0)
     assert coupling is not None
     return coupling.tested()
@@ -55,13 +55,13 @@ def rotor(rng):
 @pytest.mark.parametrize("kind", [damper, layer])
 def test_damping_wherever_it_is_explains_what_it_makes(kind, seed):
     rng = np.random.default_rng(seed)
-    assert held_out_votes(light(rng) + kind(rng), seed)[0] > 0.05
+    assert screened(light(rng) + kind(rng), seed)[0] > 0.05
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_spins_is_heard(seed):
+def test_a_rotor_is_recognised_by_its_complex_modes(seed):
     rng = np.random.default_rng(seed)
-    p, row, what, modes = held_out_votes(light(rng) + rotor(rng), seed)
+    p, row, what, modes = screened(light(rng) + rotor(rng), seed)
     assert p < 0.01
     assert "damping" in what
     assert len(modes)
@@ -69,7 +69,7 @@ def test_what_spins_is_heard(seed):
 
 
 def test_modes_that_are_real_are_silent():
-    p, row, _, _ = held_out_votes(light(np.random.default_rng(5)), 5)
+    p, row, _, _ = screened(light(np.random.default_rng(5)), 5)
     assert p == 1.0
     assert row.value == 0
 

@@ -16,14 +16,9 @@ from chladni.updating.reduced_model import evaluate
 
 
 @pytest.fixture(scope="module")
-def softer(reduced, responses):
-    """The recording, at 8 % damping, seen from a model that is nearly right."""
-    s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
-    empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
-    effects = [
-        calibration_parameter(reduced.groups, "E", [0]),
-        calibration_parameter(reduced.groups, "rho", [0]),
-    ]
+def softer(reduced, damped):
+    """The recording seen from a model that is nearly right."""
+    empty, effects = damped
     truth = evaluate(reduced.model, effects, np.array([0.01, 0.005]))
     return replace(empty, values=empty.model(truth)), effects
 

@@ -77,10 +77,10 @@ def test_a_fault_is_heard_on_the_lines_held_out(faulty):
     data, null, fault = faulty
     unseen = np.zeros_like(data.use)
     unseen[HELD] = True
-    held_out_votes = held_out_evidence(search_of(data), unseen, null, fault)
-    assert held_out_votes.held_out > 10
-    assert held_out_votes.lines > 10
-    assert held_out_votes.sensors is None
+    evidence = held_out_evidence(search_of(data), unseen, null, fault)
+    assert evidence.held_out > 10
+    assert evidence.lines > 10
+    assert evidence.sensors is None
 
 
 def test_data_that_cannot_feel_it_do_not_speak_against_it(faulty):
@@ -93,15 +93,15 @@ def test_data_that_cannot_feel_it_do_not_speak_against_it(faulty):
 
 def test_what_does_nothing_changes_no_prediction(faulty):
     data, null, _ = faulty
-    held_out_votes = held_out_evidence(search_of(data), ~data.use, null, null)
-    assert_allclose(list(held_out_votes.votes.values()), 0.0, atol=1e-9)
+    evidence = held_out_evidence(search_of(data), ~data.use, null, null)
+    assert_allclose(list(evidence.votes.values()), 0.0, atol=1e-9)
 
 
 def test_nothing_held_out_is_not_asked(faulty):
     data, null, fault = faulty
-    held_out_votes = held_out_evidence(search_of(data), np.zeros_like(data.use), null, fault)
-    assert held_out_votes.held_out is None
-    assert "the data held out" not in held_out_votes.votes
+    evidence = held_out_evidence(search_of(data), np.zeros_like(data.use), null, fault)
+    assert evidence.held_out is None
+    assert "the data held out" not in evidence.votes
 
 
 def test_an_effect_that_is_none_is_not_borne_out(reduced, faulty):
@@ -109,5 +109,5 @@ def test_an_effect_that_is_none_is_not_borne_out(reduced, faulty):
     data, null, _ = faulty
     E = calibration_parameter(reduced.groups, "E", [0])
     wrong = fit_of(reduced, data, [E, sensor_fault("a", 0, 4, 1, 0.0)], [0.0, 0.0])
-    held_out_votes = held_out_evidence(search_of(data), ~data.use, null, wrong)
-    assert held_out_votes.lines < 5
+    evidence = held_out_evidence(search_of(data), ~data.use, null, wrong)
+    assert evidence.lines < 5

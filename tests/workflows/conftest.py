@@ -1,45 +1,14 @@
-"""A small case: a plate with a mass in one corner, recorded on the model's own responses."""
+"""The small case of all workflows, and what they find in it, once a session."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.cases import SENSORS, write_case
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.points import with_masses
 from chladni.fem import modelled as fem_modelled
-from chladni.io.nastran import write_assembly
-from chladni.io.tables.write_tables import write_npz
-from chladni_specimens.plates import plate
-
-SENSORS = (2, 4, 7, 18, 30, 43)
-CASE = """
-[model]
-deck = "plate.bdf"
-units = "SI"
-damping = 0.01
-[test]
-recordings = ["frf.npz"]
-mass = {mass}
-[band]
-fit = [20.0, {top}]
-"""
-
-
-def write_case(folder, shells, sensors, frequency, top):
-    """A plate of so many shells a side with a mass on its last corner, which the deck lacks.
-
-    No two modes of the plate are alike, and none has a node at the shaker.
-    """
-    deck, corner = plate(0.3, 0.22, shells, shells, 1e-3), (shells + 1) ** 2
-    write_assembly(deck, folder / "plate.bdf")
-    write_assembly(with_masses(deck, (corner,), 0.02), folder / "article.bdf")
-    article = chladni.load(folder / "article.bdf", "SI")
-    made = chladni.frf(article, [f"{g}:+Z" for g in sensors], ["2:+Z"], frequency).frfs[0]
-    write_npz(folder / "frf.npz", made.to("accelerance"))
-    mass = round(chladni.modes(article, 7).mass, 5)
-    (folder / "case.toml").write_text(CASE.format(mass=mass, top=top))
 
 
 @pytest.fixture(scope="session")

@@ -5,11 +5,10 @@ import shutil
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran, refused
 
 import chladni
 from chladni.case.schema import SCHEMA
-from chladni.cli.app import application
 from chladni.io.package_files import mesh_path
 from chladni.workflows.question_of_case import prepared
 from chladni_bench.bench_folder import RENEWED
@@ -18,10 +17,7 @@ QUICK = ("--resolution", "1", "--averages", "2", "--exact")
 
 
 def bench(source, out, *words):
-    done = CliRunner().invoke(
-        application(), ["bench", str(source), *QUICK, *words, "--out", str(out)]
-    )
-    assert done.exit_code == 0, (done.output, done.exception)
+    ran("bench", source, *QUICK, *words, "--out", out)
     return chladni.load_case(out / "case")
 
 
@@ -48,13 +44,10 @@ BARE = ("--units", "mm-t-s", "--allow", "GENEL")
 @pytest.mark.parametrize(
     "words",
     [
-        (),
-        ("--band", "20:90"),
-        ("--excitation", "stepped-sine", "--sweeps", "1"),
+        ("--band", "20:90", "--excitation", "stepped-sine", "--sweeps", "1"),
         ("--excitation", "hammer"),
         ("--excitation", "multisine", "--levels", "1,2", "--articles", "2"),
-        ("--room", "0.001", "--rubber", "--time"),
-        ("--finer", "--hide", "point-mass"),
+        ("--room", "0.001", "--rubber", "--time", "--finer", "--hide", "point-mass"),
     ],
     ids=" ".join,
 )
@@ -117,7 +110,4 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
 
 def test_a_recording_of_too_few_lines_is_refused_before_it_is_made(demo, tmp_path):
     words = ["bench", str(demo), "--band", "20:21", "--resolution", "0.5"]
-    done = CliRunner().invoke(application(), [*words, "--out", str(tmp_path / "o")])
-    assert done.exit_code == 2
-    assert "3 lines between 20 and 21 Hz are too few" in done.output
-    assert not (tmp_path / "o").exists()
+    assert "3 lines between 20 and 21 Hz are too few" in refused(*words, "--out", tmp_path / "o")

@@ -7,20 +7,14 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran
 
 import chladni
-from chladni.cli.app import application
-from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.check_page import check_page
 from chladni.report.result_json import to_json
 from chladni.workflows.case_check import CaseFinding
 from chladni.workflows.unit_check import refuse_other_units
-
-
-def call(*arguments):
-    return CliRunner().invoke(application(), [str(a) for a in arguments])
 
 
 @pytest.fixture
@@ -47,8 +41,7 @@ def test_a_good_case_is_not_blamed(case):
 
 def test_what_the_command_writes(copied, tmp_path):
     out = tmp_path / "out"
-    done = call("check", copied, "--out", out)
-    assert done.exit_code == 0, (done.output, done.exception)
+    done = ran("check", copied, "--out", out)
     assert "Nothing looks wrong" in done.output
     case = chladni.load_case(copied)
     assert json.loads((out / "check.json").read_text()) == plain(to_json(chladni.check(case)))
@@ -58,27 +51,16 @@ def test_what_the_command_writes(copied, tmp_path):
         assert word in page
 
 
-@pytest.mark.parametrize(
-    ("faults", "rest", "said"),
-    [
+def test_the_page_counts_what_it_found(case, tmp_path):
+    checked = chladni.check(replace(case, recordings=()))
+    for faults, rest, said in (
         (1, 0, "1 thing is to be corrected first."),
         (2, 1, "2 things are to be corrected first, 1 thing is to be checked."),
         (0, 2, "2 things are to be checked."),
         (0, 0, "Nothing looks wrong with the case."),
-    ],
-)
-def test_the_page_counts_what_it_found(case, tmp_path, faults, rest, said):
-    found = [CaseFinding("a", "b", True)] * faults + [CaseFinding("c", "d")] * rest
-    checked = replace(chladni.check(replace(case, recordings=())), findings=tuple(found))
-    assert check_page(tmp_path, case, checked).lead == said
-
-
-@pytest.mark.parametrize("command", ["diagnose", "calibrate", "correlate"])
-def test_a_case_without_a_recording_is_told_where_to_name_one(copied, tmp_path, command):
-    rewritten(copied, 'recordings = ["frf.npz"]\n', "")
-    done = call(command, copied, "--out", tmp_path / "x")
-    assert done.exit_code == 2, (done.output, done.exception)
-    assert "has no recording to compare with the model; give it as recordings = [" in done.stderr
+    ):
+        found = (CaseFinding("a", "b", True),) * faults + (CaseFinding("c", "d"),) * rest
+        assert check_page(tmp_path, case, replace(checked, findings=found)).lead == said
 
 
 def test_words_nobody_reads_are_told_by_command(copied):
@@ -89,8 +71,6 @@ def test_words_nobody_reads_are_told_by_command(copied):
 
 
 FAULTS = {  # how a case is spoilt: what must be said
-    "millimetres declared SI": ('units = "SI"', 'units = "mm-t-s"', 'set units = "SI"'),
-    "milliseconds": ('units = "SI"', 'units = "mm-kg-ms"', 'set units = "SI"'),
     "grams": ("mass = 0.", "mass = 1", "is in kg"),
     "kilohertz": ("fit = [20.0, 170.0]", "fit = [15.0, 16.0]", "the band ends at 16 Hz"),
 }
@@ -104,23 +84,10 @@ def test_what_cannot_be_right_is_exit_3_and_said(copied, tmp_path, spoilt):
         mass = next(line for line in text.splitlines() if line.startswith("mass"))
         old, new = mass, f"mass = {1e3 * float(mass.split('=')[1]):.4g}"
     rewritten(copied, old, new)
-    done = call("check", copied, "--out", tmp_path / "out")
-    assert done.exit_code == 3, (done.output, done.exception)
+    done = ran("check", copied, "--out", tmp_path / "out", code=3)
     assert said in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert "Fault" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("command", ["correlate", "calibrate", "diagnose"])
-def test_a_deck_of_no_material_is_refused_though_nothing_was_weighed(copied, tmp_path, command):
-    """Its mass in mm-kg-s would be right: kilograms in either; its modulus is not."""
-    text = (copied / "case.toml").read_text().splitlines()
-    kept = [line for line in text if not line.startswith("mass")]
-    (copied / "case.toml").write_text("\n".join(kept).replace('units = "SI"', 'units = "mm-t-s"'))
-    done = call(command, copied, "--out", tmp_path / "out")
-    assert done.exit_code == 2, (done.output, done.exception)
-    assert 'set units = "SI" in [model], not mm-t-s' in done.stderr
-    assert not (tmp_path / "out").exists()
 
 
 def test_an_odd_material_is_the_users_own(case):
@@ -157,31 +124,6 @@ def test_places_off_the_mesh_and_double_ones(copied):
     assert np.isclose(max(d.off_mesh_m for d in found.dofs), 0.009)
 
 
-@pytest.fixture(scope="module")
-def along_x(folder, tmp_path_factory):
-    """Nine sensors that measured along Z; their table says X."""
-    place = tmp_path_factory.mktemp("axes")
-    shutil.copy(folder / "plate.bdf", place)
-    article = chladni.load(folder / "article.bdf", "SI")
-    ends = [f"{g}:+Z" for g in (2, 4, 7, 18, 24, 30, 36, 43, 47)]
-    made = chladni.frf(article, ends, ["2:+Z"], np.linspace(15, 250, 1200)).frfs[0]
-    write_npz(place / "frf.npz", made.to("accelerance"))
-    rows = [f"{label},{label.partition(':')[0]},+X,output" for label in ends]
-    (place / "sensors.csv").write_text("\n".join(["label,grid,direction,role", *rows, ""]))
-    text = (folder / "case.toml").read_text().replace("[20.0, 170.0]", "[20.0, 240.0]")
-    (place / "case.toml").write_text(text.replace("[band]", 'sensors = "sensors.csv"\n[band]'))
-    return place
-
-
-@pytest.mark.parametrize("command", ["check", "correlate", "calibrate", "diagnose"])
-def test_sensors_declared_along_another_axis_are_told(along_x, tmp_path, command):
-    done = call(command, along_x, "--out", tmp_path / "out")
-    assert done.exit_code == (3 if command == "check" else 2), (done.output, done.exception)
-    assert "declared along X" in done.stderr
-    assert "shapes along Z" in done.stderr
-    assert (tmp_path / "out").exists() == (command == "check")
-
-
 def test_only_axes_that_differ_are_spoken_of():
     """Half along X that are along Z, half along Y as declared."""
     said = import_module("chladni.workflows.axes_check")._where_declared
@@ -191,14 +133,6 @@ def test_only_axes_that_differ_are_spoken_of():
         said(ways, -ways[:, [1, 0, 2]])
         == "along Y where X is declared, along X where Y is declared"
     )
-
-
-def test_sensors_declared_as_they_are_pass(along_x, tmp_path):
-    place = tmp_path / "case"
-    shutil.copytree(along_x, place)
-    (place / "sensors.csv").write_text((along_x / "sensors.csv").read_text().replace("+X", "+Z"))
-    assert not chladni.check(chladni.load_case(place)).faults
-    assert len(chladni.correlate(chladni.load_case(place)).pairs) > 3
 
 
 def test_a_dead_channel_is_named(copied):

@@ -5,10 +5,10 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import call, ran
 
 import chladni
-from chladni.cli.app import application, commands
+from chladni.cli.app import commands
 from chladni.output import plain
 from chladni.report.diagnosis_json import read_diagnosis
 from chladni.report.result_json import to_json
@@ -37,7 +37,7 @@ WORKFLOW = {  # command: the function it calls
 
 
 def written(command, name, folder, out, *options, code=0):
-    done = CliRunner().invoke(application(), [command, str(folder), *options, "--out", str(out)])
+    done = call(command, folder, *options, "--out", out)
     assert done.exit_code == code, (done.output, done.exception)
     return json.loads((out / name).read_text())
 
@@ -97,8 +97,16 @@ def test_json_of_a_calibration_is_the_result_of_its_function(calibrated, folder,
     assert read_diagnosis(tmp_path / "out").study == calibrated.study
 
 
-def test_json_of_a_diagnosis_is_the_result_of_its_function(diagnosed, folder, tmp_path):
+def test_json_of_a_diagnosis_is_the_result_of_its_function(
+    case, diagnosed, folder, tmp_path, monkeypatch
+):
+    """The command hands its case to the function and writes what comes back."""
+    given = []
+    monkeypatch.setattr(
+        "chladni.cli.diagnose.diagnose", lambda case, progress: given.append(case) or diagnosed
+    )
     found = written("diagnose", "diagnosis.json", folder, tmp_path / "out")
+    assert [one.path for one in given] == [case.path]
     assert found.pop("files") == {
         "deck": "updated.bdf",
         "calibrated": "calibrated.bdf",
@@ -112,8 +120,7 @@ def test_json_of_a_diagnosis_is_the_result_of_its_function(diagnosed, folder, tm
 
 def test_arrays_of_frf_are_the_result_of_its_function(case, folder, tmp_path):
     out = tmp_path / "out"
-    done = CliRunner().invoke(application(), ["frf", str(folder), "--out", str(out)])
-    assert done.exit_code == 0, done.output
+    ran("frf", folder, "--out", out)
     (due,) = chladni.frf(case).frfs
     with np.load(out / "frf.npz", allow_pickle=False) as held:
         np.testing.assert_array_equal(held["values"], due.to("accelerance").values)

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
+from tests.builders.commands import call, ran, refused
 
 import chladni
 from chladni.case.mapped_thickness import formed_thickness
-from chladni.cli.app import application
 from chladni.errors import ChladniError
 from chladni.geometry.formed_mesh import FormedMesh
 from chladni.geometry.thickness_mapping import shell_mass
@@ -36,10 +35,6 @@ def formed_of(assembly, t=field):
     return FormedMesh(assembly.ids, points, nodes, number, t(points)[nodes], names)
 
 
-def call(*words):
-    return CliRunner().invoke(application(), [str(w) for w in words])
-
-
 @pytest.fixture
 def deck(tmp_path):
     return write_assembly(plate(*SIZE, 6, 6, T), tmp_path / "plate.bdf", "mm-t-s")
@@ -54,8 +49,7 @@ def formed(tmp_path):
 def test_a_linear_field_comes_through(deck, formed, tmp_path):
     """Gauss points carry a linear field exactly: the mass is ρ ∫ t dA, whatever the meshes."""
     out = tmp_path / "out"
-    done = call("map", deck, formed, "--units", "mm-t-s", "--out", out)
-    assert done.exit_code == 0, done.output
+    ran("map", deck, formed, "--units", "mm-t-s", "--out", out)
     after = chladni.load(out / "mapped.bdf", "mm-t-s").assembly
     rho = after.parts[0].section.membrane.rho
     mean = field(np.array([[SIZE[0] / 2, SIZE[1] / 2, 0.0]]))[0]
@@ -74,11 +68,10 @@ def test_a_file_that_lies_elsewhere_is_brought_or_refused(deck, tmp_path):
     away = write_keyword(
         tmp_path / "away.k", replace(made, points=made.points @ turn.T + [1, 2, 3]), "mm-t-s"
     )
-    done = call("map", deck, away, "--units", "mm-t-s", "--out", tmp_path / "out")
-    assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
-    assert "move it onto the deck" in done.output
-    done = call("map", deck, away, "--units", "mm-t-s", "--align", "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
+    assert "move it onto the deck" in refused(
+        "map", deck, away, "--units", "mm-t-s", "--out", tmp_path / "out"
+    )
+    ran("map", deck, away, "--units", "mm-t-s", "--align", "--out", tmp_path / "out")
     (part,) = json.loads((tmp_path / "out" / "mapping.json").read_text())["parts"]
     assert part["coverage"] > 0.99
 
@@ -174,8 +167,7 @@ def test_a_missing_part_thins_as_its_curvature_lets_expect(tmp_path):
         nodal=np.zeros(0),
     )  # fmt: skip
     path = write_keyword(tmp_path / "three.k", some, "mm-t-s")
-    done = call("map", deck, path, "--units", "mm-t-s", "--guess", "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
+    ran("map", deck, path, "--units", "mm-t-s", "--guess", "--out", tmp_path / "out")
     after = chladni.load(tmp_path / "out" / "mapped.bdf", "mm-t-s").assembly
     inside = np.abs(after.points[after.shells.nodes].mean(axis=1)[:, 1] - 3.075) < 0.04
     guessed = after.thickness()[inside & (after.shells.part == 3)]
@@ -237,6 +229,4 @@ def test_words_about_thickness_are_refused_by_a_sentence(folder, tmp_path, line,
     ],
 )
 def test_what_cannot_be_mapped_is_told(deck, formed, tmp_path, words, told):
-    done = call("map", deck, tmp_path / words[0], *words[1:], "--out", tmp_path / "out")
-    assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
-    assert told in done.output
+    assert told in refused("map", deck, tmp_path / words[0], *words[1:], "--out", tmp_path / "out")

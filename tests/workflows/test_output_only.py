@@ -32,11 +32,11 @@ def ambient(case):
         q = lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], force)
         y += np.outer(phi[:, k] * drive[0, k], q)
     t = np.arange(n) / RATE
-    held_out_votes = tuple(
+    channels = tuple(
         Function("time", f"{g}:+Z", "", t, row, "m/s^2")
         for (g, _), row in zip(ends, y, strict=True)
     )
-    recording = Recording("ambient.uff", functions=held_out_votes)
+    recording = Recording("ambient.uff", functions=channels)
     mass = replace(case.setup, mass=None)
     return replace(case, recordings=(recording,), setup=mass, notes=())
 
@@ -72,13 +72,11 @@ def test_poles_of_free_decays_are_identified(ambient):
         [np.exp(-zeta * 2 * np.pi * g * t) * np.sin(2 * np.pi * g * t) for g in f]
     )
     rows = rows + 0.002 * np.random.default_rng(3).normal(size=rows.shape)
-    held_out_votes = tuple(
+    channels = tuple(
         Function("time", label, "", t, row, "m/s^2")
         for label, row in zip(("2:+Z", "7:+Z"), rows, strict=True)
     )
-    case = replace(
-        ambient, recordings=(Recording("ring.csv", functions=held_out_votes),), band=(20, 150)
-    )
+    case = replace(ambient, recordings=(Recording("ring.csv", functions=channels),), band=(20, 150))
     found = chladni.identify(case)
     (one,) = found.recordings
     np.testing.assert_allclose(one.poles.frequency, f, rtol=1e-4)
@@ -91,19 +89,17 @@ def test_noise_has_no_natural_frequencies(ambient):
     """White noise on every sensor: one sentence, no table."""
     case = ambient
     rng = np.random.default_rng(1)
-    (held_out_votes,) = case.recordings
-    hiss = tuple(replace(g, values=rng.normal(size=len(g.x))) for g in held_out_votes.functions)
+    (channels,) = case.recordings
+    hiss = tuple(replace(g, values=rng.normal(size=len(g.x))) for g in channels.functions)
     with pytest.raises(FileError, match=r"ambient.uff: no natural frequency is above the noise"):
-        chladni.calibrate(replace(case, recordings=(replace(held_out_votes, functions=hiss),)))
+        chladni.calibrate(replace(case, recordings=(replace(channels, functions=hiss),)))
 
 
 def test_records_that_are_no_use_are_refused_in_a_sentence(ambient):
     """A force beside the responses, and no FRF: nothing is compared with anything."""
-    (held_out_votes,) = ambient.recordings
-    force = replace(held_out_votes.functions[0], unit="N")
-    odd = replace(
-        ambient, recordings=(replace(held_out_votes, functions=(*held_out_votes.functions, force)),)
-    )
+    (channels,) = ambient.recordings
+    force = replace(channels.functions[0], unit="N")
+    odd = replace(ambient, recordings=(replace(channels, functions=(*channels.functions, force)),))
     for workflow in (chladni.correlate, chladni.calibrate, chladni.diagnose):
         with pytest.raises(FileError, match="neither FRFs nor a table of poles"):
             workflow(odd)

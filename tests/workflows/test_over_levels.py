@@ -8,10 +8,9 @@ from typing import cast
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import call, ran, refused
 
 import chladni
-from chladni.cli.app import application
 from chladni.dynamics.frf import FRF
 from chladni.ema.describing_functions import micro_slip
 from chladni.fem.energy import part_energies
@@ -89,7 +88,7 @@ def folder(tmp_path_factory):
 def run(folder):
     """The command itself, and what it wrote."""
     out = folder / "out"
-    done = CliRunner().invoke(application(), ["diagnose", str(folder), "--out", str(out)])
+    done = call("diagnose", folder, "--out", out)
     assert done.exit_code in (0, 3), done.output
     return done, out, json.loads((out / "diagnosis.json").read_text())
 
@@ -127,8 +126,7 @@ def test_page_and_json_hold_the_levels(run):
     assert "Joints at each level" in text
     assert list(out.glob("levels_*.png"))
     assert plain(diagnosis_json(from_json(found))) == found
-    done = CliRunner().invoke(application(), ["report", str(out), "--out", str(out / "again")])
-    assert done.exit_code == 0, done.output
+    ran("report", out, "--out", out / "again")
     assert (out / "again" / "report.html").read_text().count("data:image") == text.count(
         "data:image"
     )
@@ -138,7 +136,7 @@ def test_page_and_json_hold_the_levels(run):
 def identified(folder):
     """The command that identifies, and where it wrote."""
     out = folder / "identified"
-    return CliRunner().invoke(application(), ["identify", str(folder), "--out", str(out)]), out
+    return call("identify", folder, "--out", out), out
 
 
 def test_identify_says_it_on_the_terminal_and_in_its_files(identified):
@@ -175,9 +173,17 @@ def test_a_table_holds_every_mode_at_every_level(identified):
     assert table.rows[0] == ("1", "1", *["–"] * 5)
 
 
+def at_levels(study, found, diagnosing=True):
+    """The result of the fitted level with what other levels say; nothing else is asked."""
+    none = cast(Question, None), cast(Prepared, SimpleNamespace(levels=study))
+    return over_levels(*none, cast(UpdatedModels, None), found, diagnosing)
+
+
 def test_linear_recordings_are_not_called_nonlinear(tmp_path):
-    found = chladni.diagnose(chladni.load_case(a_case(tmp_path, [0j] * len(LEVELS))))
-    assert found.verdict != "nonlinear"
+    """Their levels are in the result, and the verdict stays that of the fitted level."""
+    (study,) = chladni.identify(chladni.load_case(a_case(tmp_path, [0j] * len(LEVELS)))).levels
+    found = at_levels(study, DiagnosisResult("calibration only"))
+    assert found.verdict == "calibration only"
     assert {t.signature for t in found.levels} <= {"linear", "runs differ"}
     assert not found.joints
 
@@ -190,12 +196,7 @@ def test_what_is_held_must_have_a_level(folder, tmp_path):
         (folder / "bad" / path.name).write_bytes(path.read_bytes())
     (folder / "bad" / "plate.bdf").write_text((folder / "plate.bdf").read_text())
     (folder / "bad" / "case.toml").write_text(text)
-    done = CliRunner().invoke(
-        application(), ["diagnose", str(folder / "bad"), "--out", str(tmp_path / "o")]
-    )
-    assert done.exit_code == 2
-    assert "has no level" in done.output
-    assert not (tmp_path / "o").exists()
+    assert "has no level" in refused("diagnose", folder / "bad", "--out", tmp_path / "o")
 
 
 def test_a_linear_effect_that_was_named_stays_and_is_said_to_be_of_its_level(folder):
@@ -203,11 +204,9 @@ def test_a_linear_effect_that_was_named_stays_and_is_said_to_be_of_its_level(fol
     case = chladni.load_case(folder)
     (study,) = chladni.identify(case).levels
     named = DiagnosisResult("missing physics", (NamedEffect("point-mass"),))
-    prepared = cast(Prepared, SimpleNamespace(levels=study))
-    asked, stages = cast(Question, None), cast(UpdatedModels, None)  # neither is asked here
-    kept = over_levels(asked, prepared, stages, named, diagnosing=True)
+    kept = at_levels(study, named)
     assert (kept.verdict, kept.effects) == (named.verdict, named.effects)
     assert "point-mass does not explain" in kept.notes[-1]
     assert len(kept.levels) == len(study.modes)
-    plainly = over_levels(asked, prepared, stages, DiagnosisResult("calibration only"), False)
+    plainly = at_levels(study, DiagnosisResult("calibration only"), diagnosing=False)
     assert plainly.verdict == "calibration only"

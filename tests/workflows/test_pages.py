@@ -5,10 +5,9 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran
 
 import chladni
-from chladni.cli.app import application
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.report.diagnosis_json import read_diagnosis
 from chladni.report.verdict import PLACES
@@ -24,10 +23,7 @@ def run_folder(case, diagnosed, tmp_path_factory):
 def test_the_page_is_written_again_from_its_folder(run_folder, tmp_path):
     """Word for word the same, but for what only the second page has."""
     first = (run_folder / "report.html").read_text()
-    done = CliRunner().invoke(
-        application(), ["report", str(run_folder), "--out", str(tmp_path), "--title", "again"]
-    )
-    assert done.exit_code == 0, done.output
+    ran("report", run_folder, "--out", tmp_path, "--title", "again")
     second = (tmp_path / "report.html").read_text()
     for section in ("Scores", "Calibrated parameters", "Frequencies", "Why not something else"):
         a, b = (t[t.index(f"<h2>{section}</h2>") :] for t in (first, second))
@@ -110,8 +106,7 @@ def test_no_curve_no_picture(case, diagnosed, tmp_path):
 def test_a_correlation_explains_itself(folder, case, tmp_path):
     """Pairs with the model's own mode numbers, CoMAC, shapes side by side, Q in words."""
     out = tmp_path / "out"
-    done = CliRunner().invoke(application(), ["correlate", str(folder), "--out", str(out)])
-    assert done.exit_code == 0, done.output
+    ran("correlate", folder, "--out", out)
     page = (out / "report.html").read_text()
     found = json.loads((out / "correlation.json").read_text())
     f = chladni.modes(case, 20).modal.frequency

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran
 
 import chladni
-from chladni.cli.app import application
 from chladni.errors import AccuracyError, FileError
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS, units
@@ -17,10 +16,6 @@ from chladni.updating import basis_refinement
 from chladni.updating.accuracy import Accuracy
 from chladni.workflows.unit_check import refuse_other_units
 from chladni_specimens.plates import plate
-
-
-def call(*arguments):
-    return CliRunner().invoke(application(), [str(a) for a in arguments])
 
 
 @pytest.mark.parametrize("true", UNITS)
@@ -39,18 +34,6 @@ def test_the_unit_system_that_fits_is_named(case, tmp_path, true, said):
     told = rf'weighs .* kg.*set units = "{true}"' if by_mass else rf'set units = "{true}".*steel'
     with pytest.raises(FileError, match=told):
         refuse_other_units(made)
-
-
-@pytest.mark.parametrize("command", ["diagnose", "calibrate", "correlate"])
-def test_commands_refuse_it_before_they_work(case, tmp_path, command):
-    source = tmp_path / "case"
-    shutil.copytree(case.path.parent, source)
-    write_assembly(plate(0.3, 0.22, 6, 6, 1e-3), source / "plate.bdf", units("mm-t-s"))
-    done = call(command, source, "--out", tmp_path / "out")
-    assert done.exit_code == 2, (done.output, done.exception)
-    assert "\n" not in done.stderr.strip()
-    assert 'set units = "mm-t-s"' in done.stderr
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_deck_that_fits_in_no_system_says_so(case):
@@ -74,8 +57,7 @@ def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(case, tmp_path, 
     off = Accuracy(np.ones(1), np.array([0.01]), np.zeros((1, 0)))
     monkeypatch.setattr(Accuracy, "refined", lambda self, model: model)
     monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: off)
-    done = call("calibrate", case.path.parent, "--out", tmp_path / "out")
-    assert done.exit_code == 3, (done.output, done.exception)
+    done = ran("calibrate", case.path.parent, "--out", tmp_path / "out", code=3)
     assert "by 1.00%" in done.stderr
     d = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert "do not trust the result" in d["distrust"][0]

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
+from tests.builders.commands import ran, refused
 
-from chladni.cli.app import application
 from chladni.errors import FileError
 from chladni.geometry.facets import point_normals
 from chladni.io.nastran import write_assembly
@@ -81,8 +80,7 @@ def test_render_shows_sections_and_the_scan(tmp_path):
     at = f"x={PANEL.points[:, 0].mean():.3f}"
     words = ["render", str(tmp_path / "panel.bdf"), "--units", "mm-t-s", "--out"]
     shown = [*words, str(tmp_path / "out"), "--section", at, "--scan", str(tmp_path / "panel.stl")]
-    result = CliRunner().invoke(application(), shown)
-    assert result.exit_code == 0, result.output
+    ran(*shown)
     made = {p.name for p in (tmp_path / "out").iterdir()}
     assert {"scan.png", "scan.json", "report.html"} <= made
     assert any(name.startswith("section_x") for name in made)
@@ -98,6 +96,5 @@ def test_render_shows_sections_and_the_scan(tmp_path):
 def test_a_plane_that_means_nothing_is_refused(tmp_path, text, sentence):
     write_assembly(PANEL, tmp_path / "panel.bdf", units("SI"))
     words = ["render", str(tmp_path / "panel.bdf"), "--units", "SI", "--section", text]
-    result = CliRunner().invoke(application(), [*words, "--out", str(tmp_path / "out")])
-    assert result.exit_code == 2
-    assert sentence in " ".join(result.output.split())
+    said = refused(*words, "--out", tmp_path / "out")
+    assert sentence in " ".join(said.split())

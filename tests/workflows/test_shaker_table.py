@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
+from tests.builders.commands import ran, refused
 
 import chladni
-from chladni.cli.app import application
 from chladni.errors import FileError, ModelError
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
@@ -112,13 +111,10 @@ def test_what_a_table_has_not(case, article):
 
 
 def test_the_command_leaves_a_case_that_identifies(case, tmp_path):
-    run = CliRunner().invoke(
-        application(),
-        ["bench", str(case.path), "--excitation", "stepped-sine", "--seed",
-         "565", "--out", str(tmp_path / "b")],
-    )  # fmt: skip
-    assert run.exit_code == 0, run.output
-    assert "level [m/s²]" in run.output
+    done = ran(
+        "bench", case.path, "--excitation", "stepped-sine", "--seed", "565", "--out", tmp_path / "b"
+    )
+    assert "level [m/s²]" in done.output
     said = json.loads((tmp_path / "b/bench.json").read_text())
     assert said["input"] == "base:+Z"
     assert said["recordings"][0]["level_m_s2"] > 0
@@ -148,24 +144,17 @@ def test_responses_on_a_table_at_the_sensors_of_a_layout(case, tmp_path):
     }
     found = {}
     for name, more in words.items():
-        done = CliRunner().invoke(application(), [*ask, *more, "--out", str(tmp_path / name)])
-        assert done.exit_code == 0, done.output
+        ran(*ask, *more, "--out", tmp_path / name)
         found[name] = np.load(tmp_path / name / "frf.npz")
         assert str(found[name]["quantity"]) == "transmissibility"
     for name in ("layout", "table"):
         assert found[name]["outputs"].tolist() == list(labels)
         assert_allclose(found[name]["values"], found["each"]["values"], rtol=1e-6, atol=1e-9)
-    refused = [*ask, *words["layout"], "--input", "20:+Z", "--out", str(tmp_path / "x")]
-    done = CliRunner().invoke(application(), refused)
-    assert done.exit_code == 2
-    assert "must be the only input" in done.output
+    other = (*ask, *words["layout"], "--input", "20:+Z", "--out", tmp_path / "x")
+    assert "must be the only input" in refused(*other)
 
 
 QUICK = ["--excitation", "stepped-sine", "--band", "15:120", "--exact", "--units", "SI"]
-
-
-def bench(out, *words):
-    return CliRunner().invoke(application(), ["bench", *map(str, words), "--out", str(out)])
 
 
 def test_a_bare_deck_asks_for_a_table(case, tmp_path):
@@ -173,8 +162,8 @@ def test_a_bare_deck_asks_for_a_table(case, tmp_path):
     deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
     labels = case.outputs.labels
     table.write_text("label,mass\n" + "".join(f"{name},0.001\n" for name in labels))
-    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, "--input", "base:+Z")
-    assert done.exit_code == 0, done.output
+    words = ("--sensors", table, "--input", "base:+Z", "--out", tmp_path / "o")
+    done = ran("bench", deck, *QUICK, *words)
     assert "level [m/s²]" in done.output
     (frf,) = chladni.load_case(tmp_path / "o" / "case").frfs
     assert (frf.quantity, frf.inputs) == ("transmissibility", ("base:+Z",))
@@ -184,8 +173,7 @@ def test_a_bare_deck_asks_for_a_table(case, tmp_path):
 def test_sensors_are_planned_for_a_table(case, tmp_path):
     """Of the plan the sensors; neither its shaker nor its cords are there."""
     deck = case.path.parent / "plate.bdf"
-    done = bench(tmp_path / "o", deck, *QUICK, "--input", "base:+Z")
-    assert done.exit_code == 0, done.output
+    ran("bench", deck, *QUICK, "--input", "base:+Z", "--out", tmp_path / "o")
     left = chladni.load_case(tmp_path / "o" / "case")
     assert left.inputs.labels == ("base:+Z",)
     assert len(left.outputs.labels) > 5
@@ -197,8 +185,8 @@ def test_a_deck_is_driven_where_input_says(case, tmp_path):
     deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
     table.write_text("label\n" + "\n".join(case.outputs.labels))
     here = case.outputs.labels[-1]
-    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, "--input", here)
-    assert done.exit_code == 0, done.output
+    words = ("--sensors", table, "--input", here, "--out", tmp_path / "o")
+    ran("bench", deck, *QUICK, *words)
     (frf,) = chladni.load_case(tmp_path / "o" / "case").frfs
     assert (frf.quantity, frf.inputs) == ("accelerance", (here,))
 
@@ -217,11 +205,8 @@ def test_a_deck_is_driven_where_input_says(case, tmp_path):
 def test_an_input_that_is_none_is_one_sentence(case, tmp_path, words, said):
     deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
     table.write_text("label\n" + "\n".join(case.outputs.labels))
-    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, *words)
-    assert done.exit_code == 2, done.output
-    assert said in done.output
-    assert "Traceback" not in done.output
-    assert not (tmp_path / "o").exists()
+    given = ("bench", deck, *QUICK, "--sensors", table, *words, "--out", tmp_path / "o")
+    assert said in refused(*given)
 
 
 def test_what_drives_is_said_once(case, tmp_path):
@@ -229,14 +214,11 @@ def test_what_drives_is_said_once(case, tmp_path):
     deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
     rows = "\n".join(f"{name},output" for name in case.outputs.labels)
     table.write_text(f"label,role\n{rows}\n{case.outputs.labels[0]},input\n")
-    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, "--input", "base:+Z")
-    assert done.exit_code == 2
-    assert "already names inputs" in done.output
-    done = bench(tmp_path / "o", case.path, "--input", "base:+Z")
-    assert done.exit_code == 2
-    assert "is a case, which already defines sensors, drive point" in done.output
     write_assembly(plate(0.3, 0.2, 8, 6, 1.2e-3), tmp_path / "free.bdf")
-    done = bench(tmp_path / "o", tmp_path / "free.bdf", *QUICK, "--input", "base:+Z")
-    assert done.exit_code == 2
-    assert "has no grid with SPC" in done.output
-    assert not (tmp_path / "o").exists()
+    last = ("--input", "base:+Z", "--out", tmp_path / "o")
+    for words, said in (
+        ((deck, *QUICK, "--sensors", table), "already names inputs"),
+        ((case.path,), "is a case, which already defines sensors, drive point"),
+        ((tmp_path / "free.bdf", *QUICK), "has no grid with SPC"),
+    ):
+        assert said in refused("bench", *words, *last)

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran
 
 import chladni
-from chladni.cli.app import application
 from chladni.effects.points import with_masses
 from chladni.ema.setup import PoleTable
 from chladni.io.nastran import write_assembly
@@ -170,8 +169,7 @@ def test_two_shakers_an_article_and_a_level(tmp_path):
         {"file": "other.npz", "article": "B"}, {"file": "hard.npz", "level": 5.0},
     )  # fmt: skip
     out = tmp_path / "out"
-    done = CliRunner().invoke(application(), ["calibrate", str(tmp_path), "--out", str(out)])
-    assert done.exit_code == 3, (done.output, done.exception)
+    done = ran("calibrate", tmp_path, "--out", out, code=3)
     assert "predicts the held-out data worse" in done.stderr
     told = json.loads((out / "diagnosis.json").read_text())
     rows = {r["name"]: r for r in told["recordings"]}

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from tests.builders.commands import ran, refused
 
 import chladni
-from chladni.cli.app import application
 from chladni.effects import registry
 from chladni.ema.frf_estimate import estimate
 from chladni.errors import FileError, LabelError, ModelError
@@ -38,19 +37,9 @@ def folder(demo, tmp_path_factory):
     """What ``chladni bench --time`` writes of two articles at two levels."""
     out = tmp_path_factory.mktemp("bench") / "out"
     words = ["bench", str(demo), "--band", "15:120", "--resolution", "0.5", "--averages", "4"]
-    words += [
-        "--articles",
-        "2",
-        "--levels",
-        "1,2",
-        "--time",
-        "--hide",
-        "point-mass",
-        "--seed",
-        "540",
-    ]
-    done = CliRunner().invoke(application(), [*words, "--out", str(out)])
-    assert done.exit_code == 0, (done.output, done.exception)
+    words += ["--articles", "2", "--levels", "1,2", "--time", "--hide", "point-mass"]
+    words += ["--seed", "540"]
+    ran(*words, "--out", out)
     return out
 
 
@@ -87,8 +76,7 @@ def test_time_data_give_the_frfs_beside_them(folder):
     assert found.values.shape == frf.values.shape
     size = np.abs(frf.values).max()
     np.testing.assert_allclose(found.values, frf.values, atol=1e-4 * size)
-    test = CliRunner().invoke(application(), ["test", str(name), "--out", str(name.parent / "t")])
-    assert test.exit_code == 0, test.output
+    ran("test", name, "--out", name.parent / "t")
     shutil.rmtree(name.parent / "t")
 
 
@@ -144,18 +132,23 @@ OF_JOINTS = (
 )  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def plain(case):
+    """The recording of an article that hides nothing."""
+    return benched(case, exact=True, seed=540).recordings[0]
+
+
 @pytest.mark.parametrize("name", registry.names())
-def test_every_effect_of_the_catalogue_can_be_hidden(case, name):
+def test_every_effect_of_the_catalogue_can_be_hidden(case, plain, name):
     """What is hidden changes the recording by more than its noise; what it acts on must be."""
     if name in OF_JOINTS:
         with pytest.raises(ModelError, match="the structure has no"):
             benched(case, exact=True, seed=540, hide=(name,))
         return
-    plain = benched(case, exact=True, seed=540)
     found = benched(case, exact=True, seed=540, hide=(name,))
     assert found.truth["effects"][name]
-    away = np.abs(found.recordings[0].truth / plain.recordings[0].truth - 1)
-    gain = np.abs(found.recordings[0].frf.values / plain.recordings[0].frf.values - 1)
+    away = np.abs(found.recordings[0].truth / plain.truth - 1)
+    gain = np.abs(found.recordings[0].frf.values / plain.frf.values - 1)
     assert max(np.median(away), np.median(gain, axis=0).max()) > 5e-3
 
 
@@ -209,49 +202,27 @@ def test_a_case_without_sensors_is_refused(case):
     ],
 )
 def test_bad_input_is_one_sentence_and_leaves_nothing(demo, tmp_path, words, said):
-    done = CliRunner().invoke(
-        application(), ["bench", str(demo), *words, "--out", str(tmp_path / "o")]
-    )
-    assert done.exit_code == 2
-    assert said in done.output
-    assert not (tmp_path / "o").exists()
+    assert said in refused("bench", demo, *words, "--out", tmp_path / "o")
 
 
 def test_a_folder_that_is_no_case_is_not_called_one(tmp_path):
     (tmp_path / "plan").mkdir()
-    words = ["bench", str(tmp_path / "plan"), "--units", "SI", "--out", str(tmp_path / "o")]
-    done = CliRunner().invoke(application(), words)
-    assert done.exit_code == 2
-    assert "no case.toml in the folder" in done.output
+    words = ("bench", tmp_path / "plan", "--units", "SI", "--out", tmp_path / "o")
+    assert "no case.toml in the folder" in refused(*words)
 
 
 def test_a_table_that_is_no_text_is_told(demo, tmp_path):
     (tmp_path / "x.csv").write_bytes(bytes(range(128, 200)))
     words = ["--units", "mm-t-s", "--sensors", tmp_path / "x.csv", "--out", tmp_path / "o"]
-    done = CliRunner().invoke(application(), ["bench", str(demo / "deck.bdf"), *map(str, words)])
-    assert done.exit_code == 2, done.output
-    assert "is not UTF-8 text" in done.output
-    assert not (tmp_path / "o").exists()
+    assert "is not UTF-8 text" in refused("bench", demo / "deck.bdf", *words)
 
 
 def test_a_bare_deck_is_tested_where_a_table_says(demo, folder, tmp_path):
     """Deck, units and a table of sensors; without units it is refused."""
-    words = ["bench", str(demo / "deck.bdf"), "--sensors", str(folder / "case" / "sensors.csv")]
-    quick = [
-        "--band",
-        "15:80",
-        "--resolution",
-        "1",
-        "--averages",
-        "2",
-        "--out",
-        str(tmp_path / "o"),
-    ]
-    refused = CliRunner().invoke(application(), [*words, *quick])
-    assert refused.exit_code == 2
-    assert "--units" in refused.output
-    done = CliRunner().invoke(application(), [*words, *quick, "--units", "mm-t-s"])
-    assert done.exit_code == 0, done.output
+    words = ["bench", demo / "deck.bdf", "--sensors", folder / "case" / "sensors.csv"]
+    words += ["--band", "15:80", "--resolution", 1, "--averages", 2, "--out", tmp_path / "o"]
+    assert "--units" in refused(*words)
+    done = ran(*words, "--units", "mm-t-s")
     assert chladni.load_case(tmp_path / "o" / "case").frfs[0].values.shape[1] == 20
     assert "rigid motions at 0.7 Hz" in done.output
     assert "mesh of the deck" in done.output
@@ -265,15 +236,13 @@ def test_a_deck_on_the_bench_is_named_as_the_user_names_it(demo, folder, tmp_pat
     assert "BEGIN BULK\n" in free
     before, after = free.split("BEGIN BULK\n")
     deck.write_text(before.replace("CEND\n", held[0]) + held[1] + after, encoding="latin-1")
-    words = ["bench", str(deck), "--units", "mm-t-s", "--out", str(tmp_path / "o")]
-    words += ["--sensors", str(folder / "case" / "sensors.csv"), "--resolution", "1"]
-    words += ["--band", "15:80", "--averages", "2", "--finer"]
-    done = CliRunner().invoke(application(), words)
-    assert done.exit_code == 0, done.output
+    words = ["bench", deck, "--units", "mm-t-s", "--out", tmp_path / "o", "--finer"]
+    words += ["--sensors", folder / "case" / "sensors.csv", "--resolution", 1]
+    words += ["--band", "15:80", "--averages", 2]
+    done = ran(*words)
     assert f"{deck}: PARAM BAILOUT" in done.output
     assert "have no cords" not in done.output
     assert "mesh of the deck" not in done.output
     deck.write_text(deck.read_text(encoding="latin-1").replace("\nPSHELL   ", "\nPSHELL  x", 1))
-    refused = CliRunner().invoke(application(), words)
-    assert refused.exit_code == 2
-    assert str(deck) in refused.output
+    words[words.index("--out") + 1] = tmp_path / "other"
+    assert str(deck) in refused(*words)

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.decks import frequencies, opened
 
-from chladni.dynamics.eigen import normal_modes
 from chladni.errors import ChladniError
 from chladni.fem.assemble import structure
 from chladni.fem.energy import only
-from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
+from chladni.io.nastran import assembly, read_deck, write_deck
 from chladni.io.nastran.edit.model_changes import changes
 from chladni.io.nastran.edit.written_assembly import written_assembly
 from chladni.model.added_beams import with_beam_line
@@ -28,13 +28,7 @@ def section(material, kind="bar"):
 
 @pytest.fixture(params=["SI", "mm-t-s"])
 def deck(tmp_path, request):
-    path = write_assembly(plate(0.3, 0.2, 6, 4, 1e-3), tmp_path / "plate.bdf", request.param)
-    read = read_deck(path)
-    return read, assembly(read, request.param), request.param
-
-
-def frequencies(made):
-    return normal_modes(structure(made).system, 14).frequency[6:]
+    return opened(plate(0.3, 0.2, 6, 4, 1e-3), tmp_path, request.param)
 
 
 @pytest.mark.parametrize("kind", ["bar", "beam", "rod"])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.builders.decks import differing
 
 from chladni.errors import FileError, LabelError
 from chladni.io.nastran import (
@@ -20,18 +21,6 @@ from chladni.model.properties import Orthotropic
 from .conftest import ANCHORS, PLATE, real_decks
 
 CASE = "SOL 103\nCEND\nMETHOD = 1\n"
-
-
-def differing(before, after):
-    """(lines gone, lines new) as multisets, kept in order."""
-    old, new = before.read_text().splitlines(), after.read_text().splitlines()
-    gone, fresh = list(old), []
-    for line in new:
-        if line in gone:
-            gone.remove(line)
-        else:
-            fresh.append(line)
-    return gone, fresh
 
 
 def rewritten(deck, *changes, name="new.bdf"):

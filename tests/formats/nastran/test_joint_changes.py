@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.decks import rewritten
 
 from chladni.effects.element_groups import element_groups
 from chladni.effects.user_parameters import user_parameter
 from chladni.fem.assemble import structure
-from chladni.io.nastran import assembly, read_deck, write_deck
-from chladni.io.nastran.edit.model_changes import changes
+from chladni.io.nastran import assembly, read_deck
 from chladni.model.assembly import Beams, Bushes
 from chladni.model.free_parameter import FreeParameter
 from chladni.units import UNITS
@@ -69,15 +69,7 @@ def position(made, id):
     return next(k for k, p in enumerate(made.parts) if p.id == id)
 
 
-def rewritten(deck, before, after):
-    path = deck.path.with_name("updated.bdf")
-    write_deck(deck, path, changes(deck, before, after, UNITS["mm-t-s"]))
-    new = path.read_text().splitlines()
-    gone = [line for line in deck.path.read_text().splitlines() if line not in new]
-    return assembly(read_deck(path), UNITS["mm-t-s"]), gone
-
-
-KINDS = {  # what is user_parameter, and the cards whose lines change
+KINDS = {  # the free parameter, and the cards whose lines change
     "E of both solids": (dict(field="E", parts=(2, 3)), ["MAT1"]),
     "E of one solid": (dict(field="E", parts=(2,)), ["PSOLID"]),
     "nu of one solid": (dict(field="nu", parts=(3,)), ["PSOLID"]),
@@ -100,7 +92,7 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
     what = {k: v for k, v in given.items() if k != "parts"}
     effect = user_parameter(groups, FreeParameter(kind, positions=at, **what))
     after = effect.apply(before, np.array([0.05]))
-    got, gone = rewritten(found, before, after)
+    got, gone, _ = rewritten(found, before, after)
     due, was, is_now = (structure(a).system for a in (after, before, got))
     for name in ("K", "M"):
         A, B, C = (getattr(s, name).toarray() for s in (due, was, is_now))
@@ -117,7 +109,7 @@ def test_a_bush_that_changed_alone_gets_a_property_of_its_own(deck):
         element_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,))
     )
     after = effect.apply(before, np.array([0.2]))
-    got, _ = rewritten(found, before, after)
+    got, *_ = rewritten(found, before, after)
     due, is_now = (structure(a).system.K.toarray() for a in (after, got))
     assert_allclose(is_now, due, atol=1e-7 * np.abs(due).max())
     assert_allclose(got.bushes.stiffness, after.bushes.stiffness, rtol=1e-6)
@@ -141,7 +133,7 @@ def test_new_properties_of_every_kind_have_ids_of_their_own(deck):
     after = replace(
         before, parts=(*parts, own), solids=(replace(solids, part=part),), bushes=Bushes(**columns)
     )
-    got, _ = rewritten(found, before, after)
+    got, *_ = rewritten(found, before, after)
     assert_allclose(got.bushes.stiffness, after.bushes.stiffness, rtol=1e-6)
     due, is_now = (structure(a).system.K.toarray() for a in (after, got))
     assert_allclose(is_now, due, atol=1e-7 * np.abs(due).max())
@@ -151,7 +143,7 @@ def test_a_bush_that_was_taken_out_is_a_card_less(deck):
     found, before = deck
     kept = {name: column[1:] for name, column in vars(before.bushes).items()}
     after = replace(before, bushes=Bushes(**kept))
-    got, gone = rewritten(found, before, after)
+    got, gone, _ = rewritten(found, before, after)
     assert got.bushes.ids.tolist() == after.bushes.ids.tolist()
     assert [line.split(",")[0] for line in gone] == ["CBUSH"]
 
@@ -164,7 +156,7 @@ def test_a_bar_that_was_taken_out_is_a_card_less(tmp_path, card):
     before = assembly(found, UNITS["mm-t-s"])
     stays = before.beams.ids != 51
     kept = {name: column[stays] for name, column in vars(before.beams).items()}
-    got, gone = rewritten(found, before, replace(before, beams=Beams(**kept)))
+    got, gone, _ = rewritten(found, before, replace(before, beams=Beams(**kept)))
     assert got.beams.ids.tolist() == [4]
     assert gone == [card]
 
@@ -176,7 +168,7 @@ def test_the_loss_factor_of_a_bush_goes_into_its_property(deck, rows):
     loss, stiffness = before.bushes.loss.copy(), before.bushes.stiffness.copy()
     loss[rows], stiffness[rows] = 0.25, 0.5 * stiffness[rows]
     after = replace(before, bushes=replace(before.bushes, loss=loss, stiffness=stiffness))
-    got, _ = rewritten(found, before, after)
+    got, *_ = rewritten(found, before, after)
     for name in ("loss", "stiffness", "viscous"):
         assert_allclose(getattr(got.bushes, name), getattr(after.bushes, name), rtol=1e-6)
 
@@ -190,7 +182,7 @@ def test_the_loss_factor_of_a_material_goes_into_its_card(deck, names):
         k = position(before, pid)
         lossy = replace(parts[k].section.material, damping=0.3)
         parts[k] = parts[k].with_section(material=lossy)
-    got, _ = rewritten(found, before, before.with_parts(tuple(parts)))
+    got, *_ = rewritten(found, before, before.with_parts(tuple(parts)))
     for pid in (1, 2, 3):
         section = got.parts[position(got, pid)].section
         lost = getattr(section, "material", None) or section.membrane

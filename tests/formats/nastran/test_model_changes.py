@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.decks import opened, rewritten, same
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibration_parameters import calibration_parameter
@@ -12,56 +13,21 @@ from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.points import with_masses, with_springs
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
-from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
+from chladni.io.nastran import assembly, read_deck
 from chladni.io.nastran.edit.model_changes import changes
 from chladni.model.properties import Anisotropic, BeamSection, Part, ShellSection
 from chladni.units import UNITS
 from chladni_specimens.plates import folded_panel, plate
 
-SYSTEMS = ("mm-t-s", "SI", "mm-kg-ms", "mm-kg-ms, WTMASS")
-
-WEIGHED = "PARAM,WTMASS,2.59-3\n"
+WEIGHED = "PARAM,WTMASS,2.59-3\n"  # every mass counts 0.00259 times
 
 
-@pytest.fixture(params=SYSTEMS)
+@pytest.fixture(params=["mm-t-s", "SI", "mm-kg-ms", "mm-kg-ms, WTMASS"])
 def deck(request, tmp_path):
     """(deck, its assembly, units) of a folded panel; both parts share one MAT1."""
-    return opened(folded_panel(0.3, 0.2, 0.04, 0.01, 0.04), tmp_path, request.param)
-
-
-def opened(made, folder, name="mm-t-s"):
-    """The structure as a deck; with WTMASS every mass of it counts 0.00259 times."""
-    units = UNITS[name.partition(",")[0]]
-    path = write_assembly(made, folder / "deck.bdf", units)
-    if name.endswith("WTMASS"):
-        path.write_text(path.read_text().replace("BEGIN BULK\n", "BEGIN BULK\n" + WEIGHED))
-    found = read_deck(path)
-    return found, assembly(found, units), units
-
-
-def repaired(deck, before, after, units):
-    """The written deck as an assembly, and the lines that are new in it."""
-    path = deck.path.with_name("updated.bdf")
-    write_deck(deck, path, changes(deck, before, after, units))
-    old, fresh = deck.path.read_text().splitlines(), []
-    new = path.read_text().splitlines()
-    for line in new:
-        if line in old:
-            old.remove(line)
-        else:
-            fresh.append(line)
-    return assembly(read_deck(path), units), fresh, old
-
-
-def frequencies(made, count=16):
-    return normal_modes(structure(made).system, count).frequency[6:]
-
-
-def same(found, wanted, before):
-    """Equal frequencies to 1e-6, where the change itself moved them by more than 1e-4."""
-    due = frequencies(wanted)
-    np.testing.assert_allclose(frequencies(found), due, rtol=1e-6)
-    assert np.abs(frequencies(before) / due - 1).max() > 1e-4
+    units, _, weighed = request.param.partition(", ")
+    made = folded_panel(0.3, 0.2, 0.04, 0.01, 0.04)
+    return opened(made, tmp_path, units, WEIGHED if weighed else "")
 
 
 def test_nothing_to_repair(deck):
@@ -75,7 +41,7 @@ def test_ordinary_value_of_all_parts(deck, quantity, card):
     made, before, units = deck
     effect = calibration_parameter(element_groups(structure(before), 8), quantity, (0, 1))
     after = effect.apply(before, np.array([0.0712345678]))
-    found, _, gone = repaired(made, before, after, units)
+    found, gone, _ = rewritten(made, before, after, units)
     same(found, after, before)
     assert [line[:6].strip().rstrip("*") for line in gone] == [card] * (2 if quantity == "t" else 1)
     np.testing.assert_allclose(found.shells.thickness, after.shells.thickness, rtol=1e-6)
@@ -87,7 +53,7 @@ def test_ordinary_value_of_one_part(deck, quantity):
     made, before, units = deck
     effect = calibration_parameter(element_groups(structure(before), 8), quantity, (1,))
     after = effect.apply(before, np.array([-0.2]))
-    found, _, gone = repaired(made, before, after, units)
+    found, gone, _ = rewritten(made, before, after, units)
     same(found, after, before)
     assert found.parts[0] == before.parts[0]
     assert len(gone) == 1
@@ -99,7 +65,7 @@ def test_thickness_at_corners(deck):
     t = before.shells.thickness.copy()
     t[chosen] *= 1 - np.linspace(0.03, 0.2, 12).reshape(3, 4)
     after = replace(before, shells=replace(before.shells, thickness=t))
-    found, _, gone = repaired(made, before, after, units)
+    found, gone, _ = rewritten(made, before, after, units)
     same(found, after, before)
     np.testing.assert_allclose(found.shells.thickness, t, rtol=1e-6)
     assert len(gone) <= 3  # in place, or on a continuation of a line that stays
@@ -113,7 +79,7 @@ def test_thickness_of_triangles(tmp_path):
     deck, before, units = opened(made, tmp_path)
     t = before.shells.thickness * (1 - 0.1 * before.points[before.shells.nodes][..., 0])
     after = replace(before, shells=replace(before.shells, thickness=t))
-    found, _, _ = repaired(deck, before, after, units)
+    found, *_ = rewritten(deck, before, after, units)
     same(found, after, before)
 
 
@@ -124,7 +90,7 @@ def test_grain(deck, positions, axis):
     made, before, units = deck
     effect = orthotropic(element_groups(structure(before), 8), positions, np.array(axis))
     after = effect.apply(before, np.array([0.15, -0.1, 0.05, 0.1]))
-    found, _, _ = repaired(made, before, after, units)
+    found, *_ = rewritten(made, before, after, units)
     same(found, after, before)
     for k in {0, 1} - set(positions):
         assert found.parts[k] == before.parts[k]
@@ -137,7 +103,7 @@ def test_grain_keeps_its_loss_factor(tmp_path):
     first = before.with_parts((before.parts[0].with_section(membrane=lossy, bending=lossy),))
     deck, before, units = opened(first, tmp_path)
     effect = orthotropic(element_groups(structure(before), 4), (0,), np.eye(3)[0])
-    found, _, _ = repaired(deck, before, effect.apply(before, np.full(4, 0.1)), units)
+    found, *_ = rewritten(deck, before, effect.apply(before, np.full(4, 0.1)), units)
     assert found.parts[0].section.membrane.damping == pytest.approx(0.02)
 
 
@@ -150,7 +116,7 @@ def test_grain_that_is_there_already(tmp_path):
     id = before.parts[0].section.membrane.id
     material = replace(second.parts[0].section.membrane, rho=8000.0, id=id)
     after = before.with_parts((before.parts[0].with_section(membrane=material, bending=material),))
-    found, _, _ = repaired(deck, before, after, units)
+    found, *_ = rewritten(deck, before, after, units)
     same(found, after, before)
     assert found.parts[0].section.membrane.nu12 == pytest.approx(material.nu12, rel=1e-6)
 
@@ -160,7 +126,7 @@ def test_poisson_ratio(deck):
     new = replace(before.parts[0].section.membrane, nu=0.36)
     every = {"membrane": new, "bending": new, "shear": new}
     after = before.with_parts(tuple(p.with_section(**every) for p in before.parts))
-    found, _, gone = repaired(made, before, after, units)
+    found, gone, _ = rewritten(made, before, after, units)
     same(found, after, before)
     assert len(gone) == 1
 
@@ -180,7 +146,7 @@ def test_material_a_bar_shares(tmp_path):
     k = next(k for k, p in enumerate(before.parts) if isinstance(p.section, ShellSection))
     effect = calibration_parameter(element_groups(structure(before), 4), "E", (k,))
     after = effect.apply(before, np.array([0.2]))
-    found, _, _ = repaired(deck, before, after, units)
+    found, *_ = rewritten(deck, before, after, units)
     same(found, after, before)
     assert found.parts[1 - k].section.material.E == pytest.approx(steel.E)
 
@@ -190,7 +156,7 @@ def test_masses(deck, offset):
     made, before, units = deck
     grids = tuple(int(i) for i in before.ids[[3, 11]])
     after = with_masses(before, grids, 0.0321, None if offset is None else np.array(offset))
-    found, fresh, gone = repaired(made, before, after, units)
+    found, gone, fresh = rewritten(made, before, after, units)
     same(found, after, before)
     np.testing.assert_allclose(found.masses.matrix, after.masses.matrix, rtol=1e-6, atol=1e-12)
     np.testing.assert_array_equal(found.masses.node, after.masses.node)
@@ -206,7 +172,7 @@ def test_non_structural_mass(deck):
     part[np.flatnonzero(part == 0)[:5]] = len(heavy)
     more = replace(heavy[0].with_section(nonstructural=7.5), id=91)
     after = replace(before, parts=(*heavy, more), shells=replace(before.shells, part=part))
-    found, _, _ = repaired(made, before, after, units)
+    found, *_ = rewritten(made, before, after, units)
     same(found, after, before)
     loads = sorted(p.section.nonstructural for p in found.parts)
     assert loads == pytest.approx([3.0] * len(heavy) + [7.5], rel=1e-6)
@@ -218,7 +184,7 @@ def test_springs_to_ground(deck):
     grids = tuple(int(i) for i in before.ids[[0, 17]])
     after = with_springs(before, grids, np.array([[0, 0, 1.0], [0.6, 0, 0.8]]), 4321.0)
     after = with_masses(after, grids, 0.01)
-    found, _, gone = repaired(made, before, after, units)
+    found, gone, _ = rewritten(made, before, after, units)
     due, got = normal_modes(structure(after).system, 12), normal_modes(structure(found).system, 12)
     np.testing.assert_allclose(got.frequency[2:], due.frequency[2:], rtol=1e-6, atol=0.05)
     np.testing.assert_allclose(found.springs.value, after.springs.value, rtol=1e-6)
@@ -239,7 +205,7 @@ def test_plane_stiffness(tmp_path, quantity):
     deck, before, units = opened(made, tmp_path)
     effect = calibration_parameter(element_groups(structure(before), 4), quantity, (0,))
     after = effect.apply(before, np.array([0.1]))
-    found, _, _ = repaired(deck, before, after, units)
+    found, *_ = rewritten(deck, before, after, units)
     same(found, after, before)
 
 
@@ -283,7 +249,7 @@ def test_the_wall_of_a_tube_stands_in_its_card(tmp_path, kind):
     groups = element_groups(structure(before))
     stiff, wall = (calibration_parameter(groups, q, [tube]) for q in ("E", "wall"))
     after = wall.apply(stiff.apply(before, np.array([0.1])), np.array([-0.2]))
-    again, fresh, gone = repaired(found, before, after, units)
+    again, gone, fresh = rewritten(found, before, after, units)
     same(again, after, before)
     section, due = again.parts[again.part(7)].section, after.parts[after.part(7)].section
     for name in ("area", "I1", "I2", "J"):

@@ -1,0 +1,60 @@
+"""A structure as a deck; the deck with another structure's values, read again."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.fem.assemble import structure
+from chladni.io.nastran import Deck, assembly, read_deck, write_assembly, write_deck
+from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.assembly import Assembly
+
+
+class Rewritten(NamedTuple):
+    """A changed deck as it is read again, and the lines that differ from the deck before."""
+
+    found: Assembly
+    gone: list[str]
+    fresh: list[str]
+
+
+def opened(
+    made: Assembly, folder: Path, units: str = "mm-t-s", more: str = ""
+) -> tuple[Deck, Assembly, str]:
+    """The structure written as a deck, with more cards: the deck, what is read from it, units."""
+    path = write_assembly(made, folder / "deck.bdf", units)
+    path.write_text(path.read_text().replace("BEGIN BULK\n", f"BEGIN BULK\n{more}"))
+    deck = read_deck(path)
+    return deck, assembly(deck, units), units
+
+
+def rewritten(deck: Deck, before: Assembly, after: Assembly, units: str = "mm-t-s") -> Rewritten:
+    """Write the changes of a structure into its deck and read the deck again."""
+    path = deck.path.with_name("updated.bdf")
+    write_deck(deck, path, changes(deck, before, after, units))
+    return Rewritten(assembly(read_deck(path), units), *differing(deck.path, path))
+
+
+def differing(before: Path, after: Path) -> tuple[list[str], list[str]]:
+    """Lines that only the file before has, and those that only the file after has."""
+    gone, fresh = before.read_text().splitlines(), []
+    for line in after.read_text().splitlines():
+        if line in gone:
+            gone.remove(line)
+        else:
+            fresh.append(line)
+    return gone, fresh
+
+
+def frequencies(made: Assembly, count: int = 16) -> np.ndarray:
+    """Elastic natural frequencies of a free structure [Hz]."""
+    return normal_modes(structure(made).system, count).frequency[6:]
+
+
+def same(found: Assembly, wanted: Assembly, before: Assembly, moved: float = 1e-4) -> None:
+    """Assert equal frequencies to 1e-6 where the change itself moved one by more than a share."""
+    due = frequencies(wanted)
+    np.testing.assert_allclose(frequencies(found), due, rtol=1e-6)
+    assert np.abs(frequencies(before) / due - 1).max() > moved
