@@ -7,13 +7,19 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.adhesive_stiffness import SEALANT, beads_of
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.contact_stiffness import close_places
 from chladni.effects.joints import alone, beads, fasteners, with_factor_on, without_joint
 from chladni.effects.model_families import joint_families
-from chladni.effects.weld_compliance import MOST_LN_LEFT, NONE_LEFT, SOUND, WeldCompliance, of_one
-from chladni.effects.weld_missing import WeldMissing
+from chladni.effects.viscoelastic_joint import SEALANT, beads_of
+from chladni.effects.weld_compliance import (
+    MOST_LN_LEFT,
+    NONE_LEFT,
+    SOUND,
+    WeldCompliance,
+    WeldMissing,
+    of_one,
+)
 from chladni.fem.assemble import structure
 from chladni.updating.fastener_scan import (
     fastener_scores,
@@ -38,7 +44,7 @@ def found(reduced):
 
 @pytest.fixture(scope="module")
 def families(reduced):
-    return {text: (K, sd) for text, K, sd in joint_families(reduced.structure)}
+    return joint_families(reduced.structure)
 
 
 def full(assembly):

@@ -21,6 +21,7 @@ from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.clamp_springs import AN_AXIS, with_clamp_on_springs
 from .effect import Effect, Parameter, PointTerm
+from .estimate import in_mm
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_starts
 
@@ -234,14 +235,13 @@ def _effect(
 
 def _said(clamp: Clamp, direction: SupportDirection) -> str:
     """The place of the clamp and the direction of its compliance, in words."""
-    at = ", ".join(f"{1e3 * v:.0f}" for v in clamp.centre)
     n = len(clamp.grids)
     grids = f"grid {clamp.grids[0]}" if n == 1 else f"{n} grids from {clamp.grids[0]} on"
     how = [
         f"along {_named(direction.frame[0])}" if c == 1 else f"about {_named(direction.frame[1])}"
         for c in direction.components
     ]
-    return f"the supports of {grids} near ({at} mm), {' and '.join(how)}"
+    return f"the supports of {grids} near ({in_mm(clamp.centre)} mm), {' and '.join(how)}"
 
 
 def _named(axis: np.ndarray) -> str:
@@ -268,13 +268,8 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     springs = direction.pull.max(axis=1) / rng.uniform(*TAKEN)
     names = ["K" if c == 1 else "K_rot" for c in direction.components]
     known = dict(zip(names, springs.tolist(), strict=True))
-    truth = {
-        "point_m": every[chosen].centre.tolist(),
-        "value": float(springs[0]),
-        "parameters": known,
-    }
     loose = on_springs(assembly, every[chosen], direction, springs)
-    return replace(article, assembly=loose, truth=truth)
+    return article.with_hidden(loose, known, every[chosen].centre)
 
 
 FAMILY = Family(

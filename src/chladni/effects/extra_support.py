@@ -113,10 +113,8 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     grid = article.shell_grid(rng)
     K = float(np.exp(rng.uniform(np.log(2e3), np.log(5e4))))
     at = article.grids_at(np.array([grid]))
-    point = article.deck.points[article.deck.rows([grid])[0]].tolist()
-    truth = {"point_m": point, "value": K, "parameters": {"K": K}}
     held = with_springs(article.assembly, at, np.eye(3)[2:], K)
-    return replace(article, assembly=held, truth=truth)
+    return article.with_hidden(held, {"K": K}, article.place_of(grid))
 
 
 FAMILY = Family(

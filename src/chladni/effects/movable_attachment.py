@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from ..geometry.facets import tangents
 from .effect import WIDER, Effect, Parameter, PointTerm
 from .effect_context import EffectContext, ElementGrids
-from .estimate import Estimate, Location
+from .estimate import Estimate, Location, in_mm
 from .search_context import Candidate, SearchContext, best_places, distinct
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
@@ -140,7 +140,7 @@ class MovableAttachment(Effect):
         """The fitted place."""
         assert self.patch is not None
         point, grid = tuple(float(v) for v in self.at(x)), self.nearest(x)
-        text = f"near grid {grid} ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
+        text = f"near grid {grid} ({in_mm(point)} mm)"
         size = self.patch.size
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=size)
 
@@ -165,6 +165,22 @@ class MovableAttachment(Effect):
         assert self.patch is not None
         d = self.patch.flat - self.patch.size * x[1:3]
         return int(self.patch.grids[np.argmin((d**2).sum(axis=1))])
+
+
+@dataclass(frozen=True, eq=False)
+class MovableMass(MovableAttachment):
+    """A mass at an unknown place, whose first parameter is its logarithm."""
+
+    matrix = "M"
+
+    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """Place and mass."""
+        return self.at(x), self.parameters[0].value(x[0])
+
+    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """The mass itself."""
+        m = self.parameters[0].value(x[0])
+        return m, m * np.eye(len(x))[0]
 
 
 def moved(strength: Parameter) -> tuple[Parameter, ...]:
@@ -226,7 +242,7 @@ def attachments(
     if context.scan is None:
         some = places.spread(TRIED)
         effects = [near(where, grids.position(places.grids[k], places.normal[k])) for k in some]
-        return best_places(context, effects, places.point[some])
+        return best_places(context, effects)
     scan, out = context.scan, []
 
     def follow(about: int, levels: np.ndarray, k: int) -> None:
