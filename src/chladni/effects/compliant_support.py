@@ -16,7 +16,7 @@ from ..dynamics.eigen import normal_modes
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
-from ..fem.released import Clamp, clamps, released
+from ..fem.released import Clamp, Release, clamps, released
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.clamp_springs import AN_AXIS, with_clamp_on_springs
@@ -75,18 +75,10 @@ class CompliantSupport(Effect):
 
     name = "compliant-support"
     claim = "a clamp is compliant where the deck is rigid"
-    lets_go: ClassVar[bool] = True
     rounds: ClassVar[int] = 1
 
-    every: tuple[Clamp, ...] = ()  # clamps of the structure, including this one
-    rigid: np.ndarray | None = None  # springs as good as rigid of all of them (6 clamps,)
     direction: SupportDirection | None = None
     rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure
-
-    def released(self, built: Structure) -> Structure:
-        """The structure with all of its clamps on springs that are as good as rigid."""
-        assert self.rigid is not None
-        return released(built, self.every, self.rigid)
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """(k - k_rigid) gᵀg for each compliant motion g of the clamp."""
@@ -99,16 +91,12 @@ class CompliantSupport(Effect):
         """Spring stiffness [N/m] and [N m/rad] of each parameter."""
         return np.array([p.value(v) for p, v in zip(self.parameters, x, strict=True)])
 
-    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """Inertia loads M u of the structure that follows the clamp."""
-        return M @ static[: M.shape[0]]
-
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Replace the supports by GRID, RBE2 and CELAS2 to ground."""
         assert self.direction is not None
-        return on_springs(
-            assembly, self.every[self.direction.clamp], self.direction, self.springs(x)
-        )
+        assert self.release is not None
+        clamp = self.release.clamps[self.direction.clamp]
+        return on_springs(assembly, clamp, self.direction, self.springs(x))
 
 
 def on_springs(
@@ -228,8 +216,8 @@ def _effect(
     x, y, z = clamp.centre.tolist()
     return CompliantSupport(
         unknown, _said(clamp, direction), grids=tuple(int(g) for g in clamp.grids), point=(x, y, z),
-        trials_factor=tried, every=every, direction=direction, rows=sp.csr_array(rows),
-        rigid=np.repeat(stiff, 3),
+        trials_factor=tried, release=Release(every, np.repeat(stiff, 3)), direction=direction,
+        rows=sp.csr_array(rows),
     )  # fmt: skip
 
 

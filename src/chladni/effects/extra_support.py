@@ -86,9 +86,9 @@ class ExtraSupport(MovableAttachment):
         k, d = self.parameters[0].value(x[0]), self.pushes(x)
         return with_ground_bushes(assembly, row, d[None], k, self.at(x)[None])
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The fitted place, and the direction where it is not across the sheet."""
-        found, d = super().location(x), self.pushes(x)
+        found, d = super().location(x, sd), self.pushes(x)
         if abs(d @ self.direction) > ACROSS:
             return found
         return replace(found, text=f"{found.text}, along ({', '.join(f'{v:.2f}' for v in d)})")

@@ -54,7 +54,7 @@ class Article:
         more : other entries of the truth, for example ``radius_m``
         """
         place = [float(v) for v in point]
-        truth = {"point_m": place} if place else {}
+        truth: dict[str, Any] = {"point_m": place} if place else {}
         value = next(iter(parameters.values()))
         truth |= {"value": value, **more, "parameters": dict(parameters)}
         return replace(self, assembly=assembly, truth=truth)
@@ -79,6 +79,9 @@ class Article:
         return int(self.deck.ids[rng.choice(np.unique(nodes))])
 
 
+FromLump = tuple[Effect, np.ndarray] | None
+
+
 @dataclass(frozen=True, eq=False)
 class Family:
     """One kind of physics, as used by search, bench, deck and page.
@@ -92,6 +95,8 @@ class Family:
         starts of ``placed``
     closer : function that moves an effect fitted at x if it explains more next to its place; the
         last of the context's ``bases`` is that of the fit
+    of_lump : function that gives its effect, and its start, from a mass [kg] at a place (3,) [m],
+        or None if impossible; without it, the effect is no mass at a place
     cards : of the deck that represent it
     no_cards : why no card can
     settled_by : the measurement that separates it from similar causes, in words
@@ -104,6 +109,7 @@ class Family:
     placed: Callable[[EffectContext], Sequence[Effect]] | None = None
     candidates: Callable[[SearchContext], Iterable[Candidate]] | None = None
     closer: Callable[[SearchContext, Effect, np.ndarray], Candidate | None] | None = None
+    of_lump: Callable[[EffectContext, np.ndarray, float], FromLump] | None = None
     cards: tuple[str, ...] = ()
     no_cards: str = ""
     settled_by: str = ""

@@ -93,7 +93,7 @@ class HemContact(Effect):
         assert L.high is not None
         return k, Estimate("L", 2 * L.value, "m", 2 * L.low, 2 * L.high)
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The stretch, from one end to the other."""
         if not self.local or self.line is None:
             return self.where()

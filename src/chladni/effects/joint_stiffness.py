@@ -123,4 +123,4 @@ class Fastener(JointStiffness):
 
     def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
         """Inertia loads M u, because a joint that is gone may free a mode of its own."""
-        return M @ static
+        return Effect.reloads(self, static, M)

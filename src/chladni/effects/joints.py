@@ -59,7 +59,7 @@ class Connection:
 
     @property
     def where(self) -> str:
-        """What it holds and where, in words."""
+        """Its parts and its place, in words."""
         return f"between {' and '.join(self.parts[:2])} at ({in_mm(self.point)} mm)"
 
 

@@ -114,6 +114,7 @@ FAMILY = Family(
     MassPatch,
     conceal,
     candidates=MassPatch.candidates,
+    of_lump=MassPatch.of_lump,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="search for material on the sheet there, and weigh it",
     on_sheets=True,

@@ -70,6 +70,7 @@ FAMILY = Family(
     PointMass,
     conceal,
     candidates=candidates,
+    of_lump=PointMass.of_lump,
     cards=("CONM2",),
     settled_by="weigh the structure with all attached parts",
 )

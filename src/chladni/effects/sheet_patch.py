@@ -159,7 +159,7 @@ class SheetPatch(Effect):
         """R [m]."""
         return float(self.size * np.exp(x[1]))
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The fitted place, where the change of the sheet is largest."""
         grid, deepest = self.deepest(x)
         point = tuple(float(v) for v in deepest)

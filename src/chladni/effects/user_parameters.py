@@ -126,9 +126,9 @@ class UserParameter(Effect):
         y = float(self.y(x)[0][0])
         return len(x) == 1 and not NEAR_BOUND * self.low < y < NEAR_BOUND * self.high
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The place after a fit."""
-        return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
+        return self.members[0].location(self.y(x)[0], sd) if len(x) > 1 else self.where()
 
 
 def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:

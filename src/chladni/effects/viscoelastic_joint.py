@@ -151,7 +151,7 @@ class ViscoelasticJoint(JointStiffness):
         """Modulus or stiffness at the reference, and the loss factor."""
         return super().reported(x, sd)[:2]
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The joint, and the frequency dependence of its stiffness, which MAT1 cannot represent."""
         name, (_, a, _) = self.parameters[0].name, self.exponent(x)
         rise = (

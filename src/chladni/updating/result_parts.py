@@ -52,7 +52,7 @@ def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffec
 
 
 def _located(hypothesis: HypothesisFit, effect: Effect) -> Location:
-    return effect.located(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
+    return effect.location(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
 
 
 def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]:

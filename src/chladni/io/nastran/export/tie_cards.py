@@ -39,7 +39,7 @@ def bushes(
 
 
 def _middle(assembly: Assembly, nodes: np.ndarray) -> np.ndarray:
-    """Where a bush sits unless told otherwise."""
+    """Place of a bush whose card gives none."""
     a, b = nodes if nodes[1] >= 0 else (nodes[0], nodes[0])
     return assembly.points[a] + 0.5 * (assembly.points[b] - assembly.points[a])
 
