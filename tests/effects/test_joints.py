@@ -117,6 +117,17 @@ def test_no_weld_has_more_taken_from_it_than_it_has(reduced, found, families):
         assert lam[0] > -1e-6 * lam[6]
 
 
+def test_the_deck_has_the_stiffness_of_the_terms(deck, reduced, found, families):
+    """K + (f - 1) K_j + (g - 1) Σ K_i, with the joint in the deck times f, not times f g."""
+    effect = of_one(WeldCompliance, found[0].joint, found[0].share, families, 4)
+    x = np.array([8.0, np.log(1.5)])
+    terms = effect.matrices(x)
+    due = reduced.structure.system.K + sum(t.coefficient * t.operator for t in terms)
+    made = structure(effect.apply(deck, x)).system.K
+    assert len(terms) == 2
+    assert abs(made - due).max() < 1e-7 * abs(effect.operator).max()
+
+
 def test_names_follow_what_is_carried(found, families):
     one = found[0]
     effect = of_one(WeldCompliance, one.joint, one.share, families, 4)
