@@ -226,7 +226,7 @@ def test_across_a_tube_nothing_is_known_and_nothing_counts(where):
     """The second parameter of a place does nothing on a line of beams: its prior is no doubt."""
     mass = PointMass.near(where, len(where.grids) // 2)
     sd = np.array([0.1, 0.6, 1.5])
-    radius = mass.located(np.zeros(3), sd).radius_m
+    radius = mass.location(np.zeros(3), sd).radius_m
     assert radius == pytest.approx(1.96 * WIDER * 0.6 * mass.patch.size)
 
 

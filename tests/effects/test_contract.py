@@ -12,7 +12,7 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects import discretisation as mesh
 from chladni.effects import registry
 from chladni.effects import sensor_fault as sensors
-from chladni.effects.calibration_parameters import calibration_parameter, channel_gain, random_field
+from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.crack import LineFinder, crack
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.effect_context import EffectContext, Setup
@@ -88,7 +88,7 @@ def cases(reduced):
         "rho": (calibration_parameter(groups, "rho", [0]), [-0.05], [0]),
         "t": (calibration_parameter(groups, "t", [0]), [0.04], [0]),
         "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
-        "gain": (channel_gain(CHANNELS, 0.5), [0.3], [0]),
+        "gain": (sensors.channel_gain(CHANNELS, 0.5), [0.3], [0]),
         "orthotropic-material": (ortho, [0.18, -0.22, 0.1, means[3] + 0.1], means),
         "point-mass": (PointMass.near(where, k), [0.2, 0.1, -0.1], [-20, 0, 0]),
         "extra-support": (
@@ -116,7 +116,7 @@ def cases(reduced):
     }  # fmt: skip
     ones = (Parameter("k", "-", 0.0, 0.4),)
     found["fold-bending"] = (
-        FoldBending(ones, "folds", share=np.full(len(groups), 0.5)),
+        FoldBending(ones, "folds", quantity="bending", functions=np.full((len(groups), 1), 0.5)),
         [0.3],
         [0],
     )

@@ -72,18 +72,18 @@ def test_a_tilt_worth_a_word_is_said(support):
 def test_a_place_is_known_as_well_as_the_fit_says(support):
     """95 % of a Gaussian in a plane lie in the radius √5.99 sd (χ² of two); no less than h."""
     rng, sd = np.random.default_rng(0), np.array([0.1, 0.8, 0.8, 0.1, 0.1])
-    radius = support.located(np.zeros(5), sd).radius_m
+    radius = support.location(np.zeros(5), sd).radius_m
     drawn = support.patch.size * WIDER * 0.8 * rng.normal(size=(20000, 2))
     assert np.mean(np.linalg.norm(drawn, axis=1) < radius) == pytest.approx(0.95, abs=0.01)
-    longer = support.located(np.zeros(5), sd * [1, 1, 2, 1, 1]).radius_m
+    longer = support.location(np.zeros(5), sd * [1, 1, 2, 1, 1]).radius_m
     assert longer == pytest.approx(2 * radius)  # what one way is less known counts
-    assert support.located(np.zeros(5), 1e-3 * sd).radius_m == support.patch.size
+    assert support.location(np.zeros(5), 1e-3 * sd).radius_m == support.patch.size
     beyond = np.array([0.0, 0.0, 40.0, 0.0, 0.0])  # its deviation there is that of the prior
-    assert support.located(beyond, sd * [1, 1, 9, 1, 1]).radius_m == pytest.approx(radius)
+    assert support.location(beyond, sd * [1, 1, 9, 1, 1]).radius_m == pytest.approx(radius)
 
 
 def test_at_the_edge_of_a_fold_what_leads_off_it_is_no_doubt(support):
     """All grids that face as it does lie on a line: the other parameter stays at its prior."""
     line = replace(support.patch, flat=support.patch.flat * [1.0, 0.0])
-    known = replace(support, patch=line).located(np.zeros(5), np.array([0.1, 0.8, 1.5, 0.1, 0.1]))
+    known = replace(support, patch=line).location(np.zeros(5), np.array([0.1, 0.8, 1.5, 0.1, 0.1]))
     assert known.radius_m == pytest.approx(1.96 * WIDER * 0.8 * support.patch.size)

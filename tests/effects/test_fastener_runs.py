@@ -20,8 +20,7 @@ from chladni.effects.joints import (
     without_joint,
 )
 from chladni.effects.model_families import joint_families
-from chladni.effects.weld_compliance import WeldCompliance, of_one, proposed
-from chladni.effects.weld_missing import WeldMissing
+from chladni.effects.weld_compliance import WeldCompliance, WeldMissing, of_one, proposed
 from chladni.fem.assemble import structure
 from chladni.updating.candidates import Scan
 from chladni.updating.fastener_scan import (
@@ -203,7 +202,7 @@ def test_all_that_was_tried_is_paid_for(context):
 
 
 def test_a_run_that_is_gone_is_the_deck_without_it(seam, ground, welds):
-    families = {text: (K, sd) for text, K, sd in joint_families(ground.structure)}
+    families = joint_families(ground.structure)
     (one,) = together(ground, [[welds[k].joint for k in GONE]])
     effect = of_one(WeldMissing, one.joint, one.share, families, 140, len(GONE))
     x = np.array([-12.0, 0.0])

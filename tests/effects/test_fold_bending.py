@@ -53,15 +53,17 @@ def test_flat_parts_have_no_factor_and_folded_ones_one_each():
         found = fold_bending(groups)
         assert [f.text for f in found] == [f"bending at folds of {p.name}" for p in made.parts]
         for f in found:
-            assert 0 < f.share.max() <= 1
-            assert np.ptp(groups.part[f.share > 0]) == 0
+            assert 0 < f.functions.max() <= 1
+            assert np.ptp(groups.part[f.functions[:, 0] > 0]) == 0
 
 
 def test_of_a_flat_plate_the_factor_goes_with_the_square_of_frequencies():
     """Bending alone carries them: as E does, and the mass is as it was."""
     groups = element_groups(structure(plate(0.4, 0.3, 10, 8, 1e-3)))
     model = reduce(groups, normal_modes(groups.structure.system, band=400.0).shapes)
-    bent = FoldBending((Parameter("k", "-", 0.0, 1.0),), "all", share=np.ones(len(groups)))
+    everywhere = np.ones((len(groups), 1))
+    unknown = Parameter("k", "-", 0.0, 1.0)
+    bent = FoldBending((unknown,), "all", quantity="bending", functions=everywhere)
     nominal, states = evaluate(model, [], np.zeros(0), False), []
     for effect in (bent, calibration_parameter(groups, "E", [0])):
         states.append(evaluate(model, [effect], np.array([0.2]), False))

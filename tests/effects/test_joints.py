@@ -7,13 +7,20 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.adhesive_stiffness import SEALANT, beads_of
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.contact_stiffness import close_places
 from chladni.effects.joints import alone, beads, fasteners, with_factor_on, without_joint
 from chladni.effects.model_families import joint_families
-from chladni.effects.weld_compliance import MOST_LN_LEFT, NONE_LEFT, SOUND, WeldCompliance, of_one
-from chladni.effects.weld_missing import WeldMissing
+from chladni.effects.viscoelastic_joint import SEALANT, beads_of
+from chladni.effects.weld_compliance import (
+    GONE,
+    MOST_LN_LEFT,
+    NONE_LEFT,
+    SOUND,
+    WeldCompliance,
+    WeldMissing,
+    of_one,
+)
 from chladni.fem.assemble import structure
 from chladni.updating.fastener_scan import (
     fastener_scores,
@@ -38,7 +45,7 @@ def found(reduced):
 
 @pytest.fixture(scope="module")
 def families(reduced):
-    return {text: (K, sd) for text, K, sd in joint_families(reduced.structure)}
+    return joint_families(reduced.structure)
 
 
 def full(assembly):
@@ -80,14 +87,15 @@ def test_a_sound_weld_is_the_deck_and_a_missing_one_the_deck_without_it(
 ):
     for one in found:
         effect = of_one(WeldMissing, one.joint, one.share, families, len(found))
-        x = np.array([-12.0, 0.0][: len(effect.parameters)])
+        x = np.array([GONE, 0.0][: len(effect.parameters)])
         model = reduced.model_for(effect, x)
         gone = full(without_joint(deck, one.joint))
         assert_allclose(hertz(model, effect, x), gone, rtol=2e-3)
         assert np.abs(gone / full(deck) - 1).max() > 2e-3
         x[0] = SOUND
         assert_allclose(hertz(model, effect, x), full(deck), rtol=1e-6)
-        assert_allclose(full(effect.apply(deck, np.array([-12.0]))), gone, rtol=1e-9)
+        x[0] = GONE
+        assert_allclose(full(effect.apply(deck, x)), gone, rtol=1e-9)
 
 
 def test_modes_alone_do_not_see_a_stiff_weld_go(deck, reduced, found, families):
@@ -107,6 +115,17 @@ def test_no_weld_has_more_taken_from_it_than_it_has(reduced, found, families):
     for g in (-6.0, 6.0):
         lam = evaluate(model, [effect], np.array([-8.0, g]), False).lam
         assert lam[0] > -1e-6 * lam[6]
+
+
+def test_the_deck_has_the_stiffness_of_the_terms(deck, reduced, found, families):
+    """K + (f - 1) K_j + (g - 1) Σ K_i, with the joint in the deck times f, not times f g."""
+    effect = of_one(WeldCompliance, found[0].joint, found[0].share, families, 4)
+    x = np.array([8.0, np.log(1.5)])
+    terms = effect.matrices(x)
+    due = reduced.structure.system.K + sum(t.coefficient * t.operator for t in terms)
+    made = structure(effect.apply(deck, x)).system.K
+    assert len(terms) == 2
+    assert abs(made - due).max() < 1e-7 * abs(effect.operator).max()
 
 
 def test_names_follow_what_is_carried(found, families):

@@ -7,9 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.calibrated_family import calibrated_family
 from chladni.effects.element_groups import element_groups
-from chladni.effects.model_families import ADHESIVE, FAR, joint_nuisances, model_families
+from chladni.effects.model_families import (
+    ADHESIVE,
+    FAR,
+    calibrated_family,
+    joint_nuisances,
+    model_families,
+)
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Bushes
 from chladni.updating.reduced_model import evaluate, reduce
@@ -35,14 +40,14 @@ def test_every_family_is_found(jointed):
 def test_a_factor_on_bushes_is_that_of_the_deck(jointed):
     built = structure(jointed)
     twice = replace(jointed, bushes=replace(jointed.bushes, stiffness=2 * jointed.bushes.stiffness))
-    found = model_families(built)[0].slope.K
+    found = model_families(built)[0].operator
     assert_allclose((structure(twice).system.K - built.system.K - found).toarray(), 0, atol=1e-3)
 
 
 def test_shear_is_the_part_of_the_stiffness_that_residual_bending_softens(jointed):
     """Without it the stiffness is larger, and in no other strain."""
     built = structure(jointed)
-    shear = sum(f.slope.K for f in model_families(built)[1:]).toarray()
+    shear = sum(f.operator for f in model_families(built)[1:]).toarray()
     stiffer = (structure(jointed, residual_bending=False).system.K - built.system.K).toarray()
     w, V = np.linalg.eigh(stiffer)
     idle = V[:, np.abs(w) < 1e-9 * w.max()]

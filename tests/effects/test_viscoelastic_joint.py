@@ -8,11 +8,10 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.adhesive_stiffness import beads_of
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Parameter
 from chladni.effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
-from chladni.effects.joints import fasteners, with_factor_on
+from chladni.effects.joints import fasteners, stiffness, with_factor_on
 from chladni.effects.model_families import joint_families
 from chladni.effects.viscoelastic_joint import (
     LEVEL_SD,
@@ -21,8 +20,9 @@ from chladni.effects.viscoelastic_joint import (
     NO_LOSS,
     SD,
     ViscoelasticJoint,
-    _suspects,
+    beads_of,
     speaks_for,
+    suspects,
 )
 from chladni.fem.assemble import structure
 from chladni.geometry.sampling import farthest_point_sample, nearest_points
@@ -256,17 +256,17 @@ def test_bushes_are_tried_together_and_one_by_one(on_mounts):
     """Operators of the single ones add up to that of all, which is the family's."""
     built = structure(on_mounts)
     mounts = [j for j in fasteners(built) if j.kind == "bushes"]
-    tried = [s for s in _suspects(built, mounts) if s.family == "bushes"]
-    assert [len(s.joint.elements) for s in tried] == [3, 1, 1, 1]
-    whole, *each = (s.operator for s in tried)
-    family = {text: K for text, K, _ in joint_families(built)}["bushes"]
+    tried = [joint for joint in suspects(built, mounts) if joint.kind == "bushes"]
+    assert [len(joint.elements) for joint in tried] == [3, 1, 1, 1]
+    whole, *each = (stiffness(built, joint) for joint in tried)
+    family, _ = joint_families(built)["bushes"]
     assert abs(whole - family).max() < 1e-9 * abs(family).max()
     assert abs(whole - sum(each[1:], each[0])).max() < 1e-9 * abs(family).max()
 
 
 def test_a_bush_that_dissipates_has_its_own_loss_in_the_deck(on_mounts):
     built = structure(on_mounts)
-    mount = next(s.joint for s in _suspects(built, fasteners(built)[-3:]) if s.family == "bushes")
+    mount = next(j for j in suspects(built, fasteners(built)[-3:]) if j.kind == "bushes")
     one = replace(mount, elements=np.array([1]))
     unknown = tuple(Parameter(n, "-", 0.0, 1.0, s) for n, s in (("K", 1.0), ("loss factor", LOSS)))
     x = np.array([np.log(0.5), 0.0])

@@ -21,7 +21,7 @@ class Lump(Effect):
     name = "lump"
     at: float = 0.0
 
-    def location(self, x):
+    def location(self, x, sd=None):
         return Location(self.text, point_m=(self.at, 0.0, 0.0), radius_m=0.01)
 
 

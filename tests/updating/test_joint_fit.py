@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import calibration_parameter, channel_gain
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import WIDER, Effect
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.point_mass import PointMass
+from chladni.effects.sensor_fault import channel_gain
 from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.joint_fit import informed, joint_fit, of_the_object, with_priors
 from chladni.updating.map_fit import MassMeasurement, fit

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import calibration_parameter, channel_gain
+from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.point_mass import PointMass
-from chladni.effects.sensor_fault import sensor_fault
+from chladni.effects.sensor_fault import channel_gain, sensor_fault
 from chladni.fem.modelled import solved
 from chladni.updating.hypothesis_fit import over_scales
 from chladni.updating.pole_data import Poles

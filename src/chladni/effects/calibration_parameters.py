@@ -10,15 +10,15 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import (
-    Anisotropic,
     BeamSection,
     Isotropic,
     Material,
     Orthotropic,
     Part,
     ShellSection,
+    SolidSection,
 )
-from .effect import ChannelChange, Effect, FieldChange, Parameter
+from .effect import Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
 
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05, "wall": 0.05}  # prior sd of ln(value / deck's value)
@@ -33,29 +33,39 @@ REASONS = {  # of the priors, by the field
 }
 OF_FIELDS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
 SHEET, TUBE = ("E", "rho", "t"), ("E", "rho", "wall")  # of a part of shells, and of beams
+MODULI = "E", "G", "E1", "E2", "G12", "G1z", "G2z", "Q"  # of isotropic to anisotropic materials
 _AREAS = ("area", "I1", "I2", "I12", "J")  # proportional to the wall of a thin tube
 
 
 @dataclass(frozen=True, eq=False)
-class PartScale(Effect):
+class LogField(Effect):
+    """ln of the factor on one field of shells and beams: Σ_j x_j φ_j over the groups.
+
+    ``functions`` (n_groups, n_parameters) are φ_j.
+    """
+
+    quantity: str = "E"
+    functions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """The field."""
+        return (FieldChange(self.quantity, self.functions @ x, self.functions),)
+
+
+@dataclass(frozen=True, eq=False)
+class PartScale(LogField):
     """E, rho or t (of beams: the wall) of one part, or of several together, times e^x."""
 
     name = "part-scale"
     claim = "a calibration parameter of the deck is wrong"
     kind = "calibration"
 
-    quantity: str = "E"
+    written: str = "E"  # name of the field in the deck
     positions: tuple[int, ...] = ()
-    inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (n_groups,) 1 in these parts
-
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """ln factor x on the groups of these parts."""
-        name = "t" if self.quantity == "wall" else self.quantity
-        return (FieldChange(name, x[0] * self.inside, self.inside[:, None]),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Change the value in these parts of the deck."""
-        return with_scaled(assembly, self.quantity, self.positions, float(np.exp(x[0])))
+        return with_scaled(assembly, float(np.exp(x[0])), self.written, self.positions)
 
 
 def calibration_parameter(
@@ -70,7 +80,8 @@ def calibration_parameter(
     inside = np.isin(groups.part, positions).astype(float)
     return PartScale(
         (parameter,), f"{quantity} of {', '.join(names)}", names,
-        quantity=quantity, positions=tuple(positions), inside=inside,
+        quantity="t" if quantity == "wall" else quantity, functions=inside[:, None],
+        written=quantity, positions=tuple(positions),
     )  # fmt: skip
 
 
@@ -109,11 +120,13 @@ def _material(part: Part) -> Material | None:
 
 
 def value(part: Part, quantity: str) -> float:
-    """E [Pa], rho [kg/m³] or t [m] of a part of shells; E, rho or wall (1) of a part of beams.
+    """The deck's value of a field of a part [SI]; the wall of a part of beams is 1.
 
     E of an orthotropic sheet is sqrt(E1 E2).
     """
     section, material = part.section, _material(part)
+    if isinstance(section, SolidSection) or quantity not in (*SHEET, *TUBE):
+        return float(getattr(material, quantity))
     if quantity not in (TUBE if isinstance(section, BeamSection) else SHEET):
         raise TypeError(f"part {part.name} has no {quantity}")
     if quantity == "wall":
@@ -131,9 +144,9 @@ def value(part: Part, quantity: str) -> float:
 
 
 def with_scaled(
-    assembly: Assembly, quantity: str, positions: Sequence[int], factor: float
+    assembly: Assembly, factor: float, quantity: str, positions: Sequence[int]
 ) -> Assembly:
-    """Multiply E, rho, t or wall of these parts of shells or beams by a factor."""
+    """Multiply a field of these parts by a factor."""
     parts = list(assembly.parts)
     for k in positions:
         parts[k] = scaled(parts[k], quantity, factor)
@@ -146,51 +159,34 @@ def with_scaled(
 
 
 def scaled(part: Part, quantity: str, factor: float) -> Part:
-    """Multiply E, rho, t or wall of a part by a factor; a part of solids is unchanged."""
+    """Multiply a field of a part by a factor; E scales all moduli."""
     section = part.section
-    if isinstance(section, BeamSection):
-        if quantity == "wall":
-            return part.with_section(**{n: getattr(section, n) * factor for n in _AREAS})
-        return part.with_section(material=_scaled_material(section.material, quantity, factor))
-    if not isinstance(section, ShellSection):
-        return part
+    if quantity == "wall":
+        return part.with_section(**{n: getattr(section, n) * factor for n in _AREAS})
     if quantity == "t":
+        assert isinstance(section, ShellSection)
         return part.with_section(thickness=section.thickness * factor)
-    changed = {
-        name: _scaled_material(material, quantity, factor)
-        for name in ("membrane", "bending", "shear", "coupling")
-        if (material := getattr(section, name)) is not None
-    }
-    return part.with_section(**changed)
+    materials = {n: m for n, m in vars(section).items() if isinstance(m, Material)}
+    return part.with_section(
+        **{n: _scaled_material(m, quantity, factor) for n, m in materials.items()}
+    )
 
 
 def _scaled_material(material: Material, quantity: str, factor: float) -> Material:
-    if quantity == "rho":
-        return replace(material, rho=material.rho * factor)
-    if isinstance(material, Isotropic):
-        G = None if material.G is None else material.G * factor
-        return replace(material, E=material.E * factor, G=G)
-    if isinstance(material, Anisotropic):
-        return replace(material, Q=material.Q * factor, G=material.G * factor)
-    names = ("E1", "E2", "G12", "G1z", "G2z")
-    return replace(material, **{name: getattr(material, name) * factor for name in names})
+    """Multiply the numbers that a material has of a field."""
+    names = MODULI if quantity == "E" else (quantity,)
+    known = {n: v for n in names if (v := getattr(material, n, None)) is not None}
+    return replace(material, **{n: v * factor for n, v in known.items()})
 
 
 @dataclass(frozen=True, eq=False)
-class RandomField(Effect):
+class RandomField(LogField):
     """Smooth scatter of a field within the parts, by Karhunen-Loève functions with unit prior."""
 
     name = "scatter"
     claim = "thickness and modulus vary smoothly within a part"
     kind = "nuisance"
     writable = False
-
-    quantity: str = "t"
-    functions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n_groups, n), sd in
-
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Σ_j x_j φ_j over the groups."""
-        return (FieldChange(self.quantity, self.functions @ x, self.functions),)
 
 
 def random_field(
@@ -235,24 +231,3 @@ def _functions(
             column[inside] = sd * np.sqrt(w[k]) * V[:, k] / root
             out.append(column)
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class ChannelGain(Effect):
-    """One unknown real factor, common to all channels."""
-
-    name = "gain"
-    claim = "the gain of the measuring chain is unknown"
-    kind = "nuisance"
-    n_outputs: int = 1
-
-    def outputs(self, x: np.ndarray) -> ChannelChange:
-        """x / ln 10 on every channel."""
-        one = np.ones(self.n_outputs) / np.log(10)
-        return ChannelChange(x[0] * one.astype(complex), one[:, None].astype(complex))
-
-
-def channel_gain(n_outputs: int, sd: float) -> ChannelGain:
-    """The unknown gain e^x."""
-    unknown = Parameter("gain", "-", 0.0, sd, step=1.0)
-    return ChannelGain((unknown,), "every channel", n_outputs=n_outputs)

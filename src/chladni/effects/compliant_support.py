@@ -16,11 +16,12 @@ from ..dynamics.eigen import normal_modes
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
-from ..fem.released import Clamp, clamps, released
+from ..fem.released import Clamp, Release, clamps, released
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.clamp_springs import AN_AXIS, with_clamp_on_springs
 from .effect import Effect, Parameter, PointTerm
+from .estimate import in_mm
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_starts
 
@@ -74,18 +75,10 @@ class CompliantSupport(Effect):
 
     name = "compliant-support"
     claim = "a clamp is compliant where the deck is rigid"
-    lets_go: ClassVar[bool] = True
     rounds: ClassVar[int] = 1
 
-    every: tuple[Clamp, ...] = ()  # clamps of the structure, including this one
-    rigid: np.ndarray | None = None  # springs as good as rigid of all of them (6 clamps,)
     direction: SupportDirection | None = None
     rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure
-
-    def released(self, built: Structure) -> Structure:
-        """The structure with all of its clamps on springs that are as good as rigid."""
-        assert self.rigid is not None
-        return released(built, self.every, self.rigid)
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """(k - k_rigid) gᵀg for each compliant motion g of the clamp."""
@@ -98,16 +91,12 @@ class CompliantSupport(Effect):
         """Spring stiffness [N/m] and [N m/rad] of each parameter."""
         return np.array([p.value(v) for p, v in zip(self.parameters, x, strict=True)])
 
-    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """Inertia loads M u of the structure that follows the clamp."""
-        return M @ static[: M.shape[0]]
-
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Replace the supports by GRID, RBE2 and CELAS2 to ground."""
         assert self.direction is not None
-        return on_springs(
-            assembly, self.every[self.direction.clamp], self.direction, self.springs(x)
-        )
+        assert self.release is not None
+        clamp = self.release.clamps[self.direction.clamp]
+        return on_springs(assembly, clamp, self.direction, self.springs(x))
 
 
 def on_springs(
@@ -227,21 +216,20 @@ def _effect(
     x, y, z = clamp.centre.tolist()
     return CompliantSupport(
         unknown, _said(clamp, direction), grids=tuple(int(g) for g in clamp.grids), point=(x, y, z),
-        trials_factor=tried, every=every, direction=direction, rows=sp.csr_array(rows),
-        rigid=np.repeat(stiff, 3),
+        trials_factor=tried, release=Release(every, np.repeat(stiff, 3)), direction=direction,
+        rows=sp.csr_array(rows),
     )  # fmt: skip
 
 
 def _said(clamp: Clamp, direction: SupportDirection) -> str:
     """The place of the clamp and the direction of its compliance, in words."""
-    at = ", ".join(f"{1e3 * v:.0f}" for v in clamp.centre)
     n = len(clamp.grids)
     grids = f"grid {clamp.grids[0]}" if n == 1 else f"{n} grids from {clamp.grids[0]} on"
     how = [
         f"along {_named(direction.frame[0])}" if c == 1 else f"about {_named(direction.frame[1])}"
         for c in direction.components
     ]
-    return f"the supports of {grids} near ({at} mm), {' and '.join(how)}"
+    return f"the supports of {grids} near ({in_mm(clamp.centre)} mm), {' and '.join(how)}"
 
 
 def _named(axis: np.ndarray) -> str:
@@ -268,13 +256,8 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     springs = direction.pull.max(axis=1) / rng.uniform(*TAKEN)
     names = ["K" if c == 1 else "K_rot" for c in direction.components]
     known = dict(zip(names, springs.tolist(), strict=True))
-    truth = {
-        "point_m": every[chosen].centre.tolist(),
-        "value": float(springs[0]),
-        "parameters": known,
-    }
     loose = on_springs(assembly, every[chosen], direction, springs)
-    return replace(article, assembly=loose, truth=truth)
+    return article.with_hidden(loose, known, every[chosen].centre)
 
 
 FAMILY = Family(

@@ -1,7 +1,7 @@
 """Two sheets that almost touch in the model and do touch in reality."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,10 +12,9 @@ from ..geometry.clearance import all_gaps
 from ..geometry.refine import smooth_normals
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from .effect import Effect, PointTerm
 from .effect_context import ElementGrids
 from .family import Article, Family
-from .points import strength
+from .points import AtPoints, strength
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .sheet_pairs import SheetPairs
 
@@ -50,20 +49,13 @@ class ClosePlaces(SheetPairs):
 
 
 @dataclass(frozen=True, eq=False)
-class ContactStiffness(Effect):
+class ContactStiffness(AtPoints):
     """K + k bᵀ b, b the relative motion of two sheets across the gap."""
 
     name = "contact-stiffness"
     claim = "two sheets touch where the model has a gap"
 
     place: ClosePlaces | None = None
-    rows: sp.csr_array | None = None
-
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """One spring."""
-        assert self.rows is not None
-        c = np.array([self.parameters[0].value(x[0])])
-        return (PointTerm("K", self.rows, c, c[:, None]),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CBUSH between two RBE3 at the place."""
@@ -106,18 +98,13 @@ def contacts(built: Structure) -> list[ContactStiffness]:
     out = []
     for k, sheets in enumerate(places.sheets):
         grid, (x, y, z) = int(places.grids[k]), places.middle[k].tolist()
+        text = f"between {sheets[0]} and {sheets[1]} at grid {grid}"
         out.append(
             ContactStiffness(
-                (K,),
-                f"between {sheets[0]} and {sheets[1]} at grid {grid}",
-                sheets,
-                (grid,),
-                point=(x, y, z),
-                trials_factor=len(places),
-                place=places.only([k]),
-                rows=rows[[k]],
+                (K,), text, sheets, (grid,), point=(x, y, z), trials_factor=len(places),
+                place=places.only([k]), rows=rows[[k]],
             )
-        )
+        )  # fmt: skip
     return out
 
 
@@ -130,7 +117,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if context.scan is None:
         some = farthest_point_sample(points, BY_POLES)
         chosen = [effects[k] for k in some]
-        return best_places(context, chosen, points[some], FOLLOWED, extended=True)
+        return best_places(context, chosen, FOLLOWED, extended=True)
     places = ElementGrids(
         np.array([e.grids[0] for e in effects]),
         np.array([e.place.along[0] for e in effects if e.place is not None]),
@@ -155,8 +142,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     effect = effects[int(rng.integers(len(effects)))]
     K = float(np.exp(rng.uniform(np.log(2e4), np.log(2e5))))
     made = effect.apply(article.assembly, np.array([np.log(K / MEDIAN)]))
-    truth = {"point_m": list(effect.point or ()), "value": K, "parameters": {"K": K}}
-    return replace(article, assembly=made, truth=truth)
+    return article.with_hidden(made, {"K": K}, effect.point or ())
 
 
 FAMILY = Family(

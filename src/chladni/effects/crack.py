@@ -19,7 +19,7 @@ from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
 from .effect import Effect, MatrixTerm, Parameter
 from .element_groups import ElementGroups
-from .estimate import Estimate
+from .estimate import Estimate, in_mm
 from .family import Article, Family
 from .search_context import Candidate, ResponseScan, SearchContext, best_places, distinct
 
@@ -195,14 +195,13 @@ def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     assembly, on = groups.structure.assembly, line.shells
     K = blocks(groups.cubic[on], groups.nodes[on], len(assembly.points))
     name, (x, y, z) = assembly.parts[line.part].name, line.centre.tolist()
-    at = ", ".join(f"{1e3 * v:.0f}" for v in (x, y, z))
     starts = (-1.5, -0.5, 0.5, 1.5, 2.5)
     unknown = Parameter("12I/T3", "-", 0.0, 1.5, kind="linear", starts=starts, nominal=-40.0)
     reach = np.linalg.norm(np.ptp(assembly.points[groups.nodes[on].ravel()], axis=0)) / 2
     return Crack(
-        (unknown,), f"on {name} through ({at} mm)", (name,), point=(x, y, z), radius=float(reach),
-        grids=tuple(assembly.ids[np.unique(groups.nodes[on])].tolist()), trials_factor=tried,
-        shells=on, operator=congruence(groups.structure.T, K), line=line,
+        (unknown,), f"on {name} through ({in_mm(line.centre)} mm)", (name,), point=(x, y, z),
+        radius=float(reach), grids=tuple(assembly.ids[np.unique(groups.nodes[on])].tolist()),
+        trials_factor=tried, shells=on, operator=congruence(groups.structure.T, K), line=line,
     )  # fmt: skip
 
 
@@ -235,10 +234,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
     ends, tried = first[::ANGLES], len(first)
     if first and context.scan is not None:
         ends, tried = _at_rest(context.scan, len(context.bases) - 1, lines, first)
-    if not ends:
-        return []
     effects = [crack(groups, line, tried) for line in ends]
-    return best_places(context, effects, np.array([e.point for e in effects]), FOLLOWED)
+    return best_places(context, effects, FOLLOWED)
 
 
 def _at_rest(
@@ -313,8 +310,8 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     f = float(rng.uniform(0.2, 0.5))
     here, there = (a.points[a.shells.nodes].mean(axis=1) for a in (article.assembly, article.deck))
     inside = np.flatnonzero(np.isin(cKDTree(there).query(here)[1], line.shells))
-    truth = {"point_m": line.centre.tolist(), "value": f, "parameters": {"12I/T3": f}}
-    return replace(article, assembly=cracked(article.assembly, inside, f), truth=truth)
+    made = cracked(article.assembly, inside, f)
+    return article.with_hidden(made, {"12I/T3": f}, line.centre)
 
 
 FAMILY = Family(

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self
 import numpy as np
 import scipy.sparse as sp
 
-from ..fem.assemble import Structure
+from ..fem.released import Release
 from ..model.assembly import Assembly
 from .estimate import Estimate, Location
 
@@ -200,6 +200,7 @@ class Effect:
     trials_factor : number of places tried, this one included (look-elsewhere effect)
     replaces : names of calibration parameters that it makes superfluous
     expected : whether the materials of the deck usually have it
+    release : clamps that it releases, so that its rows reach beyond the dofs of the deck
     """
 
     name: ClassVar[str] = "nothing"
@@ -210,7 +211,6 @@ class Effect:
     elastic: ClassVar[bool] = False  # adds or removes stiffness only, without friction
     lone: ClassVar[bool] = False  # a second one of its kind is not a finding
     rounds: ClassVar[int] = 0  # of loads that its responses cause, see ``reloads``
-    lets_go: ClassVar[bool] = False  # releases clamps: its rows reach beyond the dofs of the deck
     own_dofs: ClassVar[int] = 0  # degrees of freedom it adds: its terms must give them mass
 
     parameters: tuple[Parameter, ...] = ()
@@ -223,6 +223,7 @@ class Effect:
     replaces: tuple[str, ...] = ()
     channels: tuple[str, ...] = field(default=())
     expected: bool = False
+    release: Release | None = None
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """Factors on fields of shells and beams."""
@@ -266,13 +267,6 @@ class Effect:
         """Place (3,) [m] and mass [kg] of an effect that is a mass at a place, else None."""
         return None
 
-    @classmethod
-    def of_lump(
-        cls, where: "EffectContext", point: np.ndarray, mass: float
-    ) -> tuple["Effect", np.ndarray] | None:
-        """The effect and its start from a mass [kg] at a place (3,) [m], or None if impossible."""
-        return None
-
     def off_the_scales(self, x: np.ndarray) -> float:
         """Mass [kg] on the structure during the test that is removed before weighing."""
         return 0.0
@@ -290,17 +284,13 @@ class Effect:
         operators = [sp.csr_array((m.operator @ shapes).T) for m in self.matrices(x)]
         return sp.csr_array(sp.vstack([*points, *operators])) if points or operators else None
 
-    def released(self, built: Structure) -> Structure:
-        """The structure with the additional dofs of its rows, which the deck's supports remove."""
-        return built
-
     def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
         """Loads (n, k) caused by the static responses (n, k) of the previous round.
 
         A strong effect changes modes beyond first order. The basis then contains the responses to
         these loads as well, ``rounds`` times.
         """
-        return M @ static
+        return M @ static[: M.shape[0]]  # beyond are motions of released clamps
 
     def recentred(
         self, x: np.ndarray, where: "EffectContext"
@@ -342,13 +332,9 @@ class Effect:
             information = np.maximum(1 / np.square(sd) - 1 / prior**2, 0.0)
         return np.asarray(1 / np.sqrt(1 / prior**2 + information / WIDER**2))
 
-    def location(self, x: np.ndarray) -> Location:
-        """The place of the effect after a fit."""
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
+        """The place after a fit, with its uncertainty where ``sd`` (n_p,) is given."""
         return self.where()
-
-    def located(self, x: np.ndarray, sd: np.ndarray) -> Location:
-        """The fitted place with its uncertainty, where the fit gives one."""
-        return self.location(x)
 
     def becomes(self, x: np.ndarray) -> str:
         """Name of the simpler effect that the data cannot distinguish from it at x, or ""."""

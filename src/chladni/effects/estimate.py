@@ -1,6 +1,12 @@
 """Results of a fitted effect: its size and its place (SI)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+
+def in_mm(place: Iterable[float]) -> str:
+    """Coordinates [m] as text in millimetres: 120, -35, 4."""
+    return ", ".join(f"{1e3 * v:.0f}" for v in place)
 
 
 @dataclass(frozen=True)

@@ -86,9 +86,9 @@ class ExtraSupport(MovableAttachment):
         k, d = self.parameters[0].value(x[0]), self.pushes(x)
         return with_ground_bushes(assembly, row, d[None], k, self.at(x)[None])
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The fitted place, and the direction where it is not across the sheet."""
-        found, d = super().location(x), self.pushes(x)
+        found, d = super().location(x, sd), self.pushes(x)
         if abs(d @ self.direction) > ACROSS:
             return found
         return replace(found, text=f"{found.text}, along ({', '.join(f'{v:.2f}' for v in d)})")
@@ -113,10 +113,8 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     grid = article.shell_grid(rng)
     K = float(np.exp(rng.uniform(np.log(2e3), np.log(5e4))))
     at = article.grids_at(np.array([grid]))
-    point = article.deck.points[article.deck.rows([grid])[0]].tolist()
-    truth = {"point_m": point, "value": K, "parameters": {"K": K}}
     held = with_springs(article.assembly, at, np.eye(3)[2:], K)
-    return replace(article, assembly=held, truth=truth)
+    return article.with_hidden(held, {"K": K}, article.place_of(grid))
 
 
 FAMILY = Family(

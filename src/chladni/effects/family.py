@@ -1,9 +1,9 @@
 """A family of effects: its interface to search, bench, deck and page."""
 
 import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -41,6 +41,24 @@ class Article:
     drive: tuple[int, tuple[float, float, float]] | None = None
     truth: dict[str, Any] = field(default_factory=dict)
 
+    def with_hidden(
+        self, assembly: Assembly, parameters: Mapping[str, float], point: Iterable[float] = (),
+        **more: Any,
+    ) -> Self:  # fmt: skip
+        """The article with an effect in its assembly, and the truth about it.
+
+        Parameters
+        ----------
+        parameters : by the names that the effect reports, the one to be found first
+        point : (3,) its place [m], where it has one
+        more : other entries of the truth, for example ``radius_m``
+        """
+        place = [float(v) for v in point]
+        truth: dict[str, Any] = {"point_m": place} if place else {}
+        value = next(iter(parameters.values()))
+        truth |= {"value": value, **more, "parameters": dict(parameters)}
+        return replace(self, assembly=assembly, truth=truth)
+
     @property
     def weight(self) -> float:
         """Mass of the article [kg]."""
@@ -51,10 +69,17 @@ class Article:
         where = self.deck.points[self.deck.rows(grids)]
         return tuple(self.assembly.ids[nearest_points(self.assembly.points, where)].tolist())
 
+    def place_of(self, grid: int) -> np.ndarray:
+        """Place (3,) [m] of a grid of the deck."""
+        return np.asarray(self.deck.points[self.deck.rows([grid])[0]])
+
     def shell_grid(self, rng: np.random.Generator) -> int:
         """Id of a random grid of the deck's shells, or of its beams if it has no shells."""
         nodes = self.deck.shells.nodes if len(self.deck.shells) else self.deck.beams.nodes
         return int(self.deck.ids[rng.choice(np.unique(nodes))])
+
+
+FromLump = tuple[Effect, np.ndarray] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +95,8 @@ class Family:
         starts of ``placed``
     closer : function that moves an effect fitted at x if it explains more next to its place; the
         last of the context's ``bases`` is that of the fit
+    of_lump : function that gives its effect, and its start, from a mass [kg] at a place (3,) [m],
+        or None if impossible; without it, the effect is no mass at a place
     cards : of the deck that represent it
     no_cards : why no card can
     settled_by : the measurement that separates it from similar causes, in words
@@ -82,6 +109,7 @@ class Family:
     placed: Callable[[EffectContext], Sequence[Effect]] | None = None
     candidates: Callable[[SearchContext], Iterable[Candidate]] | None = None
     closer: Callable[[SearchContext, Effect, np.ndarray], Candidate | None] | None = None
+    of_lump: Callable[[EffectContext, np.ndarray, float], FromLump] | None = None
     cards: tuple[str, ...] = ()
     no_cards: str = ""
     settled_by: str = ""

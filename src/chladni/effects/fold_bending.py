@@ -5,33 +5,25 @@ their ends at an edge rigidly; another lets them rotate. A bead smaller than a s
 the deck. Membrane and mass are the same in all of them.
 """
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from ..geometry.facets import cell_areas
 from ..geometry.folds import share_at_folds
-from .effect import Effect, FieldChange, Parameter
+from .calibration_parameters import LogField
+from .effect import Parameter
 from .element_groups import ElementGroups
 
 SPREAD = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
 LEAST_SHARE = 0.02  # share at folds, in groups that have folds, below which a part has no factor
 
 
-@dataclass(frozen=True, eq=False)
-class FoldBending(Effect):
+class FoldBending(LogField):
     """A factor e^(x s) on the bending stiffness of one part, s the share of a group at folds."""
 
     name = "fold-bending"
     claim = "a fold is stiffer or softer in bending than shells joined at an angle"
     kind = "nuisance"
     writable = False
-
-    share: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (n_groups,) 0 of other parts
-
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """ln of the factor on bending stiffness."""
-        return (FieldChange("bending", x[0] * self.share, self.share[:, None]),)
 
 
 def fold_bending(groups: ElementGroups) -> list[FoldBending]:
@@ -49,5 +41,6 @@ def fold_bending(groups: ElementGroups) -> list[FoldBending]:
         if own @ groups.area > LEAST_SHARE * groups.area[own > 0].sum():
             name = assembly.parts[k].name
             unknown = Parameter("k", "-", 0.0, SPREAD, step=0.3)
-            out.append(FoldBending((unknown,), f"bending at folds of {name}", share=own))
+            text = f"bending at folds of {name}"
+            out.append(FoldBending((unknown,), text, quantity="bending", functions=own[:, None]))
     return out

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..errors import ModelError
 from ..model.assembly import Assembly
 from .effect import Effect, Parameter, PointTerm
-from .estimate import Estimate, Location
+from .estimate import Estimate, Location, in_mm
 from .family import Article, Family
 from .hem_line import HemLine, hem_lines
 from .points import NOTHING
@@ -93,14 +93,14 @@ class HemContact(Effect):
         assert L.high is not None
         return k, Estimate("L", 2 * L.value, "m", 2 * L.low, 2 * L.high)
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The stretch, from one end to the other."""
         if not self.local or self.line is None:
             return self.where()
         _, middle, reach = self.parameters
         s0, ell = middle.value(x[1]), reach.value(x[2])
         point, *ends = (self._at(s) for s in (s0, s0 - ell, s0 + ell))
-        begin, end = (", ".join(f"{1e3 * v:.0f}" for v in e) for e in ends)
+        begin, end = map(in_mm, ends)
         text = f"along {self.line.name} from ({begin} mm) to ({end} mm)"
         return replace(self.where(), text=text, point_m=point, radius_m=ell)
 
@@ -153,7 +153,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     line = lines[int(rng.integers(len(lines)))]
     k = float(10 ** rng.uniform(9.0, 10.0))
     made = line.gripped(article.assembly, k * line.share)
-    return replace(article, assembly=made, truth={"value": k, "parameters": {"K": k}})
+    return article.with_hidden(made, {"K": k})
 
 
 FAMILY = Family(

@@ -19,8 +19,9 @@ from ..fem.sparse_assembly import congruence
 from ..geometry.beam_lines import connected_rows, fastener_bars, member_beams
 from ..model.assembly import Assembly, picked
 from ..model.properties import BeamSection, Isotropic, Part, SolidSection
-from .model_families import SOFT
+from .estimate import in_mm
 
+SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
 MOST_SOLIDS = 27  # of a weld: more of them in one piece are a casting
 NEXT = 2.0  # median distances to the nearest: fasteners farther apart are not in one line
 MOST_RUN = 8  # fasteners in a run that is tried as one
@@ -58,9 +59,8 @@ class Connection:
 
     @property
     def where(self) -> str:
-        """What it holds and where, in words."""
-        at = ", ".join(f"{1e3 * v:.0f}" for v in self.point)
-        return f"between {' and '.join(self.parts[:2])} at ({at} mm)"
+        """Its parts and its place, in words."""
+        return f"between {' and '.join(self.parts[:2])} at ({in_mm(self.point)} mm)"
 
 
 def members(assembly: Assembly, kind: str, group: int) -> Any:
@@ -183,12 +183,12 @@ def lines(joints: Sequence[Connection]) -> list[tuple[int, ...]]:
 
 def joined(joints: Sequence[Connection]) -> Connection:
     """Several fasteners of one kind as one."""
-    first = joints[0]
     return replace(
-        first,
+        joints[0],
         elements=np.concatenate([j.elements for j in joints]),
         ids=tuple(i for j in joints for i in j.ids),
         point=np.mean([j.point for j in joints], axis=0),
+        parts=tuple(dict.fromkeys(p for j in joints for p in j.parts)),
         grids=tuple(dict.fromkeys(g for j in joints for g in j.grids)),
         rows=sp.csr_array(sp.vstack([j.rows for j in joints])),
     )
@@ -300,11 +300,18 @@ def with_factor_on(
     return _with_members(replace(assembly, parts=tuple(parts)), joint, changed)
 
 
-def with_solids(assembly: Assembly, factor: float, soft: bool) -> Assembly:
-    """The assembly with all solids of adhesive, or all of metal, times a factor."""
+def with_family(assembly: Assembly, name: str, factor: float) -> Assembly:
+    """Multiply the stiffness of all joints of a family: "adhesive", "welds" or "bushes".
+
+    Firm springs in rigid ties (:mod:`.rigid_ties`) are not bushes of the deck and stay.
+    """
     if factor == 1:
         return assembly
-    parts = []
+    if name == "bushes":
+        old = assembly.bushes
+        own = np.where(old.ids > 0, factor, 1.0)
+        return replace(assembly, bushes=replace(old, stiffness=own[:, None] * old.stiffness))
+    parts, soft = [], name == "adhesive"
     for part in assembly.parts:
         m = getattr(part.section, "material", None)
         if isinstance(part.section, SolidSection) and isinstance(m, Isotropic):

@@ -17,13 +17,13 @@ from ..dynamics.eigen import normal_modes
 from ..fem.assemble import structure
 from ..geometry.facets import point_normals, tangents
 from ..model.added_points import with_points
-from ..model.assembly import Assembly, Bushes, Masses
+from ..model.assembly import Assembly, appended
 from .effect import Effect, Parameter, PointTerm
 from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate
 from .family import Article, Family
-from .movable_attachment import MovableAttachment, around, moved, patch, there
-from .points import strength
+from .movable_attachment import MovableMass, around, moved, patch, there
+from .points import strength, with_masses
 from .search_context import Candidate, SearchContext, best_places, distinct
 
 SHARE = 0.015  # of the structure's mass: prior median of the resonator's mass
@@ -36,7 +36,7 @@ IN_PLANE = 1e3  # times the spring: stiffness that holds the written mass in the
 
 
 @dataclass(frozen=True, eq=False)
-class LocalResonator(MovableAttachment):
+class LocalResonator(MovableMass):
     """x = (ln mass, place along both axes of the patch, ln frequency)."""
 
     name = "local-resonator"
@@ -97,15 +97,6 @@ class LocalResonator(MovableAttachment):
         """Return "point-mass" if the interval of the tuning exceeds the highest spectral line."""
         return self.becomes(x + 1.96 * self.widened(sd))
 
-    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Place and mass of the resonator."""
-        return self.at(x), self.parameters[0].value(x[0])
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """The mass of the resonator."""
-        m = self.parameters[0].value(x[0])
-        return m, np.array([m, 0.0, 0.0, 0.0])
-
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a GRID with CONM2, on a CBUSH from the nearest grid."""
         m, k = self.values(x)
@@ -129,23 +120,14 @@ def with_oscillator(
     if np.isclose(np.abs(normal).max(), 1.0, rtol=0, atol=1e-6):
         frame = np.eye(3)
     stiffness = np.where(np.abs(frame @ normal) > 0.5, k, IN_PLANE * k)
-    masses, bushes, none = assembly.masses, assembly.bushes, np.zeros((1, 6))
-    new_mass = Masses(
-        np.append(masses.ids, int(masses.ids.max(initial=0)) + 1),
-        np.append(masses.node, row),
-        np.concatenate([masses.matrix, np.diag([m, m, m, 0, 0, 0])[None]]),
-    )
-    new_bush = Bushes(
-        np.append(bushes.ids, int(bushes.ids.max(initial=0)) + 1),
-        np.concatenate([bushes.nodes, [[assembly.rows([grid])[0], row]]]),
-        np.concatenate([bushes.frame, frame[None]]),
-        np.concatenate([bushes.place, np.asarray(place)[None]]),
-        np.concatenate([bushes.stiffness, [[*stiffness, 0, 0, 0]]]),
-        np.concatenate([bushes.viscous, none]),
-        np.concatenate([bushes.loss, none]),
-    )
+    grown = with_masses(grown, grown.ids[[row]].tolist(), m)
+    bush = appended(
+        grown.bushes, ids=[int(grown.bushes.ids.max(initial=0)) + 1],
+        nodes=[[assembly.rows([grid])[0], row]], frame=[frame], place=[place],
+        stiffness=[[*stiffness, 0, 0, 0]],
+    )  # fmt: skip
     held = np.concatenate([assembly.supports, [[row, c] for c in (4, 5, 6)]])
-    return replace(grown, masses=new_mass, bushes=new_bush, supports=held)
+    return replace(grown, bushes=bush, supports=held)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
@@ -156,7 +138,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
         few = where.places.only(some[: PLACES // 3])
         at = [where.grids.position(*spot) for spot in zip(few.grids, few.normal, strict=True)]
         effects = [LocalResonator.near(where, k) for k in at]
-        return best_places(context, effects, where.grids.point[at])
+        return best_places(context, effects)
     mass, f_max = SHARE * where.setup.weight, where.setup.f_max
     hertz = np.geomspace(f_max / LOWEST, f_max, TRIED)
     places, taken = where.places.only(some), list[int]()
@@ -203,12 +185,10 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     elastic = normal_modes(structure(article.deck).system, 12).frequency[6:]
     f = float(np.exp(rng.uniform(np.log(elastic[0]), np.log(elastic[-1]))))
     (at,) = article.grids_at(np.array([grid]))
-    row, point = article.assembly.rows([at])[0], article.deck.points[article.deck.rows([grid])[0]]
-    made = article.assembly
+    made, row = article.assembly, article.assembly.rows([at])[0]
     normal = point_normals(made.points, made.shells.nodes)[row]
     made = with_oscillator(made, at, made.points[row], normal, m, m * (2 * np.pi * f) ** 2)
-    truth = {"point_m": point.tolist(), "value": m, "parameters": {"M": m, "f": f}}
-    return replace(article, assembly=made, truth=truth)
+    return article.with_hidden(made, {"M": m, "f": f}, article.place_of(grid))
 
 
 FAMILY = Family(

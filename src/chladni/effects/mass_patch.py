@@ -1,6 +1,6 @@
 """A mass distributed over a region of a sheet: trim, mastic, a damping mat or a run of paint."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
@@ -15,8 +15,7 @@ from .estimate import Estimate
 from .family import Article, Family
 from .points import strength
 from .property_bands import levels, with_bands
-from .search_context import Candidate, SearchContext
-from .sheet_patch import RADII, RIMMED, SheetPatch, patches
+from .sheet_patch import RADII, RIMMED, SheetPatch, disc, random_place
 
 SHARE = 0.03  # of the structure's mass: prior median
 
@@ -103,29 +102,19 @@ def heavier(part: Part, load: float) -> Part:
     return part.with_section(nonstructural=section.nonstructural + load)
 
 
-def candidates(context: SearchContext) -> list[Candidate]:
-    """The places where a distributed mass explains most."""
-    return patches(context, MassPatch, each=1)
-
-
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """Add 2 to 8 % of the mass on a disc of 40 to 90 mm radius round a grid of the first part."""
-    made, m = article.assembly, float(rng.uniform(0.02, 0.08)) * article.weight
-    first = made.shells.part == 0
-    centre = made.points[rng.choice(np.unique(made.shells.nodes[first]))]
-    radius = float(rng.uniform(0.04, 0.09))
-    middle = made.points[made.shells.nodes].mean(axis=1)
-    q = (first & (np.linalg.norm(middle - centre, axis=1) <= radius)).astype(float)
-    truth = {
-        "point_m": centre.tolist(), "value": m, "radius_m": radius, "parameters": {"M": m},
-    }  # fmt: skip
-    return replace(article, assembly=spread_mass(made, q, m), truth=truth)
+    m = float(rng.uniform(0.02, 0.08)) * article.weight
+    centre, radius = random_place(article, rng), float(rng.uniform(0.04, 0.09))
+    made = spread_mass(article.assembly, disc(article, centre, radius).astype(float), m)
+    return article.with_hidden(made, {"M": m}, centre, radius_m=radius)
 
 
 FAMILY = Family(
     MassPatch,
     conceal,
-    candidates=candidates,
+    candidates=MassPatch.candidates,
+    of_lump=MassPatch.of_lump,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="search for material on the sheet there, and weigh it",
     on_sheets=True,

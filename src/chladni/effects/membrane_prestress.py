@@ -23,7 +23,7 @@ from ..geometry.cells import edges_of
 from ..geometry.facets import cell_areas, vector_areas
 from ..geometry.sampling import farthest_point_sample
 from ..model.added_points import next_id
-from ..model.assembly import Assembly, Scalars
+from ..model.assembly import Assembly, appended, picked
 from .effect import Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
@@ -179,8 +179,8 @@ def with_summed_springs(assembly: Assembly, own: int) -> Assembly:
     key, back = np.unique(motions, axis=0, return_inverse=True)
     value = np.bincount(back.reshape(-1), s.value[own:], len(key))
     key, value = key[value != 0], value[value != 0]
-    kept = Scalars(s.ids[:own], s.nodes[:own], s.component[:own], s.value[:own], s.damping[:own])
-    return _with_springs(replace(assembly, springs=kept), key // 8, key % 8, value)
+    kept = replace(assembly, springs=picked(s, slice(own)))
+    return _with_springs(kept, key // 8, key % 8, value)
 
 
 def pulled_rim(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:
@@ -232,12 +232,8 @@ def _turns(
 def _with_springs(
     assembly: Assembly, nodes: np.ndarray, component: np.ndarray, value: np.ndarray
 ) -> Assembly:
-    old, ids = assembly.springs, next_id(assembly) + np.arange(len(value))
-    new = Scalars(
-        np.append(old.ids, ids), np.concatenate([old.nodes, nodes]),
-        np.concatenate([old.component, component]), np.append(old.value, value),
-        np.append(old.damping, np.zeros(len(value))),
-    )  # fmt: skip
+    ids = next_id(assembly) + np.arange(len(value))
+    new = appended(assembly.springs, ids=ids, nodes=nodes, component=component, value=value)
     return replace(assembly, springs=new)
 
 

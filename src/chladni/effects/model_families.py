@@ -6,32 +6,33 @@ shear of a part. Two formulations of one element differ most in it (MacNeal's re
 flexibility is a part of it), and so do coarse and fine meshes.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..fem import shell
 from ..fem.assemble import Structure
-from ..fem.derivative import Slope, by_part, of_lumps
+from ..fem.derivative import by_part, of_lumps
 from ..fem.energy import only
 from ..fem.shell_section import section_arrays
 from ..fem.sparse_assembly import blocks, congruence
+from ..model.assembly import Assembly
 from ..model.properties import Isotropic, ShellSection, SolidSection
-from .effect import MatrixTerm, Parameter
-from .linear_parameter import LinearScale
+from .effect import Effect, MatrixTerm, Parameter
+from .joints import SOFT, with_family
 
-SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
 ADHESIVE, WELD, FASTENER = 0.5, 0.3, 0.5  # prior sd of ln k
 JOINTS = "adhesive", "welds", "bushes"  # names of the families of joints
 FAR = 3.0  # limit of scatter in prior standard deviations
 SHEAR = 0.5  # prior sd of ln of the transverse shear stiffness of a part
+JointFamilies = dict[str, tuple[sp.csr_array, float]]  # name: operator in K, prior sd of ln k
 FEWEST = 0.002  # share of the shells' area below which a part has no factor of its own
 
 
 @dataclass(frozen=True, eq=False)
-class ModelFamily(LinearScale):
+class ModelFamily(Effect):
     """A factor e^x on the operator of a family in K."""
 
     name = "family"
@@ -39,11 +40,31 @@ class ModelFamily(LinearScale):
     kind = "nuisance"
     writable = False
 
+    operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The operator of the family times the change of the factor."""
-        assert self.slope is not None
         (factor,), (v,) = self.parameters, x
-        return (MatrixTerm("K", self.slope.K, factor.value(v) - 1, np.array([factor.slope(v)])),)
+        return (MatrixTerm("K", self.operator, factor.value(v) - 1, np.array([factor.slope(v)])),)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedFamily(ModelFamily):
+    """A family of joints whose factor exceeds the usual scatter: written into the deck."""
+
+    claim = "joints of one kind are far stiffer or softer than in the deck"
+    kind = "calibration"
+    writable = True
+    called = "stiffness, times the deck's"
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """Write the factor on E of solids or on K of bushes."""
+        return with_family(assembly, self.text, self.parameters[0].value(x[0]))
+
+
+def calibrated_family(family: ModelFamily) -> CalibratedFamily:
+    """Make a family of joints writable as a number of the deck."""
+    return CalibratedFamily(family.parameters, family.text, operator=family.operator)
 
 
 def shared_factor(name: str, family: str, sd: float) -> Parameter:
@@ -58,7 +79,7 @@ def shared_factor(name: str, family: str, sd: float) -> Parameter:
 
 def model_families(built: Structure) -> list[ModelFamily]:
     """Every family of joints, and the transverse shear of every part."""
-    return [*joint_nuisances(built), *_families(_shear(built))]
+    return [*joint_nuisances(built), *_families(dict(_shear(built)))]
 
 
 def joint_nuisances(built: Structure) -> list[ModelFamily]:
@@ -66,23 +87,17 @@ def joint_nuisances(built: Structure) -> list[ModelFamily]:
     return _families(joint_families(built))
 
 
-def _families(found: Iterable[tuple[str, sp.csr_array, float]]) -> list[ModelFamily]:
+def _families(found: JointFamilies) -> list[ModelFamily]:
     return [
-        ModelFamily((shared_factor("k", text, sd),), text, slope=_slope(K))
-        for text, K, sd in found
+        ModelFamily((shared_factor("k", text, sd),), text, operator=K)
+        for text, (K, sd) in found.items()
         if K.nnz
     ]
 
 
-def joint_families(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
-    """(name, operator in K, prior sd of ln k) of every family of joints."""
-    yield from _solids(built)
-    yield from _bushes(built)
-
-
-def _slope(K: sp.csr_array) -> Slope:
-    empty = sp.csr_array(K.shape)
-    return Slope(empty, empty, K)
+def joint_families(built: Structure) -> JointFamilies:
+    """Every family of joints that the structure has."""
+    return {name: (K, sd) for name, K, sd in (*_solids(built), *_bushes(built))}
 
 
 def _solids(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
@@ -107,7 +122,7 @@ def _bushes(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
         yield "bushes", of_lumps(built, "bushes", own.tolist()).K, FASTENER
 
 
-def _shear(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
+def _shear(built: Structure) -> Iterator[tuple[str, tuple[sp.csr_array, float]]]:
     """γᵀS γ of every part with a share of more than ``FEWEST`` of the shells' area."""
     assembly = built.assembly
     shells = assembly.shells
@@ -124,4 +139,4 @@ def _shear(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
         arrays = section_arrays(alone, geo)
         A = shell.stiffness(geo, alone.shells.thickness, S=arrays.S, reference=arrays.Qm)
         K = congruence(built.T, blocks(A, alone.shells.nodes, len(assembly.points)))
-        yield f"shear of {assembly.parts[k].name}", K, SHEAR
+        yield f"shear of {assembly.parts[k].name}", (K, SHEAR)

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from ..geometry.facets import tangents
 from .effect import WIDER, Effect, Parameter, PointTerm
 from .effect_context import EffectContext, ElementGrids
-from .estimate import Estimate, Location
+from .estimate import Estimate, Location, in_mm
 from .search_context import Candidate, SearchContext, best_places, distinct
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
@@ -136,35 +136,50 @@ class MovableAttachment(Effect):
         """The strength; ``location`` holds the place."""
         return super().reported(x, sd)[:1]
 
-    def location(self, x: np.ndarray) -> Location:
-        """The fitted place."""
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
+        """The fitted place, and its 95 % radius [m], at least the mesh size."""
         assert self.patch is not None
         point, grid = tuple(float(v) for v in self.at(x)), self.nearest(x)
-        text = f"near grid {grid} ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
-        size = self.patch.size
-        return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=size)
+        text = f"near grid {grid} ({in_mm(point)} mm)"
+        far = 1.0 if sd is None else max(self._reach(x, sd), 1.0)
+        radius = self.patch.size * far
+        return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
 
-    def located(self, x: np.ndarray, sd: np.ndarray) -> Location:
-        """The place, and its 95 % radius [m], widened as the intervals are.
+    def _reach(self, x: np.ndarray, sd: np.ndarray) -> float:
+        """95 % radius in units of the patch's size, widened as the intervals are.
 
         In a plane the radius is at most √5.99 times the larger standard deviation. Along a line (of
-        beams, or the edge of a fold) it is 1.96 times the standard deviation. It is at least the
-        mesh size. An axis counts only if the fit ended within the grids, because beyond them the
-        place is fixed.
+        beams, or the edge of a fold) it is 1.96 times the standard deviation. An axis counts only
+        if the fit ended within the grids, because beyond them the place is fixed.
         """
         assert self.patch is not None
         at, size = self.patch.size * x[1:3], self.patch.size
         moves = np.ptp(self.patch.flat, axis=0) > _FLAT * size
         times = np.sqrt(5.99) if moves.all() else 1.96
         known = moves & (self.patch.inside(at) == at)
-        far = float(times * WIDER * sd[1:3][known].max(initial=0.0))
-        return replace(self.location(x), radius_m=size * max(far, 1.0))
+        return float(times * WIDER * sd[1:3][known].max(initial=0.0))
 
     def nearest(self, x: np.ndarray) -> int:
         """Id of the grid nearest to the place."""
         assert self.patch is not None
         d = self.patch.flat - self.patch.size * x[1:3]
         return int(self.patch.grids[np.argmin((d**2).sum(axis=1))])
+
+
+@dataclass(frozen=True, eq=False)
+class MovableMass(MovableAttachment):
+    """A mass at an unknown place, whose first parameter is its logarithm."""
+
+    matrix = "M"
+
+    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """Place and mass."""
+        return self.at(x), self.parameters[0].value(x[0])
+
+    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """The mass itself."""
+        m = self.parameters[0].value(x[0])
+        return m, m * np.eye(len(x))[0]
 
 
 def moved(strength: Parameter) -> tuple[Parameter, ...]:
@@ -226,7 +241,7 @@ def attachments(
     if context.scan is None:
         some = places.spread(TRIED)
         effects = [near(where, grids.position(places.grids[k], places.normal[k])) for k in some]
-        return best_places(context, effects, places.point[some])
+        return best_places(context, effects)
     scan, out = context.scan, []
 
     def follow(about: int, levels: np.ndarray, k: int) -> None:

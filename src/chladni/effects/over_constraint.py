@@ -6,16 +6,16 @@ spring k_0 in every tie, far stiffer than the sheets round it
 as for a weld of reduced stiffness.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..errors import ModelError
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import MatrixTerm, Parameter
 from .family import Article, Family
+from .joint_stiffness import Fastener
 from .joints import Connection
 from .rigid_ties import RigidTie, firmly_held, rigid_ties, sprung
 from .search_context import Candidate, SearchContext, best_places
@@ -27,31 +27,25 @@ BY_POLES, FOLLOWED = 12, 2
 
 
 @dataclass(frozen=True, eq=False)
-class OverConstraint(Effect):
+class OverConstraint(Fastener):
     """K - K_j / (1 + k/k_0), K_j = k_0 bᵀb the firm spring in the tie: k and k_0 in series."""
 
     name = "over-constraint"
     claim = "a joint is compliant where the model has a rigid tie"
-    rounds = 1  # a released component may have its own mode
+    rounds = 1
 
     tie: RigidTie | None = None
     firm: float = 1.0
-    rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
     def left(self, x: float) -> float:
         """Remaining share of the firm spring, k / (k + k_0)."""
         return 1.0 / (1.0 + self.firm / self.parameters[0].value(x))
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """(f - 1) K_j."""
+        """(f - 1) K_j, without a difference of nearly equal numbers."""
         k = self.parameters[0].value(x[0])
         lost = 1.0 / (1.0 + k / self.firm)
         return (MatrixTerm("K", self.operator, -lost, np.array([lost * (1 - lost)])),)
-
-    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
-        """All relative motions that load the tie."""
-        return self.rows
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CBUSH between the tie's independent grid and a new one that leads the others."""
@@ -71,12 +65,10 @@ def over_constraint(
     tie, firm = firmly_held(assembly, int(joint.elements[0]))
     z = firm * float(np.exp(np.log(share / (1 - np.minimum(share, 0.999))).mean()))
     unknown = Parameter("K", "N/m", 0.0, SD, z, step=1.0, starts=STARTS, nominal=RIGID)
-    x, y, z_at = assembly.points[tie.lead].tolist()
-    return OverConstraint(
-        (unknown,), f"rigid tie {joint.where}", joint.parts, joint.grids, point=(x, y, z_at),
-        trials_factor=tried, tie=tie, firm=firm, rows=joint.rows,
-        operator=sp.csr_array(joint.rows.T @ joint.rows),
-    )  # fmt: skip
+    effect = OverConstraint.of(
+        joint, (unknown,), f"rigid tie {joint.where}", tried, "", {}, "", tie=tie, firm=firm
+    )
+    return replace(effect, point=tuple(assembly.points[tie.lead].tolist()))
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
@@ -87,11 +79,10 @@ def candidates(context: SearchContext) -> list[Candidate]:
         return []
     built = context.where.groups.structure
     effects = [over_constraint(built.assembly, *every[k], len(at)) for k in at]
-    points = np.array([e.point for e in effects])
     if context.scan is None:
-        some = farthest_point_sample(points, BY_POLES)
+        some = farthest_point_sample(np.array([e.point for e in effects]), BY_POLES)
         chosen = [effects[k] for k in some]
-        return best_places(context, chosen, points[some], FOLLOWED, -1.0, extended=True)
+        return best_places(context, chosen, FOLLOWED, apart=-1.0, extended=True)
     left = np.ones((len(every), len(STARTS)))
     left[at] = [[e.left(x) for x in STARTS] for e in effects]
     out: dict[int, Candidate] = {}
@@ -111,10 +102,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     tie = ties[int(rng.integers(len(ties)))]
     k = float(10 ** rng.uniform(4.5, 6.0))
     made = sprung(article.assembly, tie, k)
-    place = article.assembly.points[tie.lead].tolist()
-    return replace(
-        article, assembly=made, truth={"point_m": place, "value": k, "parameters": {"K": k}}
-    )
+    return article.with_hidden(made, {"K": k}, article.assembly.points[tie.lead])
 
 
 FAMILY = Family(

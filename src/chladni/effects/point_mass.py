@@ -1,6 +1,6 @@
 """A point mass that is missing from the model."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from ..model.assembly import Assembly
 from .effect_context import EffectContext
 from .family import Article, Family
-from .movable_attachment import MovableAttachment, attachments, moved, patch, there
+from .movable_attachment import MovableMass, attachments, moved, patch, there
 from .points import strength, with_masses
 from .search_context import Candidate, SearchContext
 
@@ -17,22 +17,17 @@ TRIED = np.exp(np.linspace(-3.0, 1.5, 7))  # multiples of the median
 
 
 @dataclass(frozen=True, eq=False)
-class PointMass(MovableAttachment):
+class PointMass(MovableMass):
     """M + m Σ bᵀb over three translations b, at an unknown place."""
 
     name = "point-mass"
     claim = "the structure carries a mass that the model lacks"
-    matrix = "M"
 
     @classmethod
     def near(cls, where: EffectContext, k: int) -> Self:
         """A mass near the k-th grid."""
         m = strength("M", "kg", SHARE * where.setup.weight, 1.2, (-1.5, -0.5, 0.5))
         return cls(moved(m), patch=patch(where, k, np.eye(3)), **there(where, k))
-
-    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Place and mass."""
-        return self.at(x), self.parameters[0].value(x[0])
 
     @classmethod
     def of_lump(
@@ -42,11 +37,6 @@ class PointMass(MovableAttachment):
         k = int(np.linalg.norm(where.grids.point - point, axis=1).argmin())
         effect = cls.near(where, k)
         return effect, np.array([np.log(mass / effect.parameters[0].scale), 0.0, 0.0])
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """The mass itself."""
-        m = self.parameters[0].value(x[0])
-        return m, np.array([m, 0.0, 0.0])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CONM2 at the nearest grid, offset to the place."""
@@ -72,15 +62,15 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     weight, grid = article.weight, article.shell_grid(rng)
     m = float(rng.uniform(0.015, 0.08)) * weight
     at = article.grids_at(np.array([grid]))
-    point = article.deck.points[article.deck.rows([grid])[0]].tolist()
-    truth = {"point_m": point, "value": m, "parameters": {"M": m}}
-    return replace(article, assembly=with_masses(article.assembly, at, m), truth=truth)
+    loaded = with_masses(article.assembly, at, m)
+    return article.with_hidden(loaded, {"M": m}, article.place_of(grid))
 
 
 FAMILY = Family(
     PointMass,
     conceal,
     candidates=candidates,
+    of_lump=PointMass.of_lump,
     cards=("CONM2",),
     settled_by="weigh the structure with all attached parts",
 )

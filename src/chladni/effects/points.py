@@ -1,6 +1,7 @@
 """Masses and springs at points."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,40 +14,46 @@ from .effect import Effect, Parameter, PointTerm
 NOTHING = -30.0  # ln of a strength over its median that is as good as zero
 
 
-def _empty() -> sp.csr_array:
-    return sp.csr_array((0, 0))
-
-
 @dataclass(frozen=True, eq=False)
 class AtPoints(Effect):
-    """Σ_k c b_kᵀ b_k at fixed rows, one strength for all, c = scale · e^x."""
+    """Σ_k c s_k b_kᵀ b_k at fixed rows b: one strength c = scale · e^x, in shares s.
 
-    rows: sp.csr_array = field(default_factory=_empty)  # (k, n_free)
-    directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    Attributes
+    ----------
+    rows : (k, n)
+    shares : (m,)   k/m rows one after another have one share; 1 by default
+    """
 
-    matrix = "K"
+    rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    shares: np.ndarray = field(default_factory=lambda: np.ones(1))
+
+    matrix: ClassVar[Literal["K", "M"]] = "K"
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """One strength on every row."""
-        c = np.full(self.rows.shape[0], self.parameters[0].value(x[0]))
-        return (PointTerm("M" if self.matrix == "M" else "K", self.rows, c, c[:, None]),)
+        """The strength on every row."""
+        each = np.repeat(self.shares, self.rows.shape[0] // len(self.shares))
+        c = self.parameters[0].value(x[0]) * each
+        return (PointTerm(self.matrix, self.rows, c, c[:, None]),)
 
 
 @dataclass(frozen=True, eq=False)
 class MassEffect(AtPoints):
-    """Masses: they act in every direction and count once per grid in the weight."""
+    """Masses at grids: the rows are all three translations of each."""
 
     matrix = "M"
 
+    def each(self, x: np.ndarray) -> np.ndarray:
+        """Mass at every grid (n,) [kg]."""
+        return self.parameters[0].value(x[0]) * np.broadcast_to(self.shares, len(self.grids))
+
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Total mass n · m."""
-        total = len(self.grids) * self.parameters[0].value(x[0])
+        """Total mass."""
+        total = float(self.each(x).sum())
         return total, np.array([total])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CONM2 at each grid."""
-        m = self.parameters[0].value(x[0])
-        return with_masses(assembly, self.grids, m)
+        return with_masses(assembly, self.grids, self.each(x))
 
 
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:

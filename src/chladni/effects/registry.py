@@ -12,7 +12,6 @@ from functools import cache
 from ..errors import ExtensionError, LabelError
 from ..extensions import installed
 from . import (
-    adhesive_stiffness,
     compliant_support,
     contact_stiffness,
     crack,
@@ -32,7 +31,6 @@ from . import (
     thickness_distribution,
     viscoelastic_joint,
     weld_compliance,
-    weld_missing,
 )
 from .family import Family
 
@@ -50,9 +48,9 @@ BUILT_IN = (
     mass_patch.FAMILY,
     crack.FAMILY,
     membrane_prestress.FAMILY,
-    weld_missing.FAMILY,
+    weld_compliance.MISSING,
     weld_compliance.FAMILY,
-    adhesive_stiffness.FAMILY,
+    viscoelastic_joint.ADHESIVE,
     hem_contact.FAMILY,
     contact_stiffness.FAMILY,
     over_constraint.FAMILY,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..geometry.beam_lines import fastener_bars
 from ..model.added_points import next_id, with_points
-from ..model.assembly import Assembly, Bushes, RigidBody
+from ..model.assembly import Assembly, RigidBody, appended
 from ..model.properties import ShellSection
 
 FIRM = 100.0  # times E t: stiffer than any sheet, but its modes do not mask all others
@@ -132,14 +132,10 @@ def _with_legs(body: RigidBody, legs: np.ndarray) -> RigidBody:
 def sprung(assembly: Assembly, tie: RigidTie, k: float, id: int | None = None) -> Assembly:
     """Replace the tie by springs: k [N/m] in translation and k reach² in rotation."""
     made, lead = loosened(assembly, tie)
-    old, none = made.bushes, np.zeros((1, 6))
-    new = Bushes(
-        np.append(old.ids, next_id(made) if id is None else id),
-        np.vstack([old.nodes, [[tie.lead, lead]]]),
-        np.concatenate([old.frame, np.eye(3)[None]]),
-        np.vstack([old.place, made.points[[lead]]]),
-        np.vstack([old.stiffness, k * np.r_[1, 1, 1, [tie.reach**2] * 3]]),
-        np.vstack([old.viscous, none]), np.vstack([old.loss, none]),
+    new = appended(
+        made.bushes, ids=[next_id(made) if id is None else id], nodes=[[tie.lead, lead]],
+        frame=[np.eye(3)], place=made.points[[lead]],
+        stiffness=[k * np.r_[1, 1, 1, [tie.reach**2] * 3]],
     )  # fmt: skip
     return replace(made, bushes=new)
 

@@ -177,18 +177,20 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
 
 
 def best_places(
-    context: SearchContext, effects: Sequence[Effect], point: np.ndarray, wanted: int = 2,
-    apart: float = APART, extended: bool = False,
+    context: SearchContext, effects: Sequence[Effect], wanted: int = 2, *, apart: float = APART,
+    extended: bool = False, point: np.ndarray | None = None,
 ) -> list[Candidate]:  # fmt: skip
     """The best places of an effect, evaluated at many places with all its starts.
 
     Parameters
     ----------
-    point : (n_effects, 3)   their places [m]
     apart : see :func:`distinct`
     extended : see :meth:`SearchContext.scores`
+    point : (n_effects, 3)   their places [m], where these are not the points of the effects
     """
-    options = []
+    if not effects:
+        return []
+    point, options = np.array([e.point for e in effects]) if point is None else point, []
     for effect in effects:
         scores = context.scores(effect, effect.starts(), extended)[0]
         options.append((float(scores.min()), effect.starts()[int(np.argmin(scores))]))

@@ -9,32 +9,53 @@ from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
 
+LN10 = np.log(10.0)
+
 
 @dataclass(frozen=True, eq=False)
-class SensorFault(Effect):
-    """Gain and sign of one channel: the recorded signal is ± e^x times the true one."""
+class ChannelGain(Effect):
+    """One unknown real factor on some channels: the recorded signal is ± e^x times the true one.
+
+    ``mask`` (n_out,) is 1 on these channels, ``sign`` that of the factor.
+    """
+
+    name = "gain"
+    claim = "the gain of the measuring chain is unknown"
+    kind = "nuisance"
+
+    mask: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    sign: int = 1
+
+    def outputs(self, x: np.ndarray) -> ChannelChange:
+        """x / ln 10 (+ iπ / ln 10 for a reversed sign) on these channels."""
+        value = self.mask * (x[0] + (1j * np.pi if self.sign < 0 else 0)) / LN10
+        return ChannelChange(value.astype(complex), (self.mask / LN10)[:, None].astype(complex))
+
+
+def channel_gain(n_outputs: int, sd: float) -> ChannelGain:
+    """The unknown gain e^x, common to all channels."""
+    unknown = Parameter("gain", "-", 0.0, sd, step=1.0)
+    return ChannelGain((unknown,), "every channel", mask=np.ones(n_outputs))
+
+
+@dataclass(frozen=True, eq=False)
+class SensorFault(ChannelGain):
+    """Gain and sign of one channel."""
 
     name = "sensor-fault"
     claim = "a channel's gain or sign is wrong"
     kind = "test"
 
-    channel: int = 0
-    n_outputs: int = 1
-    sign: int = 1
-    mask: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    @property
+    def channel(self) -> int:
+        """Position of the channel."""
+        return int(self.mask.argmax())
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The factor on the channel, negative for a reversed sign."""
         (gain,) = self.parameters
         low, high = sorted(self.sign * v for v in gain.interval(x[0], self.widened(sd)[0]))
         return (Estimate(gain.name, self.sign * gain.value(x[0]), gain.unit, low, high),)
-
-    def outputs(self, x: np.ndarray) -> ChannelChange:
-        """x / ln 10 (+ iπ / ln 10 for a reversed sign) on that channel."""
-        value, slope = np.zeros(self.n_outputs, complex), np.zeros((self.n_outputs, 1), complex)
-        value[self.channel] = (x[0] + (1j * np.pi if self.sign < 0 else 0)) / np.log(10)
-        slope[self.channel] = 1 / np.log(10)
-        return ChannelChange(value, slope)
 
 
 def sensor_fault(label: str, channel: int, n_outputs: int, sign: int, start: float) -> SensorFault:
@@ -43,11 +64,8 @@ def sensor_fault(label: str, channel: int, n_outputs: int, sign: int, start: flo
     unknown = Parameter("gain", "-", 0.0, 0.7, step=0.7, starts=(start,))
     return SensorFault(
         (unknown,), text, channels=(label,), trials_factor=2 * n_outputs,
-        channel=channel, n_outputs=n_outputs, sign=sign,
+        mask=np.eye(n_outputs)[channel], sign=sign,
     )  # fmt: skip
-
-
-LN10 = np.log(10.0)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:

@@ -8,36 +8,33 @@ from ..fem.locate import Share
 from ..model.assembly import Assembly
 from .effect_context import EffectContext
 from .family import Article, Family
-from .points import MassEffect, strength, with_masses
+from .points import AtPoints, strength, with_masses
 
 
 @dataclass(frozen=True, eq=False)
-class SensorMass(MassEffect):
+class SensorMass(AtPoints):
     """M + m Σ bᵀb over all sensors: mass of accelerometers and cables, removed before weighing.
 
-    ``shares`` are the (grid id, weight) pairs to which each sensor is attached.
+    ``places`` are the (grid id, weight) pairs to which each sensor is attached.
     """
 
     name = "sensor-mass"
     claim = "the accelerometers' mass is missing from the model"
+    matrix = "M"
 
-    shares: tuple[Share, ...] = ()
+    places: tuple[Share, ...] = ()
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write CONM2 at the grids, in proportion to their weights."""
         m = self.parameters[0].value(x[0])
         total: dict[int, float] = {}
-        for grid, weight in (pair for share in self.shares for pair in share):
+        for grid, weight in (pair for share in self.places for pair in share):
             total[grid] = total.get(grid, 0.0) + weight * m
         return with_masses(assembly, tuple(total), np.array(list(total.values())))
 
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Zero, because the article is weighed without its sensors."""
-        return 0.0, np.zeros(1)
-
     def off_the_scales(self, x: np.ndarray) -> float:
-        """Total mass of the sensors."""
-        return len(self.shares) * self.parameters[0].value(x[0])
+        """Total mass of the sensors, without which the article is weighed."""
+        return len(self.places) * self.parameters[0].value(x[0])
 
 
 def sensor_mass(where: EffectContext) -> list[SensorMass]:
@@ -51,15 +48,15 @@ def sensor_mass(where: EffectContext) -> list[SensorMass]:
     text = f"at the {len(shares)} sensors"
     grids = tuple(sorted({max(share, key=lambda pair: pair[1])[0] for share in shares}))
     rows = where.at_shares(shares)
-    return [SensorMass((m,), text, grids=grids, rows=rows, directions=np.eye(3), shares=shares)]
+    return [SensorMass((m,), text, grids=grids, rows=rows, places=shares)]
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """Add 0.25 to 0.6 % of the article's mass at every sensor, removed before weighing."""
     each = float(rng.uniform(0.0025, 0.006)) * article.weight
     loaded = with_masses(article.assembly, article.grids_at(article.outputs), each)
-    truth = {"value": each, "parameters": {"M": each}}
-    return replace(article, assembly=loaded, truth=truth, off_scale=each * len(article.outputs))
+    hidden = article.with_hidden(loaded, {"M": each})
+    return replace(hidden, off_scale=each * len(article.outputs))
 
 
 FAMILY = Family(

@@ -127,10 +127,8 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     grid, direction = article.drive or (article.shell_grid(rng), (0.0, 0.0, 1.0))
     (at,) = article.grids_at(np.array([grid]))
     made = restrained(article.assembly, ((at, 1.0),), direction, k_lat, k_rot, m)
-    point = article.deck.points[article.deck.rows([grid])[0]].tolist()
     known = {"k_lat": k_lat, "k_rot": k_rot, "m": m}
-    truth = {"point_m": point, "value": k_lat, "parameters": known}
-    return replace(article, assembly=made, truth=truth, off_scale=m)
+    return replace(article.with_hidden(made, known, article.place_of(grid)), off_scale=m)
 
 
 FAMILY = Family(

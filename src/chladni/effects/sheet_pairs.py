@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from ..fem.assemble import Structure
 from ..fem.average import average_rows
 from ..model.added_points import next_id, with_points
-from ..model.assembly import Assembly, Average, Bushes
+from ..model.assembly import Assembly, Average, appended
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,19 +67,14 @@ class SheetPairs:
         """Add springs k (k,) [N/m] along the directions, where k is positive."""
         on = np.flatnonzero(k > 0)
         grown, ends = self.tied(assembly, on)
-        old, zero = grown.bushes, np.zeros((len(on), 6))
         e = self.along[on]
         z = np.cross(e, np.eye(3)[np.abs(e).argmin(axis=1)])
         z /= np.linalg.norm(z, axis=1, keepdims=True)
-        stiffness = zero.copy()
+        stiffness = np.zeros((len(on), 6))
         stiffness[:, 0] = k[on]
-        new = Bushes(
-            np.append(old.ids, next_id(grown) + np.arange(len(on))),
-            np.concatenate([old.nodes, ends]),
-            np.concatenate([old.frame, np.stack([e, np.cross(z, e), z], axis=1)]),
-            np.concatenate([old.place, self.middle[on]]),
-            np.concatenate([old.stiffness, stiffness]),
-            np.concatenate([old.viscous, zero]),
-            np.concatenate([old.loss, zero]),
-        )
+        new = appended(
+            grown.bushes, ids=next_id(grown) + np.arange(len(on)), nodes=ends,
+            frame=np.stack([e, np.cross(z, e), z], axis=1), place=self.middle[on],
+            stiffness=stiffness,
+        )  # fmt: skip
         return replace(grown, bushes=new)

@@ -14,10 +14,13 @@ import numpy as np
 from ..geometry.sampling import farthest_point_sample
 from .effect import Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
-from .estimate import Location
+from .estimate import Estimate, Location, in_mm
+from .family import Article
 from .search_context import Candidate, SearchContext, best_places, distinct
 
 BELL, RIMMED = (0.0, 0.3), (float(np.log(2.0)), 0.5)  # ln p and sd: pressed; cut or glued on
+RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
+TRIED = 30  # groups that are evaluated one by one if only natural frequencies are known
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +74,7 @@ class SheetPatch(Effect):
     """
 
     quantity: ClassVar[str] = "t"  # t, E or rho
+    followed: ClassVar[int] = 1  # places for each baseline
     scanned: ClassVar[float] = 0.0  # strength x[0] at which a scan takes the slope
     grows: ClassVar[tuple[float, float]] = (0.0, np.inf)  # multiples of it that are accepted
     rim: ClassVar[tuple[float, float]] = BELL  # prior of ln p
@@ -155,11 +159,11 @@ class SheetPatch(Effect):
         """R [m]."""
         return float(self.size * np.exp(x[1]))
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The fitted place, where the change of the sheet is largest."""
         grid, deepest = self.deepest(x)
         point = tuple(float(v) for v in deepest)
-        text = f"on {self.parts[0]} near ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
+        text = f"on {self.parts[0]} near ({in_mm(point)} mm)"
         radius = self.radius_at(x)
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
 
@@ -171,41 +175,81 @@ class SheetPatch(Effect):
         outside = d2[k] > max(0.25 * self.radius_at(x), self.spacing) ** 2
         return int(self.ids[k]), self.points[k] if outside else c
 
+    @classmethod
+    def candidates(cls, context: SearchContext) -> list[Candidate]:
+        """Scan patches at every group and radius; return the best places for each baseline."""
+        groups = context.where.groups
+        every = np.flatnonzero(groups.sheet)
+        sheets = len(set(groups.connected[every].tolist()))
+        if context.scan is None:
+            some = farthest_point_sample(groups.centre[every], TRIED)
+            tried = [cls.on(groups, int(g), sheets) for g in some]
+            return best_places(context, tried, point=groups.centre[some])
+        tried = [cls.on(groups, int(g), sheets) for g in every]
+        effects = [e for e in tried for _ in RADII]
+        starts = [
+            np.array([cls.scanned, np.log(R), 0.0, 0.0, cls.rim[0]]) for _ in tried for R in RADII
+        ]
+        changes = np.stack([e.log(x) for e, x in zip(effects, starts, strict=True)], axis=1)
+        centre = np.repeat(groups.centre[every], len(RADII), axis=0)
+        least, most = cls.grows
+        out: list[Candidate] = []
+        taken: list[int] = []
+        for about, base in enumerate(context.bases):
+            amount, score = context.scan.field_scores(about, cls.quantity, changes)
+            score = np.where((amount > least) & (amount < most), score, np.inf)
+            for k in distinct(score, centre, taken, cls.followed):
+                if np.isfinite(score[k]):
+                    taken.append(k)
+                    start = np.array([cls.begun(float(amount[k])), *starts[k][1:]])
+                    out.append(Candidate(effects[k], start, base))
+        return out
 
-RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
-TRIED = 30  # groups that are evaluated one by one if only natural frequencies are known
+
+@dataclass(frozen=True, eq=False)
+class SheetLoss(SheetPatch):
+    """A field times 1 - β q(x), β = ``most`` / (1 + e^-x), so that it stays positive."""
+
+    most: ClassVar[float] = 1.0  # share that may be lost in the middle
+    begins: ClassVar[tuple[float, float]] = (0.0, 1.0)  # shares from which a fit may start
+
+    @classmethod
+    def lost(cls, x: float) -> float:
+        """β, from 0 to ``most``."""
+        return float(cls.most / (1 + np.exp(-x)))
+
+    def log(self, x: np.ndarray) -> np.ndarray:
+        """ln(1 - β q) over the groups."""
+        q = self.bump(x, self.centre, self.variance)
+        return np.log1p(-self.lost(x[0]) * q) * self.inside
+
+    @classmethod
+    def begun(cls, amount: float) -> float:
+        """Start of the logit of β / ``most``."""
+        beta = np.clip(amount * cls.lost(cls.scanned), *cls.begins)
+        return float(np.log(beta / (cls.most - beta)))
+
+    @staticmethod
+    def value_of(loss: float) -> float:
+        """The reported value at a loss."""
+        return loss
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """Value where the loss is largest, and the radius R; ``location`` holds the place."""
+        rows, reach = super().reported(x, sd), 1.96 * self.widened(sd)[0]
+        q = float(self.bump(x, self.deepest(x)[1][None])[0])
+        here, *ends = (self.value_of(q * self.lost(x[0] + s * reach)) for s in (0, -1, 1))
+        return replace(rows[0], value=here, low=min(ends), high=max(ends)), rows[1]
 
 
-def patches(context: SearchContext, kind: type[SheetPatch], each: int = 2) -> list[Candidate]:
-    """Scan patches of a kind at every group and radius; return the best places per baseline.
+def random_place(article: Article, rng: np.random.Generator) -> np.ndarray:
+    """Place (3,) [m] of a random grid of the article's first part."""
+    made = article.assembly
+    return np.asarray(made.points[rng.choice(np.unique(made.shells.nodes[made.shells.part == 0]))])
 
-    Parameters
-    ----------
-    each : number of places per baseline
-    """
-    groups = context.where.groups
-    every = np.flatnonzero(groups.sheet)
-    sheets = len(set(groups.connected[every].tolist()))
-    if context.scan is None:
-        some = farthest_point_sample(groups.centre[every], TRIED)
-        tried = [kind.on(groups, int(g), sheets) for g in some]
-        return best_places(context, tried, groups.centre[some])
-    tried = [kind.on(groups, int(g), sheets) for g in every]
-    effects = [e for e in tried for _ in RADII]
-    starts = [
-        np.array([kind.scanned, np.log(R), 0.0, 0.0, kind.rim[0]]) for _ in tried for R in RADII
-    ]
-    changes = np.stack([e.log(x) for e, x in zip(effects, starts, strict=True)], axis=1)
-    centre = np.repeat(groups.centre[every], len(RADII), axis=0)
-    least, most = kind.grows
-    out: list[Candidate] = []
-    taken: list[int] = []
-    for about, base in enumerate(context.bases):
-        amount, score = context.scan.field_scores(about, kind.quantity, changes)
-        score = np.where((amount > least) & (amount < most), score, np.inf)
-        for k in distinct(score, centre, taken, each):
-            if np.isfinite(score[k]):
-                taken.append(k)
-                start = np.array([kind.begun(float(amount[k])), *starts[k][1:]])
-                out.append(Candidate(effects[k], start, base))
-    return out
+
+def disc(article: Article, centre: np.ndarray, radius: float) -> np.ndarray:
+    """Shells (m,) of the article's first part within a radius [m] of a place [m]."""
+    made = article.assembly
+    middle = made.points[made.shells.nodes].mean(axis=1)
+    return np.asarray((made.shells.part == 0) & (np.linalg.norm(middle - centre, axis=1) <= radius))

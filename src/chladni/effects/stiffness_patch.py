@@ -6,26 +6,22 @@ like a slightly stiffer region. A corner 11 % stiffer near the shaker gained 43 
 where nothing was missing.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import Part
 from .calibration_parameters import scaled
-from .effect import Effect, Parameter
+from .effect import Parameter
 from .element_groups import ElementGroups
-from .estimate import Estimate
 from .family import Article, Family
 from .property_bands import with_bands
-from .search_context import Candidate, SearchContext
-from .sheet_patch import RIMMED, SheetPatch, patches
-
-MOST_LOSS = 0.9  # of the stiffness may be lost in the middle
+from .sheet_patch import RIMMED, SheetLoss, disc, random_place
 
 
 @dataclass(frozen=True, eq=False)
-class StiffnessPatch(SheetPatch):
+class StiffnessPatch(SheetLoss):
     """E(x) = E0 (1 - β q(x)), β = 0.9 / (1 + e^-x), for membrane and bending; always positive."""
 
     name = "stiffness-patch"
@@ -35,6 +31,8 @@ class StiffnessPatch(SheetPatch):
     scanned = -1.0
     grows = (0.1, np.inf)  # a smaller loss, or a stiffening, is not accepted
     rim = RIMMED
+    most = 0.9
+    begins = (0.05, 0.75)
 
     @classmethod
     def strength(cls, groups: ElementGroups) -> Parameter:
@@ -43,34 +41,16 @@ class StiffnessPatch(SheetPatch):
             "E", "of the deck's", -0.5, 1.2, 1.0, "linear", 0.8, starts=(-0.5,), nominal=-40.0
         )
 
-    def log(self, x: np.ndarray) -> np.ndarray:
-        """ln(1 - β q) over the groups."""
-        q = self.bump(x, self.centre, self.variance)
-        return np.log1p(-lost(x[0]) * q) * self.inside
-
-    @classmethod
-    def begun(cls, amount: float) -> float:
-        """Start of the logit, for losses from 5 to 75 %."""
-        beta = np.clip(amount * lost(cls.scanned), 0.05, 0.75)
-        return float(np.log(beta / (MOST_LOSS - beta)))
-
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write new properties, in bands of equal ratio."""
         centre = assembly.points[assembly.shells.nodes].mean(axis=1)
-        log = np.log1p(-lost(x[0]) * self.bump(x, centre) * self.shells)
+        log = np.log1p(-self.lost(x[0]) * self.bump(x, centre) * self.shells)
         return with_bands(assembly, log, softened)
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """Remaining share of E where it is lowest, and the radius R."""
-        rows = Effect.reported(self, x, sd)
-        q = float(self.bump(x, self.deepest(x)[1][None])[0])
-        here, high, low = (1 - q * lost(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
-        return replace(rows[0], value=here, low=low, high=high), rows[1]
-
-
-def lost(x: float) -> float:
-    """β, from 0 to MOST."""
-    return float(MOST_LOSS / (1 + np.exp(-x)))
+    @staticmethod
+    def value_of(loss: float) -> float:
+        """Remaining share of E."""
+        return 1 - loss
 
 
 def softened(part: Part, log: float) -> Part:
@@ -78,31 +58,19 @@ def softened(part: Part, log: float) -> Part:
     return scaled(part, "E", float(np.exp(log)))
 
 
-def candidates(context: SearchContext) -> list[Candidate]:
-    """The places where a softer patch explains most."""
-    return patches(context, StiffnessPatch, each=1)
-
-
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """Multiply E by 0.35 to 0.6 on a disc of 60 to 110 mm round a grid of the first part."""
-    made = article.assembly
-    first = made.shells.part == 0
-    centre = made.points[rng.choice(np.unique(made.shells.nodes[first]))]
+    centre = random_place(article, rng)
     factor, radius = float(rng.uniform(0.35, 0.6)), float(rng.uniform(0.06, 0.11))
-    middle = made.points[made.shells.nodes].mean(axis=1)
-    inside = first & (np.linalg.norm(middle - centre, axis=1) <= radius)
-    truth = {
-        "point_m": centre.tolist(), "value": factor, "radius_m": radius,
-        "parameters": {"E": factor},
-    }  # fmt: skip
-    changed = with_bands(made, np.log(factor) * inside, softened)
-    return replace(article, assembly=changed, truth=truth)
+    inside = disc(article, centre, radius)
+    changed = with_bands(article.assembly, np.log(factor) * inside, softened)
+    return article.with_hidden(changed, {"E": factor}, centre, radius_m=radius)
 
 
 FAMILY = Family(
     StiffnessPatch,
     conceal,
-    candidates=candidates,
+    candidates=StiffnessPatch.candidates,
     cards=("MAT1", "MAT8", "PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="tap the sheet there and next to it with a small hammer, and measure its thickness",
     on_sheets=True,

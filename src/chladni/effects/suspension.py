@@ -1,6 +1,6 @@
 """Stiffness of the suspension, such as bungee cords."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,6 +16,8 @@ class Suspension(AtPoints):
 
     name = "suspension"
     claim = "the suspension's stiffness is missing from the model"
+
+    directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of the rows
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a spring to ground at each hanger: CELAS2, or CBUSH in an oblique direction."""
@@ -61,8 +63,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     K = float(np.exp(rng.uniform(np.log(800), np.log(6000))))
     at = article.grids_at(article.hangers)
     up = np.tile([0.0, 0.0, 1.0], (len(at), 1))
-    truth = {"value": K, "parameters": {"K": K}}
-    return replace(article, assembly=with_springs(article.assembly, at, up, K), truth=truth)
+    return article.with_hidden(with_springs(article.assembly, at, up, K), {"K": K})
 
 
 FAMILY = Family(

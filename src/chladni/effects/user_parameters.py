@@ -8,6 +8,7 @@ one part are added; their second-order product is neglected.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,13 @@ from ..fem.derivative import Slope, by_part, of_lumps, of_part
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
-from ..model.properties import Isotropic, Part, ShellSection, SolidSection
+from ..model.properties import Part, SolidSection
 from .calibration_parameters import (
     OF_FIELDS,
     SHEET,
     SPREAD,
     TUBE,
     calibration_parameter,
-    scaled,
     value,
     with_scaled,
 )
@@ -126,9 +126,9 @@ class UserParameter(Effect):
         y = float(self.y(x)[0][0])
         return len(x) == 1 and not NEAR_BOUND * self.low < y < NEAR_BOUND * self.high
 
-    def location(self, x: np.ndarray) -> Location:
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The place after a fit."""
-        return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
+        return self.members[0].location(self.y(x)[0], sd) if len(x) > 1 else self.where()
 
 
 def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
@@ -173,7 +173,7 @@ def _bounds(parts: Sequence[Part], free: FreeParameter) -> tuple[float, float]:
     low = -np.inf if free.low is None else float(np.log(free.low))
     high = np.inf if free.high is None else float(np.log(free.high))
     if free.field == "nu":
-        nu = max(number(parts[k], "nu") for k in free.positions)
+        nu = max(value(parts[k], "nu") for k in free.positions)
         reach = SERVES * (1 - 2 * nu) / (2 * nu)
         low, high = max(low, -reach), min(high, reach)
     return low, high
@@ -206,14 +206,14 @@ def _lumps(free: FreeParameter) -> tuple[tuple[str, tuple[int, ...]], ...]:
 
 def _of_part(built: Structure, k: int, name: str) -> LinearScale:
     """E or rho of solids, the wall of fasteners, nu, or moduli of an orthotropic sheet."""
-    part, write = built.assembly.parts[k], PartWriter(k, name)
+    part, write = built.assembly.parts[k], partial(with_scaled, quantity=name, positions=(k,))
     text = f"{name} of {part.name}"
     if name in TUBE:
         whole = mass_properties(built.assembly)[0]
         heavier = mass_properties(write(built.assembly, 2.0))[0] if name != "E" else whole
         slope = of_part(built, k, name)
         return linear_scale(text, name, "-", 1.0, slope, write, weight_slope=heavier - whole)
-    v = number(part, name)
+    v = value(part, name)
     first = _scaled(by_part(built, k, name), v)
     up, down = (
         _three(by_part(replace(built, assembly=write(built.assembly, 1 + h)), k, name))
@@ -238,7 +238,7 @@ def _of_lumps(built: Structure, family: str, rows: Sequence[int]) -> LinearScale
     field = "M" if family == "masses" else "K"
     return linear_scale(
         f"{field} of {family}", field, "-", 1.0, of_lumps(built, family, rows),
-        LumpWriter(family, tuple(rows)), weight_slope=weight,
+        partial(_with_lumps, family=family, rows=tuple(rows)), weight_slope=weight,
     )  # fmt: skip
 
 
@@ -246,85 +246,28 @@ def _mass(assembly: Assembly, row: int) -> float:
     return float(np.trace(assembly.masses.matrix[row, :3, :3]) / 3)
 
 
-@dataclass(frozen=True)
-class PartWriter:
-    """Multiply a field of one part by a factor."""
-
-    position: int
-    field: str
-
-    def __call__(self, assembly: Assembly, factor: float) -> Assembly:
-        """The assembly with the field times the factor."""
-        parts = list(assembly.parts)
-        parts[self.position] = changed(parts[self.position], self.field, factor)
-        return assembly.with_parts(tuple(parts))
-
-
-@dataclass(frozen=True)
-class LumpWriter:
+def _with_lumps(assembly: Assembly, factor: float, family: str, rows: tuple[int, ...]) -> Assembly:
     """Multiply the values of some springs, bushes or masses by a factor."""
-
-    family: str
-    rows: tuple[int, ...]
-
-    def __call__(self, assembly: Assembly, factor: float) -> Assembly:
-        """The assembly with these values times the factor."""
-        column = {"springs": "value", "bushes": "stiffness", "masses": "matrix"}[self.family]
-        members = getattr(assembly, self.family)
-        values = getattr(members, column).copy()
-        values[list(self.rows)] *= factor
-        return replace(assembly, **{self.family: replace(members, **{column: values})})
+    column = {"springs": "value", "bushes": "stiffness", "masses": "matrix"}[family]
+    members = getattr(assembly, family)
+    values = getattr(members, column).copy()
+    values[list(rows)] *= factor
+    return replace(assembly, **{family: replace(members, **{column: values})})
 
 
 def with_factor(assembly: Assembly, free: FreeParameter, factor: float) -> Assembly:
     """Multiply a user parameter by a factor in all its parts and joints, without linearisation."""
-    whole = free.field in (*SHEET, *TUBE)
-    of_solids = [k for k in free.positions if isinstance(assembly.parts[k].section, SolidSection)]
-    fields = [k for k in free.positions if whole and k not in of_solids]
-    assembly = with_scaled(assembly, free.field, fields, factor)
-    for k in free.positions:
-        if k not in fields:
-            assembly = PartWriter(k, free.field)(assembly, factor)
+    assembly = with_scaled(assembly, factor, free.field, free.positions)
     for family, rows in _lumps(free):
         if rows:
-            assembly = LumpWriter(family, rows)(assembly, factor)
+            assembly = _with_lumps(assembly, factor, family, rows)
     return assembly
 
 
 def values_of(assembly: Assembly, free: FreeParameter) -> np.ndarray:
     """The deck's values (n,) of all members that share the factor."""
-    out = [number(assembly.parts[k], free.field) for k in free.positions]
+    out = [value(assembly.parts[k], free.field) for k in free.positions]
     out += [float(assembly.springs.value[r]) for r in free.springs]
     stiff = assembly.bushes.stiffness[list(free.bushes)]
     out += stiff[stiff != 0].tolist()
     return np.array(out + [_mass(assembly, r) for r in free.masses])
-
-
-def number(part: Part, name: str) -> float:
-    """The deck's value of a field of a part."""
-    section = part.section
-    if isinstance(section, SolidSection):
-        return float(getattr(section.material, name))
-    if name in (*SHEET, *TUBE):
-        return value(part, name)
-    assert isinstance(section, ShellSection)
-    return float(getattr(section.membrane or section.bending, name))
-
-
-def changed(part: Part, name: str, factor: float) -> Part:
-    """Multiply a field of a part by a factor; E scales all moduli of the part."""
-    section = part.section
-    if isinstance(section, SolidSection):
-        material = section.material
-        new_values = {name: getattr(material, name) * factor}
-        if name == "E" and isinstance(material, Isotropic) and material.G is not None:
-            new_values["G"] = material.G * factor
-        return part.with_section(material=replace(material, **new_values))
-    if name in (*SHEET, *TUBE):
-        return scaled(part, name, factor)
-    new = {
-        n: replace(m, **{name: getattr(m, name) * factor})
-        for n in ("membrane", "bending", "shear", "coupling")
-        if (m := getattr(section, n)) is not None and hasattr(m, name)
-    }
-    return part.with_section(**new)

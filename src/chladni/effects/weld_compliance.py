@@ -1,27 +1,27 @@
-"""A weld or a fastener that is softer than the deck has it.
+"""A weld or a fastener that is softer than in the deck, or missing.
 
-A deck's weld is a thousand times stiffer than the sheets round it: what it does to the structure
-hardly depends on its own stiffness w until that falls to the z of the sheets.  So its prior and its
-name go by the softness s = z/(w + z) that static responses give: with s of its stiffness left it
-carries half of its load, with e^-3 s next to none, and is missing.  With e^3 s it carries nearly
-all: what data want of a weld beyond that is another patch of sheet that it holds, which a mesh sets
-and no weld can be blamed for.
+A weld of a deck is a thousand times stiffer than the sheets around it. Its stiffness w hardly
+affects the structure until it falls to that of the sheets, z. Hence prior and name depend on the
+softness s = z/(w + z), which static responses give. With a share s of its stiffness the weld
+carries half of its load; with e^-3 s it carries nearly none and is missing. With e^3 s it carries
+nearly all. More than that is not a property of a weld, but another patch of sheet that it holds,
+which the mesh determines.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..errors import ModelError
 from ..fem.assemble import structure
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .joints import MOST_RUN, Connection, fasteners, with_factor_on, with_solids
-from .model_families import joint_families
+from .joint_stiffness import Fastener
+from .joints import MOST_RUN, Connection, fasteners, with_factor_on, with_family, without_joint
+from .model_families import JointFamilies, joint_families
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
 
 NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
@@ -29,6 +29,7 @@ MOST_LN_LEFT = 3.0  # ln of what is left over s, at most
 SD = 1.2  # of the same: from next to nothing of the load to nearly all
 STARTS = (-1.5, 0.0, 1.5)
 SOUND = 40.0  # x of the deck's own
+GONE = -12.0  # x of a missing joint: as good as nothing left
 BY_POLES = 12  # fasteners tried where each costs eigenproblems
 FOLLOWED = 2  # about the calibrated model, and one more about the deck's
 SINGLE = 2  # half of the odds are those of one fastener, wherever it is ...
@@ -38,29 +39,19 @@ RUNS_FOLLOWED = 2, 1  # about the deck's own model, where a gap is sharper, and 
 FAMILY_OF = {"solids": "welds", "bushes": "bushes"}  # the nuisance that scales all of a kind
 NEEDS = "welds, screws or bushes between sheets or beams"
 
-JointFamilies = dict[str, tuple[sp.csr_array, float]]
-
 
 @dataclass(frozen=True, eq=False)
-class WeldCompliance(Effect):
-    """K + (f - 1) K_j + (e^g - 1) Σ_{i≠j} K_i: the joint times f = e^x, others of its kind e^g.
-
-    The others' factor takes the place of the one that all of a kind share, so that none has more
-    taken from it than it has and K stays positive.
-    """
+class WeldCompliance(Fastener):
+    """K + (f - 1) K_j + (g - 1) Σ_{i≠j} K_i: the joint times f = s e^x, others of its family g."""
 
     name = "weld-compliance"
     elastic = True
     claim = "a weld or a fastener is softer than in the deck"
-    rounds = 1  # a weld that is gone may free a mode of its own
-
-    joint: Connection | None = None
-    operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    others: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    rounds = 1
 
     @staticmethod
     def strength(softness: float) -> Parameter:
-        """ln of what is left over s."""
+        """Logarithm of the remaining share over s."""
         return Parameter("K", "of the deck's", 0.0, SD, softness, starts=STARTS, nominal=SOUND)
 
     def left(self, x: float) -> tuple[float, float]:
@@ -71,45 +62,47 @@ class WeldCompliance(Effect):
         f = min(self.parameters[0].value(y), 1.0)
         return f, f * (1 - (y / MOST_LN_LEFT) ** 2 if x > 0 else 1.0)
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The joint's own and that of the others of its kind."""
-        (f, slope), e = self.left(x[0]), np.eye(len(x))
-        own = MatrixTerm("K", self.operator, f - 1, slope * e[0])
-        if len(x) == 1:
-            return (own,)
-        g = float(np.exp(x[1]))
-        return own, MatrixTerm("K", self.others, g - 1, g * e[1])
-
-    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
-        """All relative motions that load the joint."""
-        assert self.joint is not None
-        return self.joint.rows
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """A property of its own for the joint, the others as they were fitted beside it."""
-        assert self.joint is not None
-        auxiliary_residual = x[1] if len(x) > 1 else 0.0
-        made = with_all(assembly, self.joint.kind, float(np.exp(auxiliary_residual)))
-        return with_factor_on(
-            made, self.joint, self.left(x[0])[0] / float(np.exp(auxiliary_residual))
-        )
+    def factor(self, x: np.ndarray) -> tuple[float, float]:
+        """The remaining share of the stiffness, and its slope."""
+        return self.left(x[0])
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """What is left of the joint's stiffness."""
+        """Remaining share of the joint's stiffness."""
         low, here, high = (self.left(x[0] + k * 1.96 * self.widened(sd)[0])[0] for k in (-1, 0, 1))
         return (Estimate("K", here, "of the deck's", low, high),)
 
     def becomes(self, x: np.ndarray) -> str:
-        """A missing weld, where next to no load is carried."""
+        """Return "weld-missing" where the joint carries nearly no load."""
         return "weld-missing" if x[0] < NONE_LEFT else ""
 
 
-def with_all(assembly: Assembly, kind: str, factor: float) -> Assembly:
-    """The assembly with all welds of solids, or all bushes, times a factor."""
-    if kind != "bushes":
-        return with_solids(assembly, factor, soft=False)
-    bushes = replace(assembly.bushes, stiffness=factor * assembly.bushes.stiffness)
-    return replace(assembly, bushes=bushes)
+@dataclass(frozen=True, eq=False)
+class WeldMissing(WeldCompliance):
+    """The joint times e^-12 s, others of its kind times e^g; the rest is too small to estimate."""
+
+    name = "weld-missing"
+    claim = "a weld or a fastener of the deck is missing or carries no load"
+
+    @staticmethod
+    def strength(softness: float) -> Parameter:
+        """Nothing left, as good as."""
+        return Parameter("K", "of the deck's", GONE, 1.0, softness, starts=(GONE,), nominal=SOUND)
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """Remove the elements of a missing joint, and write the others as fitted with it."""
+        assert self.joint is not None
+        if x[0] > NONE_LEFT:
+            return super().apply(assembly, x)
+        made = with_family(assembly, self.family, self.factor_of_others(x))
+        return without_joint(made, self.joint)
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """Zero stiffness, with an upper limit that would carry a twentieth of the load."""
+        return (Estimate("K", 0.0, "of the deck's", 0.0, self.left(NONE_LEFT)[0]),)
+
+    def becomes(self, x: np.ndarray) -> str:
+        """Return "", because there is no simpler effect."""
+        return ""
 
 
 def of_one(
@@ -120,50 +113,38 @@ def of_one(
     tried: int,
     count: int = 1,
 ) -> WeldCompliance:
-    """The effect of one of as many fasteners, or runs of them, as were tried.
+    """The effect of one of as many fasteners, or runs of ``count`` of them, as were tried.
 
     Parameters
     ----------
-    count : of fasteners in the run
-    share : (r,)   z/(w + z) of the joint's rows, see :func:`.joints.softness`
-    families : {name: what all joints of a kind have in K, prior sd of ln of their factor}
+    share : (r,)   z/(w + z) of the joint's rows
     """
-    own = sp.csr_array(joint.rows.T @ joint.rows)
-    unknown: tuple[Parameter, ...] = (kind.strength(float(share.min())),)
-    others, text = own, FAMILY_OF.get(joint.kind, "")
-    if text in families:
-        K, sd = families[text]
-        others = sp.csr_array(K - own)
-        unknown = (*unknown, Parameter("K of the others", "-", 0.0, sd, step=0.5))
     word = "weld" if joint.kind == "solids" else "fastener"
-    x, y, z = joint.point.tolist()
     named = f"{word} {joint.ids[0]}"
     if count > 1:
         named = f"{count} {word}s in a row, elements {joint.ids[0]} to {joint.ids[-1]},"
-    return kind(
-        unknown, f"{named} {joint.where}", joint.parts, joint.grids,
-        point=(x, y, z), trials_factor=tried, replaces=(text,) if text in families else (),
-        joint=joint, operator=own, others=others,
+    return kind.of(
+        joint, (kind.strength(float(share.min())),), f"{named} {joint.where}", tried,
+        FAMILY_OF.get(joint.kind, ""), families, "K of the others",
     )  # fmt: skip
 
 
 def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candidate]:
-    """The fasteners that explain most, by exact re-analysis about the calibrated model and both."""
+    """The fasteners, and runs of them, that explain most, by exact re-analysis from each base."""
     tried = context.fasteners
     own = [k for k, (joint, _) in enumerate(tried) if not joint.rigid]
     if not own:
         return []
     built = context.where.groups.structure
-    families = {text: (K, sd) for text, K, sd in joint_families(built)}
+    families = joint_families(built)
 
     def effect(k: int) -> WeldCompliance:
         return of_one(kind, *tried[k], families, SINGLE * len(own))
 
     if context.scan is None:
-        points = np.array([tried[k][0].point for k in own])
-        some = farthest_point_sample(points, BY_POLES)
+        some = farthest_point_sample(np.array([tried[k][0].point for k in own]), BY_POLES)
         chosen = [effect(own[k]) for k in some]
-        return best_places(context, chosen, points[some], FOLLOWED, -1.0, extended=True)
+        return best_places(context, chosen, FOLLOWED, apart=-1.0, extended=True)
     alone = [kind((kind.strength(float(share.min())),)) for _, share in tried]
     left = np.array([[e.left(x[0])[0] for x in e.starts()] for e in alone])
     out: dict[int, Candidate] = {}
@@ -252,21 +233,37 @@ def candidates(context: SearchContext) -> list[Candidate]:
     return proposed(WeldCompliance, context)
 
 
-def drawn(article: Article, rng: np.random.Generator) -> tuple[Connection, dict[str, object]]:
-    """A fastener of the article, and where it is."""
+def missing(context: SearchContext) -> list[Candidate]:
+    """Missing welds, screws and bushes."""
+    return proposed(WeldMissing, context)
+
+
+def drawn(article: Article, rng: np.random.Generator) -> Connection:
+    """A random fastener of the article.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
     found = fasteners(structure(article.assembly))
     if not found:
         raise ModelError("the structure has no weld, screw or bush")
-    joint = found[int(rng.integers(len(found)))]
-    return joint, {"point_m": joint.point.tolist()}
+    return found[int(rng.integers(len(found)))]
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A fastener keeps 1e-5 to 1e-4 of its stiffness: it carries about half of its load."""
-    joint, truth = drawn(article, rng)
+    """Leave 1e-5 to 1e-4 of the stiffness of a fastener: it carries about half of its load."""
+    joint = drawn(article, rng)
     f = float(10 ** rng.uniform(-5, -4))
     made = with_factor_on(article.assembly, joint, f)
-    return replace(article, assembly=made, truth={**truth, "value": f, "parameters": {"K": f}})
+    return article.with_hidden(made, {"K": f}, joint.point)
+
+
+def remove(article: Article, rng: np.random.Generator) -> Article:
+    """Remove a fastener."""
+    joint = drawn(article, rng)
+    return article.with_hidden(without_joint(article.assembly, joint), {"K": 0.0}, joint.point)
 
 
 FAMILY = Family(
@@ -275,5 +272,13 @@ FAMILY = Family(
     candidates=candidates,
     cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBAR", "CBAR", "PBUSH", "CBUSH"),
     settled_by="tap on both sides of the joint with a small hammer, and test a coupon of it",
+    needs=NEEDS,
+)
+MISSING = Family(
+    WeldMissing,
+    remove,
+    candidates=missing,
+    cards=("MAT1", "CHEXA", "CPENTA", "CTETRA", "CBAR", "CBUSH", "PBUSH"),
+    settled_by="inspect that joint, and test it by ultrasound or a chisel",
     needs=NEEDS,
 )

@@ -95,6 +95,18 @@ def motions_of(assembly: Assembly, held_by: tuple[Clamp, ...]) -> sp.csr_array:
     return sp.csr_array(sp.hstack(columns))
 
 
+@dataclass(frozen=True, eq=False)
+class Release:
+    """Clamps of a structure, and the springs (6 clamps,) on them that are as good as rigid."""
+
+    clamps: tuple[Clamp, ...]
+    springs: np.ndarray
+
+    def of(self, built: Structure) -> Structure:
+        """The structure with the motions of the clamps as further degrees of freedom."""
+        return released(built, self.clamps, self.springs)
+
+
 def released(
     built: Structure, held_by: tuple[Clamp, ...], hold: np.ndarray | float = 0.0
 ) -> Structure:

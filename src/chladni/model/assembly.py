@@ -268,6 +268,20 @@ class Assembly:
         return self.shells.thickness.mean(axis=1)
 
 
-def picked(family: Any, which: np.ndarray) -> Any:
-    """Select members of a family of elements by rows or a mask."""
+def appended(family: Any, **columns: Any) -> Any:
+    """Add members to a family of elements; a column that is not given is zero."""
+    n = len(columns["ids"])
+    none = {k: np.zeros((n, *old.shape[1:]), old.dtype) for k, old in vars(family).items()}
+    return concatenated(family, replace(family, **{**none, **columns}))
+
+
+def concatenated(*families: Any) -> Any:
+    """Members of several families of one kind, in order."""
+    first, *_ = families
+    names = vars(first)
+    return replace(first, **{k: np.concatenate([vars(f)[k] for f in families]) for k in names})
+
+
+def picked(family: Any, which: np.ndarray | slice) -> Any:
+    """Select members of a family of elements by rows, a mask or a slice."""
     return replace(family, **{name: value[which] for name, value in vars(family).items()})

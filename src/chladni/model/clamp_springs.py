@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from .added_points import next_id, with_points
-from .assembly import Assembly, RigidBody, Scalars
+from .assembly import Assembly, RigidBody, appended
 
 AN_AXIS = 1 - 1e-6  # cosine from which a direction is an axis of the basic frame
 
@@ -48,13 +48,8 @@ def with_clamp_on_springs(
         supports=np.concatenate([stay, np.array(own, np.int64).reshape(-1, 2)]),
     )  # fmt: skip
     n, old = len(springs), grown.springs
-    return replace(
-        grown,
-        springs=Scalars(
-            np.append(old.ids, next_id(grown) + np.arange(n)),
-            np.concatenate([old.nodes, np.tile([int(at), -1], (n, 1))]),
-            np.concatenate([old.component, [[c, 1] for c in springs]]),
-            np.append(old.value, list(springs.values())),
-            np.append(old.damping, np.zeros(n)),
-        ),
-    )
+    new = appended(
+        old, ids=next_id(grown) + np.arange(n), nodes=np.tile([int(at), -1], (n, 1)),
+        component=[[c, 1] for c in springs], value=list(springs.values()),
+    )  # fmt: skip
+    return replace(grown, springs=new)

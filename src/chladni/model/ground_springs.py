@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .assembly import Assembly, Bushes, Scalars
+from .assembly import Assembly, appended
 
 AN_AXIS = 1 - 1e-6  # cosine from which a direction is an axis of the grid's own frame
 
@@ -22,10 +22,14 @@ def with_springs(
     d = np.asarray(directions, float)
     local = d if assembly.axes is None else np.einsum("kij,kj->ki", assembly.axes[rows], d)
     straight = np.abs(local).max(axis=1) > AN_AXIS
-    component = np.abs(local[straight]).argmax(axis=1)
-    made = replace(assembly, springs=_scalars(assembly.springs, rows[straight], component, k))
-    askew = ~straight
-    return with_ground_bushes(made, rows[askew], d[askew], k)
+    component = 1 + np.abs(local[straight]).argmax(axis=1)
+    old, n = assembly.springs, len(component)
+    new = appended(
+        old, ids=int(old.ids.max(initial=0)) + 1 + np.arange(n), nodes=_to_ground(rows[straight]),
+        component=np.column_stack([component, np.ones(n, int)]), value=np.full(n, float(k)),
+    )  # fmt: skip
+    made = replace(assembly, springs=new)
+    return with_ground_bushes(made, rows[~straight], d[~straight], k)
 
 
 def with_ground_bushes(
@@ -43,17 +47,15 @@ def with_ground_bushes(
         return assembly
     stiffness = np.zeros((n, 6))
     stiffness[:, : 6 if np.ndim(k) else 1] = k
-    none = np.zeros((n, 6))
-    new = Bushes(
-        np.append(old.ids, int(old.ids.max(initial=0)) + 1 + np.arange(n)),
-        np.concatenate([old.nodes, np.column_stack([rows, np.full(n, -1)])]),
-        np.concatenate([old.frame, np.array([_frame(d) for d in directions])]),
-        np.concatenate([old.place, places]),
-        np.concatenate([old.stiffness, stiffness]),
-        np.concatenate([old.viscous, none]),
-        np.concatenate([old.loss, none]),
-    )
+    new = appended(
+        old, ids=int(old.ids.max(initial=0)) + 1 + np.arange(n), nodes=_to_ground(rows),
+        frame=np.array([_frame(d) for d in directions]), place=places, stiffness=stiffness,
+    )  # fmt: skip
     return replace(assembly, bushes=new)
+
+
+def _to_ground(rows: np.ndarray) -> np.ndarray:
+    return np.column_stack([rows, np.full(len(rows), -1)])
 
 
 def _frame(x: np.ndarray) -> np.ndarray:
@@ -61,14 +63,3 @@ def _frame(x: np.ndarray) -> np.ndarray:
     z = np.cross(x, np.eye(3)[np.abs(x).argmin()])
     z = z / np.linalg.norm(z)
     return np.array([x, np.cross(z, x), z])
-
-
-def _scalars(old: Scalars, rows: np.ndarray, component: np.ndarray, k: float) -> Scalars:
-    n = len(rows)
-    return Scalars(
-        np.append(old.ids, int(old.ids.max(initial=0)) + 1 + np.arange(n)),
-        np.concatenate([old.nodes, np.column_stack([rows, np.full(n, -1)])]),
-        np.concatenate([old.component, np.column_stack([component + 1, np.ones(n, int)])]),
-        np.append(old.value, np.full(n, float(k))),
-        np.append(old.damping, np.zeros(n)),
-    )

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .assembly import Assembly, Masses
+from .assembly import Assembly, appended
 
 
 def with_masses(
@@ -20,11 +20,10 @@ def with_masses(
     x, y, z = np.zeros(3) if offset is None else offset
     arm = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])  # motion of the mass
     each = np.broadcast_to(np.asarray(m, float), len(grids))[:, None, None]
-    new = Masses(
-        np.append(old.ids, first + np.arange(len(grids))),
-        np.append(old.node, assembly.rows(list(grids))),
-        np.concatenate([old.matrix, each * (arm.T @ arm)]),
-    )
+    new = appended(
+        old, ids=first + np.arange(len(grids)), node=assembly.rows(list(grids)),
+        matrix=each * (arm.T @ arm),
+    )  # fmt: skip
     return replace(assembly, masses=new)
 
 

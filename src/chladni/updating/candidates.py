@@ -194,7 +194,7 @@ class UpdatingContext:
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
         base, reduced = self.baselines[about], self.problem.reduced
-        wider = extended or effect.lets_go
+        wider = extended or effect.release is not None
         widened = reduced.model_for if wider else reduced.model.split_for
         model = widened(effect, starts[0])
         data = self.problem.data.rebased(model)

@@ -39,7 +39,7 @@ class LocalOptimum:
         if self.effect.text == other.effect.text:
             sd = np.maximum(self.sd, other.sd)
             return bool((np.abs(self.x - other.x) <= 2 * sd).all())
-        mine, its = (v.effect.located(v.x, v.sd) for v in (self, other))
+        mine, its = (v.effect.location(v.x, v.sd) for v in (self, other))
         if None in (mine.point_m, its.point_m, mine.radius_m, its.radius_m):
             return False
         apart = np.linalg.norm(np.subtract(mine.point_m, its.point_m))  # type: ignore[arg-type]

@@ -10,11 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.calibration_parameters import channel_gain, defaults
+from ..effects.calibration_parameters import defaults
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
 from ..effects.model_families import joint_nuisances
 from ..effects.registry import catalogue, family
+from ..effects.sensor_fault import channel_gain
 from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
 from ..effects.weld_patch import WeldPatch, weld_patch
 from ..ema.identification import Identified, equalised, identify

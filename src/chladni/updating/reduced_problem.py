@@ -14,6 +14,7 @@ from ..effects.element_groups import ElementGroups, element_groups
 from ..fem.assemble import Structure
 from ..fem.base_motion import base_motion
 from ..fem.modelled import Modelled, modelled
+from ..fem.released import Release
 from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
@@ -68,8 +69,8 @@ class ReducedProblem:
         model, rows = self.model, effect.basis_rows(x, self.shapes)
         if rows is None:
             return model.split_for(effect, x)
-        if effect.lets_go:
-            model = self._released(effect)
+        if effect.release is not None:
+            model = self._released(effect.release)
             assert model.following is not None
             g = rows[:, len(model.following) :].toarray().T
             blocks = [np.vstack([model.following @ g, g])]
@@ -92,14 +93,14 @@ class ReducedProblem:
         low = int(np.sum(self.frequency <= self.f_max))
         return self.model.vectors.blocks[0][: len(self.structure.system.dofs), :low]
 
-    def _released(self, effect: Effect) -> Reduced:
+    def _released(self, release: Release) -> Reduced:
         """The reduced model with clamps released; the structure follows their motion by -K⁻¹ K_qg.
 
         The factor is that of K + σM; each iteration leaves σ/(σ + λ_1) = 1/5 of the last error.
         """
         if self.model.following is not None:
             return self.model
-        built, K = effect.released(self.structure), self.structure.system.elastic
+        built, K = release.of(self.structure), self.structure.system.elastic
         n = len(self.structure.system.dofs)
         force = -built.system.elastic[:n, n:].toarray()
         R = self.factor.solve(force)

@@ -53,10 +53,10 @@ def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffec
 
 def _located(hypothesis: HypothesisFit, effect: Effect) -> Location:
     """The place of an effect; its radius includes all optima that are nearly as probable."""
-    place = effect.located(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
+    place = effect.location(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
     if effect is not hypothesis.effect or place.point_m is None or not hypothesis.nearly:
         return place
-    others = [v.effect.located(v.x, v.sd) for v in hypothesis.nearly]
+    others = [v.effect.location(v.x, v.sd) for v in hypothesis.nearly]
     reach = [place.radius_m or 0.0] + [
         float(np.linalg.norm(np.subtract(o.point_m, place.point_m))) + (o.radius_m or 0.0)
         for o in others
@@ -90,11 +90,11 @@ def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
         return ()
     rows = found.effect.reported(found.own.x, found.own.sd)
     values = list(dict.fromkeys(w for v in found.nearly if (w := _values_apart(rows, v))))
-    own = found.effect.located(found.own.x, found.own.sd).text
+    own = found.effect.location(found.own.x, found.own.sd).text
     places = [
         f"{place} ({np.exp((found.own.neg2_log_evidence - v.neg2_log_evidence) / 2):.0%} as likely)"
         for v in found.nearly
-        if (place := v.effect.located(v.x, v.sd).text) != own
+        if (place := v.effect.location(v.x, v.sd).text) != own
     ]
     if isinstance(found.data, Poles) and values:
         return (

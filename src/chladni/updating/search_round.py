@@ -192,7 +192,7 @@ def _of_the_same_lump(
         return []
     base, out = taken(problem, lead, ("calibration", "nuisance")), list[HypothesisFit]()
     for family in problem.families:
-        begun = family.effect.of_lump(problem.where, *lump)
+        begun = None if family.of_lump is None else family.of_lump(problem.where, *lump)
         if begun is not None and not already_there(problem, *begun):
             with suppress(ModelError):
                 out.append(problem.fitted_with(*begun, base))

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.calibrated_family import calibrated_family
 from ..effects.discretisation import MeshError
 from ..effects.effect import Effect
+from ..effects.model_families import calibrated_family
 from .hypothesis_fit import HypothesisFit
 from .implausible_values import is_strained
 from .likelihood import Responses

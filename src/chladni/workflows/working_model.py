@@ -11,7 +11,8 @@ from ..case.free_parameters import fields_of
 from ..case.schema import FIELDS
 from ..dynamics.frf import FRF, Quantity
 from ..dynamics.statespace import StateSpace, state_space
-from ..effects.user_parameters import number, with_factor
+from ..effects.calibration_parameters import value as value_of
+from ..effects.user_parameters import with_factor
 from ..errors import LabelError, ModelError
 from ..io.nastran import assembly, write_deck
 from ..io.nastran.edit.model_changes import changes
@@ -136,7 +137,7 @@ class WorkingModel(Model):
                 raise LabelError(f"no field {field!r}; there are {', '.join(OF_PARTS)}")
             for k, wanted in _wanted(made, field, value).items():
                 free = FreeParameter(field, field, positions=(k,))
-                made = with_factor(made, free, wanted / number(made.parts[k], field))
+                made = with_factor(made, free, wanted / value_of(made.parts[k], field))
         return replace(self, assembly=made)
 
     def write(self, path: Path | str) -> Path:
@@ -186,6 +187,6 @@ def _wanted(made: Assembly, field: str, value: float | Mapping[str, float]) -> d
         if not out:
             raise LabelError(f"no part of the model has {field}")
     for k, v in out.items():
-        if not 0 < v < np.inf or not number(made.parts[k], field) > 0:
+        if not 0 < v < np.inf or not value_of(made.parts[k], field) > 0:
             raise ModelError(f"{field} of {made.parts[k].name} cannot become {v:g}")
     return out

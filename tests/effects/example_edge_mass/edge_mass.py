@@ -5,11 +5,10 @@ package tells chladni by one entry point, ``edge-mass = "edge_mass:FAMILY"`` in 
 ``chladni.effects``.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.effects.effect import PointTerm
 from chladni.effects.effect_context import EffectContext
 from chladni.effects.family import Article, Family
 from chladni.effects.points import MassEffect, strength
@@ -21,26 +20,10 @@ SHARE = 0.03  # of the structure's mass: prior median
 
 @dataclass(frozen=True, eq=False)
 class EdgeMass(MassEffect):
-    """M Σ_k s_k b_kᵀ b_k over the edge's grids, s_k their shares of its length."""
+    """M Σ_k s_k b_kᵀ b_k over the grids of the edge, s_k their shares of its length."""
 
     name = "edge-mass"
     claim = "something heavy runs along an edge that the model does not have"
-
-    shares: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the grids, sum 1
-
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """The mass in its shares on all three translations of each grid."""
-        c = self.parameters[0].value(x[0]) * np.repeat(self.shares, 3)
-        return (PointTerm("M", self.rows, c, c[:, None]),)
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """The mass, whatever its grids."""
-        m = self.parameters[0].value(x[0])
-        return m, np.array([m])
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CONM2 at each grid."""
-        return with_masses(assembly, self.grids, self.parameters[0].value(x[0]) * self.shares)
 
 
 def edge(assembly: Assembly, part: int) -> tuple[np.ndarray, np.ndarray]:
@@ -66,7 +49,7 @@ def edge_masses(where: EffectContext) -> list[EdgeMass]:
         out.append(
             EdgeMass(
                 (m,), f"along the edge of {name}", (name,), grids, trials_factor=len(parts),
-                rows=where.translations(grids), directions=np.eye(3), shares=shares,
+                rows=where.translations(grids), shares=shares,
             )
         )  # fmt: skip
     return out
@@ -77,7 +60,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     made, m = article.assembly, float(rng.uniform(0.02, 0.08)) * article.weight
     rows, shares = edge(made, 0)
     loaded = with_masses(made, tuple(made.ids[rows].tolist()), m * shares)
-    return replace(article, assembly=loaded, truth={"value": m, "parameters": {"M": m}})
+    return article.with_hidden(loaded, {"M": m})
 
 
 FAMILY = Family(

@@ -108,7 +108,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     side = float(rng.uniform(3e-3, 5e-3))
     grids = lines(article.assembly)[0]
     made = with_beam_line(article.assembly, grids, section(side), (0.0, 0.0, 1.0), "stringer")
-    return replace(article, assembly=made, truth={"value": side, "parameters": {"a": side}})
+    return article.with_hidden(made, {"a": side})
 
 
 FAMILY = Family(

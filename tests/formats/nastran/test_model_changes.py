@@ -209,14 +209,18 @@ def test_plane_stiffness(tmp_path, quantity):
     same(found, after, before)
 
 
-def test_what_no_card_says_is_refused(deck):
+def test_a_mass_with_inertia_comes_back(deck):
     made, before, units = deck
     heavy = with_masses(before, (int(before.ids[0]),), 0.1)
     turned = heavy.masses.matrix.copy()
-    turned[0, 3:, 3:] += np.eye(3)
+    turned[-1, 3:, 3:] += np.diag([1e-4, 1.5e-4, 2e-4])
     heavy = replace(heavy, masses=replace(heavy.masses, matrix=turned))
-    with pytest.raises(ModelError, match="inertia"):
-        changes(made, before, heavy, units)
+    found, _, _ = repaired(made, before, heavy, units)
+    np.testing.assert_allclose(found.masses.matrix, turned, rtol=1e-5, atol=1e-12)
+
+
+def test_what_no_card_says_is_refused(deck):
+    made, before, units = deck
     odd = Anisotropic(1e9 * np.eye(3), id=before.parts[0].section.membrane.id)
     after = before.with_parts(
         tuple(p.with_section(membrane=odd, bending=odd) for p in before.parts)

@@ -12,6 +12,7 @@ from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_deck
 from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.assembly import RigidBody
 from chladni.units import UNITS
 
 DECK = """\
@@ -84,9 +85,18 @@ def test_a_membrane_force_comes_back(deck, tmp_path):
 
 
 def test_followers_in_different_motions_are_refused(deck, tmp_path):
+    body = next(b for b in deck[1].rigid if isinstance(b, RigidBody) and len(b.dependent) > 1)
+    odd = replace(body, dependent=body.dependent[:2], components=((1, 2, 3), (1, 2)))
+    rigid = tuple(odd if b is body else b for b in deck[1].rigid)
+    with pytest.raises(ModelError, match="follow in different motions"):
+        written(deck, replace(deck[1], rigid=rigid), tmp_path)
+
+
+def test_a_new_body_of_several_motions_comes_back(deck, tmp_path):
+    """It is one RBE2 for each set of motions."""
     tie = next(t for t in rigid_ties(deck[1]) if len(t.rows) == 2)
     made = sprung(deck[1], tie, 2e5)
     odd = [replace(b, components=((1, 2, 3), (1, 2))) if len(b.dependent) == 2 else b
            for b in made.rigid]  # fmt: skip
-    with pytest.raises(ModelError, match="follow in different motions"):
-        written(deck, replace(made, rigid=tuple(odd)), tmp_path)
+    made = replace(made, rigid=tuple(odd))
+    alike(made, written(deck, made, tmp_path))

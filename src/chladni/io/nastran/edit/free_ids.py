@@ -21,13 +21,13 @@ def free_ids(deck: Deck, after: Assembly) -> FreeIds:
     """Counters that begin above what the deck, and the parts of the structure to be, have."""
     parts = [p.id for p in after.parts]
     return FreeIds(
-        count(1 + max([0, *_ids(deck, "MAT")])),
-        count(1 + max([0, *parts, *_ids(deck, "P")])),
-        count(1 + max([900, *_ids(deck, "CORD"), *_ids(deck, "CORD1", 5)])),  # CORD1 holds two
+        count(1 + max([0, *ids_of(deck, "MAT")])),
+        count(1 + max([0, *parts, *ids_of(deck, "P")])),
+        count(1 + max([900, *ids_of(deck, "CORD"), *ids_of(deck, "CORD1", 5)])),  # CORD1 holds two
     )
 
 
-def _ids(deck: Deck, begins: str, field: int = 1) -> Iterator[int]:
+def ids_of(deck: Deck, begins: str, field: int = 1) -> Iterator[int]:
     """Ids of all cards whose names begin so."""
     for kind in (kind for kind in deck.cards if kind.startswith(begins)):
         yield from (int(word) for word in deck[kind].words(field).tolist() if word.isdigit())

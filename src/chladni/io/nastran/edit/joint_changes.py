@@ -94,8 +94,7 @@ def _bushes(deck: Deck, changed: dict[int, _BushChange], free: Iterator[int]) ->
     """
     users: dict[int, dict[_BushChange, list[int]]] = {}
     for cards in deck.present("CBUSH"):
-        ids, pid = cards.integers(1), cards.integers(2, 0)
-        for id, p in zip(ids.tolist(), np.where(pid == 0, ids, pid).tolist(), strict=True):
+        for id, p in zip(cards.integers(1).tolist(), cards.properties().tolist(), strict=True):
             if id in changed:  # not one that was taken out
                 kinds = users.setdefault(int(p), {})
                 same = next((c for c in kinds if _alike(c, changed[id])), changed[id])

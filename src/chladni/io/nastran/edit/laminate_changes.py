@@ -15,9 +15,10 @@ from ....model.assembly import Assembly
 from ....model.properties import Material, Part, ShellSection
 from ....units import Units
 from .. import Add, Deck, SetField
-from ..text.cards import FIELDS
+from ..text.cards import position
 from ..text.table import Cards
 from .changes import Change
+from .split_properties import copied
 
 KINDS = ("PCOMP", "PCOMPG")
 MODULI = {
@@ -167,7 +168,9 @@ def _material(
     cards = laminated(deck, before)
     for pair in sorted(wanted - {(1.0, 1.0)}):
         id = next(free)
-        yield Add([_copy(table, row, id, pair)], "of the laminates that changed")
+        changed = {position(kind, n): v for n, v in _times(table, row, pair).items()}
+        card = copied(table, mid, {1: id, **changed})
+        yield Add([card], "of the laminates that changed")
         for k in (k for k in parts if factors[k].material == pair):
             name = cards[k][0].name
             for at, m, _ in layers(*cards[k]):
@@ -195,20 +198,9 @@ def _plain_users(deck: Deck, assembly: Assembly) -> set[int]:
 def _times(table: Cards, row: int, pair: tuple[float, float]) -> dict[str, float]:
     """Fields that are given, times their factors."""
     card, factor = table.single(row), dict.fromkeys(MODULI[table.name], pair[0]) | {"RHO": pair[1]}
-    at = {name: FIELDS[table.name].index(name) + 1 for name in factor}
+    at = {name: position(table.name, name) for name in factor}
     return {
-        name: float(card.reals(at[name])[0]) * f
+        name: card.real(0, at[name]) * f
         for name, f in factor.items()
         if f != 1.0 and card.words(at[name])[0] != b""
     }
-
-
-def _copy(
-    table: Cards, row: int, id: int, pair: tuple[float, float]
-) -> list[float | int | str | None]:
-    """The card with another id and its values times their factors."""
-    fields: list[float | int | str | None] = [f or None for f in table.fields(row)]
-    fields[0] = id
-    for name, value in _times(table, row, pair).items():
-        fields[FIELDS[table.name].index(name)] = value
-    return [table.name, *fields]

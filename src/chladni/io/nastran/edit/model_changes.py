@@ -9,12 +9,13 @@ from ....model.assembly import Assembly, Shells
 from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from ....units import Units
 from .. import Add, Deck, Replace, SetColumns, SetField, units_of
+from ..export.numbering import Systems
 from ..export.part_cards import material_card
 from .added_elements import added_cards
 from .beam_additions import added_beams
 from .beam_changes import with_sections
 from .changes import Change
-from .free_ids import FreeIds, free_ids
+from .free_ids import FreeIds, free_ids, ids_of
 from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
 from .split_properties import (
@@ -52,7 +53,7 @@ def changes(
     out += laminate_changes(deck, before, after, units, free.materials)
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after, free.properties)
-    out += tie_changes(deck, before, after)
+    out += tie_changes(deck, before, after, units)
     out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
     if cards := [*added_cards(before, whole, units, free), *added.cards(before, units, free)]:
@@ -125,7 +126,7 @@ def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> 
     """One card's values, or another card in its place."""
     if isinstance(now, Orthotropic) and isinstance(was, Isotropic):
         return [Replace("MAT1", id, material_card(now, id, units))]
-    if isinstance(now, Anisotropic) and id in _ids(deck, "MAT2"):
+    if isinstance(now, Anisotropic) and id in ids_of(deck, "MAT2"):
         return list(_stiffness(id, was, now, units))
     if type(was) is not type(now) or isinstance(now, Anisotropic):
         kinds = f"{type(was).__name__} to {type(now).__name__}"
@@ -168,21 +169,13 @@ def _axes(before: Assembly, after: Assembly, free: FreeIds) -> list[Change]:
     z = np.eye(3)[int(np.argmin(np.abs(x)))]
     z = z - x * (x @ z)
     z = z / np.linalg.norm(z)
-    cid = next(free.systems)
-    out: list[Change] = [
-        Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "material axis 1 of the sheet")
-    ]
+    systems = Systems(after, free.systems)
+    cid = systems.of_frame(np.array([x, np.cross(z, x), z]))
+    out: list[Change] = [Add(list(systems.cards()), "material axis 1 of the sheet")]
     for kind, chosen in _by_kind(after.shells, moved):
         if len(chosen):
             out += [SetField(kind, int(i), "THETA", cid) for i in after.shells.ids[chosen]]
     return out
-
-
-def _ids(deck: Deck, kind: str) -> list[int]:
-    if kind not in deck.cards:
-        return []
-    words = deck[kind].words(1).tolist()
-    return [int(w) for w in words if w.isdigit()]
 
 
 def _by_kind(shells: Shells, rows: np.ndarray) -> list[tuple[str, np.ndarray]]:

@@ -1,16 +1,20 @@
 """Rigid elements that lead others than before, put into their cards."""
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count
 
 from ....errors import ModelError
 from ....model.assembly import Assembly, RigidBody
+from ....units import Units
 from .. import Deck
+from ..export.tie_cards import ties
 from .changes import Change, Replace
 
 _KINDS = ("RBE2", "RBAR")  # what becomes an RBE2 where it changes
 
 
-def tie_changes(deck: Deck, before: Assembly, after: Assembly) -> Iterator[Change]:
+def tie_changes(deck: Deck, before: Assembly, after: Assembly, units: Units) -> Iterator[Change]:
     """An RBE2 in place of every rigid element whose independent point or followers changed.
 
     Raises
@@ -28,14 +32,8 @@ def tie_changes(deck: Deck, before: Assembly, after: Assembly) -> Iterator[Chang
             raise ModelError(
                 f"{deck.path}: rigid element {now.id} is not an RBE2 and cannot be split"
             )
-        yield Replace(kinds[0], now.id, rbe2(after, now))
-
-
-def rbe2(assembly: Assembly, body: RigidBody) -> list[int | str]:
-    """The card of a rigid element whose followers all follow in the same motions."""
-    motions = {"".join(map(str, sorted(c))) for c in body.components}
-    if len(motions) != 1:
-        raise ModelError(f"the followers of rigid element {body.id} follow in different motions")
-    ids = assembly.ids
-    return ["RBE2", body.id, int(ids[body.independent]), int(motions.pop()),
-            *(int(ids[row]) for row in body.dependent)]  # fmt: skip
+        alone = replace(after, rigid=(now,))
+        card, *more = ties(alone, units, iter([now.id]), count(now.id + 1))
+        if more:
+            raise ModelError(f"the followers of rigid element {now.id} follow in different motions")
+        yield Replace(kinds[0], now.id, card)

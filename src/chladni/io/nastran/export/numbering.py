@@ -1,12 +1,12 @@
 """Numbers for what a fresh deck needs: elements, properties, coordinate systems."""
 
 from collections.abc import Iterator, Sequence
+from itertools import count
 
 import numpy as np
 
 from ....model.assembly import Assembly
-from ....units import Units
-from ..text.format import card
+from ..text.format import Card
 
 
 class Ids:
@@ -55,27 +55,27 @@ def unique_ids(wanted: Sequence[int]) -> list[int]:
 
 
 class Systems:
-    """Rectangular coordinate systems, one for each frame that is asked for."""
+    """Rectangular coordinate systems, one for each frame that is needed."""
 
-    def __init__(self, assembly: Assembly) -> None:
+    def __init__(self, assembly: Assembly, free: Iterator[int] | None = None) -> None:
         self._axes = assembly.axes
-        self._frames: list[np.ndarray] = []
+        self._free = count(1) if free is None else free
+        self._frames: dict[int, np.ndarray] = {}
         self._known: dict[bytes, int] = {np.eye(3).tobytes(): 0}
 
     def of_frame(self, frame: np.ndarray) -> int:
         """Id of the system with these axes (rows), 0 for the basic one."""
         key = (np.round(frame, 12) + 0.0).tobytes()
         if key not in self._known:
-            self._frames.append(frame)
-            self._known[key] = len(self._frames)
+            self._known[key] = cid = next(self._free)
+            self._frames[cid] = frame
         return self._known[key]
 
     def of_point(self, row: int) -> int | None:
         """CD of a point, None where basic."""
         return None if self._axes is None else self.of_frame(self._axes[row]) or None
 
-    def cards(self, units: Units) -> Iterator[str]:
+    def cards(self) -> Iterator[Card]:
         """CORD2R of every frame, with its origin at 0 and points one unit of length away."""
-        for k, (x, _, z) in enumerate(self._frames):
-            values = [k + 1, None, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]
-            yield from card("CORD2R", values, 1e-12)
+        for cid, (x, _, z) in self._frames.items():
+            yield ["CORD2R", cid, None, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]

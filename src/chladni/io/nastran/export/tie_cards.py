@@ -4,13 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ....model.assembly import Assembly, Average, Equation, RigidBody
+from ....model.assembly import Assembly, Average, Equation, RigidBody, picked
 from ....units import Units
 from ..read.springs_and_masses import no_body, point_mass
-from ..text.format import Value, card
-from .numbering import Ids, Systems
-
-_EXACT = 1e-11
+from ..text.format import Card, Value
+from .numbering import Systems
 
 
 def has_equations(assembly: Assembly) -> bool:
@@ -18,59 +16,61 @@ def has_equations(assembly: Assembly) -> bool:
     return any(isinstance(t, Equation) for t in assembly.rigid)
 
 
-def bushes(assembly: Assembly, units: Units, ids: Ids, systems: Systems) -> Iterator[str]:
-    """CBUSH in a system of its own frame, one PBUSH for equal values."""
+def bushes(
+    assembly: Assembly, units: Units, ids: Iterator[int], properties: Iterator[int],
+    systems: Systems, since: int = 0,
+) -> Iterator[Card]:  # fmt: skip
+    """CBUSH in a system of its own frame, one PBUSH for equal values; from a row of bushes on."""
     b = assembly.bushes
     work = np.array([units.force / units.length] * 3 + [units.force * units.length] * 3)
     known: dict[bytes, int] = {}
-    for k in range(len(b)):
+    for k in range(since, len(b)):
         rows = (b.stiffness[k] / work, b.viscous[k] / (work * units.time), b.loss[k])
         key = np.concatenate(rows).tobytes()
         if key not in known:
-            known[key] = pid = len(known) + 1
-            yield from _pbush(pid, rows)
+            known[key] = pid = next(properties)
+            yield _pbush(pid, rows)
         ends: list[Value] = [int(assembly.ids[r]) if r >= 0 else None for r in b.nodes[k]]
         frame = systems.of_frame(b.frame[k])
         where: list[Value] = [None, 0, *(b.place[k] / units.length).tolist()]
         if np.allclose(b.place[k], _middle(assembly, b.nodes[k]), rtol=1e-12, atol=0):
             where = []
-        values = [ids.bush[k], known[key], *ends, None, None, None, frame, *where]
-        yield from card("CBUSH", values, _EXACT)
+        yield ["CBUSH", next(ids), known[key], *ends, None, None, None, frame, *where]
 
 
 def _middle(assembly: Assembly, nodes: np.ndarray) -> np.ndarray:
-    """Where a bush sits unless told otherwise."""
+    """Place of a bush whose card gives none."""
     a, b = nodes if nodes[1] >= 0 else (nodes[0], nodes[0])
     return assembly.points[a] + 0.5 * (assembly.points[b] - assembly.points[a])
 
 
-def _pbush(pid: int, rows: tuple[np.ndarray, ...]) -> Iterator[str]:
+def _pbush(pid: int, rows: tuple[np.ndarray, ...]) -> Card:
     """PBUSH with the rows K, B, GE that hold anything."""
     values: list[Value] = [pid]
     for key, row in zip(("K", "B", "GE"), rows, strict=True):
         if np.any(row) or key == "K":
             values += [key, *row.tolist()]
             values += [None] if len(values) > 1 else []
-    yield from card("PBUSH", values, _EXACT)
+    return ["PBUSH", *values]
 
 
-def masses(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
-    """CONM2 where the matrix is a body's, CONM1 otherwise."""
+def masses(assembly: Assembly, units: Units, ids: Iterator[int], since: int = 0) -> Iterator[Card]:
+    """CONM2 where the matrix is a body's, CONM1 otherwise; from a row of masses on."""
     unit = np.array([1.0] * 3 + [units.length] * 3)
-    scale = units.mass * unit[:, None] * unit
-    for k, node in enumerate(assembly.masses.node.tolist()):
-        M, grid = assembly.masses.matrix[k] / scale, int(assembly.ids[node])
+    scale = units.inertia * unit[:, None] * unit
+    some = picked(assembly.masses, slice(since, None))
+    for node, matrix in zip(some.node.tolist(), some.matrix, strict=True):
+        M, grid = matrix / scale, int(assembly.ids[node])
         body = _body(M)
         if body is None:
-            lower = M[np.tril_indices(6)].tolist()
-            yield from card("CONM1", [ids.mass[k], grid, 0, *lower], _EXACT)
+            yield ["CONM1", next(ids), grid, 0, *M[np.tril_indices(6)].tolist()]
             continue
         m, x, J = body
         inertia = [J[0, 0], -J[1, 0], J[1, 1], -J[2, 0], -J[2, 1], J[2, 2]]
-        values: list[Value] = [ids.mass[k], grid, None, m]
+        values: list[Value] = [next(ids), grid, None, m]
         if np.any(x) or np.any(J):
             values += [*x.tolist(), None, *(float(v) for v in inertia)]
-        yield from card("CONM2", values, _EXACT)
+        yield ["CONM2", *values]
 
 
 def _body(M: np.ndarray) -> tuple[float, np.ndarray, np.ndarray] | None:
@@ -88,20 +88,21 @@ def _body(M: np.ndarray) -> tuple[float, np.ndarray, np.ndarray] | None:
     return (m, x, J) if np.allclose(again, M, rtol=1e-10, atol=1e-12 * np.abs(M).max()) else None
 
 
-def ties(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
-    """RBE2, RBE3, MPC (set 1)."""
-    extra = max([*ids.rigid, *ids.shell, *ids.beam, *ids.bush, *ids.spring, 0]) + 1_000_000
-    for tie, id in zip(assembly.rigid, ids.rigid, strict=True):
+def ties(
+    assembly: Assembly, units: Units, ids: Iterator[int], more: Iterator[int], since: int = 0
+) -> Iterator[Card]:
+    """RBE2, RBE3, MPC (set 1); from one on. A body of several motions takes ``more`` ids."""
+    for tie in assembly.rigid[since:]:
+        id = next(ids)
         if isinstance(tie, Equation):
-            yield from card("MPC", _equation(assembly, tie, units), _EXACT)
+            yield ["MPC", *_equation(assembly, tie, units)]
         elif isinstance(tie, Average):
-            yield from card("RBE3", _average(assembly, tie, id), _EXACT)
+            yield ["RBE3", *_average(assembly, tie, id)]
         else:
+            lead = int(assembly.ids[tie.independent])
             for k, (comps, rows) in enumerate(_groups(tie).items()):
-                extra += k > 0
-                values: list[Value] = [id if k == 0 else extra]
-                values += [int(assembly.ids[tie.independent]), _packed(comps)]
-                yield from card("RBE2", values + assembly.ids[rows].tolist())
+                own = next(more) if k else id
+                yield ["RBE2", own, lead, _packed(comps), *assembly.ids[rows].tolist()]
 
 
 def _packed(components: tuple[int, ...]) -> int:

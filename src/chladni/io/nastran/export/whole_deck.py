@@ -1,16 +1,17 @@
 """A fresh deck from an Assembly: every array comes back when it is read again."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 
-from ....model.assembly import Assembly, Scalars
+from ....model.assembly import Assembly, Scalars, picked
 from ....output import write_text
 from ....units import Units
 from ....units import units as unit_system
-from ..text.format import card
+from ..text.format import Card, Value, card, texts
 from . import part_cards, tie_cards
 from .numbering import Ids, Systems
 
@@ -28,18 +29,16 @@ def write_assembly(
     units = unit_system("SI" if units is None else units)
     ids, systems = Ids(assembly), Systems(assembly)
     body = [
-        *_points(assembly, units, systems),
+        *texts(points(assembly, units, systems), _EXACT),
         *part_cards.properties(assembly, units, ids),
-        *_shells(assembly, units, ids),
-        *_solids(assembly, ids),
-        *_beams(assembly, units, ids),
-        *_scalars(assembly, units, ids),
-        *tie_cards.bushes(assembly, units, ids, systems),
-        *tie_cards.masses(assembly, units, ids),
-        *tie_cards.ties(assembly, units, ids),
-        *_supports(assembly),
+        *texts(_shells(assembly, units, ids), 1e-9),
+        *texts(_solids(assembly, ids)),
+        *texts(_beams(assembly, units, ids), 1e-9),
+        *texts(_joints(assembly, units, ids, systems), _EXACT),
+        *texts(_supports(assembly)),
     ]
-    text = [*_head(assembly, units, count), *systems.cards(units), *body, "ENDDATA"]
+    frames = texts(systems.cards(), 1e-12)
+    text = [*_head(assembly, units, count), *frames, *body, "ENDDATA"]
     return write_text(path, "\n".join(text) + "\n")
 
 
@@ -61,18 +60,27 @@ def _head(assembly: Assembly, units: Units, count: int) -> Iterator[str]:
         yield from card("PARAM", ["K6ROT", assembly.k6rot], _EXACT)
 
 
-def _points(assembly: Assembly, units: Units, systems: Systems) -> Iterator[str]:
-    """GRID and SPOINT."""
+def points(assembly: Assembly, units: Units, systems: Systems, since: int = 0) -> Iterator[Card]:
+    """GRID and SPOINT; from a row on."""
     scalar = assembly.scalar_points
-    points = (assembly.points / units.length).tolist()
-    for k, (id, place) in enumerate(zip(assembly.ids.tolist(), points, strict=True)):
+    for k in range(since, len(assembly.points)):
+        id, place = int(assembly.ids[k]), (assembly.points[k] / units.length).tolist()
         if scalar is not None and scalar[k]:
-            yield from card("SPOINT", [id])
+            yield ["SPOINT", id]
         else:
-            yield from card("GRID", [id, None, *place, systems.of_point(k)], _EXACT)
+            yield ["GRID", id, None, *place, systems.of_point(k)]
 
 
-def _shells(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
+def _joints(assembly: Assembly, units: Units, ids: Ids, systems: Systems) -> Iterator[Card]:
+    """Springs, bushes, masses, rigid elements."""
+    yield from _scalars(assembly, units, ids)
+    yield from tie_cards.bushes(assembly, units, iter(ids.bush), count(1), systems)
+    yield from tie_cards.masses(assembly, units, iter(ids.mass))
+    last = max([*ids.rigid, *ids.shell, *ids.beam, *ids.bush, *ids.spring, 0])
+    yield from tie_cards.ties(assembly, units, iter(ids.rigid), count(last + 1_000_001))
+
+
+def _shells(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
     """CQUAD4 and CTRIA3, corner thickness where it is not the property's."""
     s = assembly.shells
     nodes = assembly.ids[s.nodes].tolist()
@@ -82,48 +90,51 @@ def _shells(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
     angle = part_cards.material_direction(assembly)
     for k, three in enumerate(s.triangle.tolist()):
         n = 3 if three else 4
-        values: list[float | int | str | None] = [ids.shell[k], ids.part[s.part[k]], *nodes[k][:n]]
+        values: list[Value] = [ids.shell[k], ids.part[s.part[k]], *nodes[k][:n]]
         values += [angle[k], s.offset[k] / units.length or None, *[None] * (6 - n)]
         if own[k]:
             values += t[k, :n].tolist()
-        yield from card(_SHELL[three], _tail(values), 1e-9)
+        yield [_SHELL[three], *_tail(values)]
 
 
-def _tail(values: list[float | int | str | None]) -> list[float | int | str | None]:
+def _tail(values: list[Value]) -> list[Value]:
     """Reals as floats, so that none is written as an integer."""
     return [float(v) if isinstance(v, np.floating) else v for v in values]
 
 
-def _solids(assembly: Assembly, ids: Ids) -> Iterator[str]:
+def _solids(assembly: Assembly, ids: Ids) -> Iterator[Card]:
     names = {8: "CHEXA", 6: "CPENTA", 4: "CTETRA"}
     for block, mine in zip(assembly.solids, ids.solids, strict=True):
         for k, nodes in enumerate(assembly.ids[block.nodes].tolist()):
-            yield from card(names[len(nodes)], [mine[k], ids.part[block.part[k]], *nodes])
+            yield [names[len(nodes)], mine[k], ids.part[block.part[k]], *nodes]
 
 
-def _beams(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
+def _beams(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
     """CBAR, CBEAM, CROD."""
     numbered = replace(assembly, beams=replace(assembly.beams, ids=np.array(ids.beam, int)))
     for k, part in enumerate(assembly.beams.part.tolist()):
-        name, *values = part_cards.beam_element(numbered, k, ids.part[part], units)
-        yield from card(str(name), values, 1e-9)
+        yield part_cards.beam_element(numbered, k, ids.part[part], units)
 
 
-def _scalars(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
+def _scalars(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
     """CELAS2, CDAMP2, CMASS2."""
     work = units.force * units.length
-    families = (
-        ("CELAS2", assembly.springs, ids.spring, work),
-        ("CDAMP2", assembly.dampers, ids.damper, work * units.time),
-        ("CMASS2", assembly.scalar_masses, ids.scalar_mass, units.mass * units.length**2),
-    )
-    for name, table, mine, unit in families:
-        yield from _scalar(assembly, name, table, mine, unit, units.length)
+    yield from springs(assembly, units, iter(ids.spring))
+    dampers, masses = assembly.dampers, assembly.scalar_masses
+    yield from _scalar(assembly, "CDAMP2", dampers, iter(ids.damper), work * units.time, units)
+    unit = units.mass * units.length**2
+    yield from _scalar(assembly, "CMASS2", masses, iter(ids.scalar_mass), unit, units)
+
+
+def springs(assembly: Assembly, units: Units, ids: Iterator[int], since: int = 0) -> Iterator[Card]:
+    """CELAS2; from a row of springs on."""
+    work, some = units.force * units.length, picked(assembly.springs, slice(since, None))
+    yield from _scalar(assembly, "CELAS2", some, ids, work, units)
 
 
 def _scalar(
-    assembly: Assembly, name: str, table: Scalars, mine: Sequence[int], unit: float, length: float
-) -> Iterator[str]:
+    assembly: Assembly, name: str, table: Scalars, ids: Iterator[int], unit: float, units: Units
+) -> Iterator[Card]:
     """K in the deck's unit: K_SI u_a u_b = K unit, u the length of a translation, 1 of a turn."""
     spoint = assembly.scalar_points
     for k in range(len(table)):
@@ -134,16 +145,16 @@ def _scalar(
             for r, c in zip(rows, comps, strict=True)
         ]
         turns = [turns[e] if known[e] else turns[1 - e] for e in (0, 1)]
-        scale = np.prod([1.0 if t else length for t in turns])
-        values: list[float | int | str | None] = [mine[k], float(table.value[k] * scale / unit)]
+        scale = np.prod([1.0 if t else units.length for t in turns])
+        values: list[Value] = [next(ids), float(table.value[k] * scale / unit)]
         for r, c, there in zip(rows, comps, known, strict=True):
             values += [int(assembly.ids[r]), int(c)] if there else [None, None]
         if name == "CELAS2" and table.damping[k]:
             values.append(float(table.damping[k]))
-        yield from card(name, values, _EXACT)
+        yield [name, *values]
 
 
-def _supports(assembly: Assembly) -> Iterator[str]:
+def _supports(assembly: Assembly) -> Iterator[Card]:
     """SPC1, points with the same components together."""
     held: dict[int, list[int]] = {}
     for row, component in assembly.supports.tolist():
@@ -151,5 +162,5 @@ def _supports(assembly: Assembly) -> Iterator[str]:
     groups: dict[str, list[int]] = {}
     for row, components in held.items():
         groups.setdefault("".join(map(str, sorted(components))), []).append(int(assembly.ids[row]))
-    for text, points in groups.items():
-        yield from card("SPC1", [1, int(text), *points])
+    for text, ids in groups.items():
+        yield ["SPC1", 1, int(text), *ids]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ....model.assembly import Beams
+from ....model.assembly import Beams, concatenated
 from ....model.properties import BeamSection, Part
 from ..text.table import Cards
 from .bar_sections import refuse_impossible
@@ -17,10 +17,7 @@ def beams(ctx: Context, parts: Parts) -> Beams:
     found = [_oriented(ctx, parts, c) for c in ctx.deck.present("CBAR", "CBEAM")]
     found += [_rods(ctx, parts, c) for c in ctx.deck.present("CROD", "CTUBE")]
     found += [_conrods(ctx, parts, c) for c in ctx.deck.present("CONROD")]
-    if not found:
-        return Beams()
-    names = ("ids", "nodes", "part", "up", "offset", "pins")
-    return Beams(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+    return concatenated(*(found or [Beams()]))
 
 
 def _straight(ctx: Context, cards: Cards, nodes: np.ndarray, part: np.ndarray) -> Beams:
@@ -48,8 +45,7 @@ def _check_length(ctx: Context, cards: Cards, made: Beams) -> np.ndarray:
 
 def _rods(ctx: Context, parts: Parts, cards: Cards) -> Beams:
     nodes = ctx.rows(cards, cards.ids(3, 2))
-    pid = cards.integers(2, 0)
-    pid = np.where(pid == 0, cards.integers(1), pid)
+    pid = cards.properties()
     return _straight(ctx, cards, nodes, parts.of(_FAMILY[cards.name], cards, pid))
 
 
@@ -83,8 +79,7 @@ def _defaults(ctx: Context, cards: Cards, k: int) -> bytes:
 
 def _oriented(ctx: Context, parts: Parts, cards: Cards) -> Beams:
     nodes = ctx.rows(cards, cards.ids(3, 2))
-    pid = cards.integers(2, int(_defaults(ctx, cards, 2) or 0))
-    pid = np.where(pid == 0, cards.integers(1), pid)
+    pid = cards.properties(int(_defaults(ctx, cards, 2) or 0))
     part = parts.of(_FAMILY[cards.name], cards, pid)
     flags = _flags(ctx, cards)
     up = _up(ctx, cards, nodes, flags)

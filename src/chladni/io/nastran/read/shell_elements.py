@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ....model.assembly import Shells, Solids
+from ....model.assembly import Shells, Solids, concatenated
 from ....model.properties import ShellSection
 from ..text.table import Cards
 from .context import Context
@@ -19,10 +19,7 @@ def shells(ctx: Context, parts: Parts) -> Shells:
     """All shells, quadrilaterals first."""
     found = [_quads(ctx, parts, c) for c in ctx.deck.present(*_QUADS)]
     found += [_triangles(ctx, parts, c) for c in ctx.deck.present(*_TRIANGLES)]
-    if not found:
-        return Shells()
-    names = ("ids", "nodes", "part", "thickness", "axis", "offset")
-    return Shells(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+    return concatenated(*(found or [Shells()]))
 
 
 def _quads(ctx: Context, parts: Parts, cards: Cards) -> Shells:
@@ -51,8 +48,7 @@ def _made(
     X = ctx.places[nodes]
     corners = 3 if cards.name in _TRIANGLES else 4
     normal = _normals(ctx, cards, nodes[:, :corners])
-    pid = cards.integers(2)
-    pid = np.where(pid == 0, cards.integers(1), pid)
+    pid = cards.properties(None)
     part = parts.of("shell", cards, pid)
     offset = np.zeros(len(cards)) if zoffs is None else cards.reals(zoffs, 0.0) * ctx.scale.length
     return Shells(

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ....model.assembly import Bushes, Masses, Scalars
+from ....model.assembly import Bushes, Masses, Scalars, concatenated
 from ....units import Units
 from ..text.deck import Deck
 from ..text.table import Cards
@@ -67,8 +67,7 @@ def _values(ctx: Context, cards: Cards, k: int, damped: bool) -> tuple[np.ndarra
         loss = cards.reals(7, 0.0) if damped and k == 1 else np.zeros(len(cards))
         return cards.reals(2), loss
     known = _properties(ctx, "P" + cards.name[1:-1])
-    pid = cards.integers(2, 0)
-    pid = np.where(pid == 0, cards.integers(1), pid)
+    pid = cards.properties()
     for i, p in enumerate(pid.tolist()):
         if p not in known:
             there = ", ".join(map(str, sorted(known)[:8])) or "none"
@@ -94,32 +93,28 @@ def _properties(ctx: Context, name: str) -> Values:
     return out
 
 
-def _joined(found: list[Scalars]) -> Scalars:
-    if not found:
-        return Scalars()
-    names = ("ids", "nodes", "component", "value", "damping")
-    return Scalars(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
-
-
 def springs(ctx: Context) -> Scalars:
     """CELAS1 to CELAS4."""
     s = ctx.scale
     names = ("CELAS1", "CELAS2", "CELAS3", "CELAS4")
-    return _joined(_pairs(ctx, names, s.force * s.length, damped=True))
+    found = _pairs(ctx, names, s.force * s.length, damped=True)
+    return concatenated(*(found or [Scalars()]))
 
 
 def dampers(ctx: Context) -> Scalars:
     """CDAMP1 to CDAMP4."""
     s = ctx.scale
     names = ("CDAMP1", "CDAMP2", "CDAMP3", "CDAMP4")
-    return _joined(_pairs(ctx, names, s.force * s.length * s.time, damped=False))
+    found = _pairs(ctx, names, s.force * s.length * s.time, damped=False)
+    return concatenated(*(found or [Scalars()]))
 
 
 def scalar_masses(ctx: Context) -> Scalars:
     """CMASS1 to CMASS4."""
     s = ctx.scale
     names = ("CMASS1", "CMASS2", "CMASS3", "CMASS4")
-    made = _joined(_pairs(ctx, names, s.inertia * s.length**2, damped=False))
+    found = _pairs(ctx, names, s.inertia * s.length**2, damped=False)
+    made = concatenated(*(found or [Scalars()]))
     if np.any(negative := made.value < 0):
         id = made.ids[negative][0]
         cards = next(c for c in ctx.deck.present(*names) if id in c.integers(1))
@@ -132,10 +127,7 @@ def masses(ctx: Context) -> Masses:
     """CONM1 and CONM2."""
     found = [_conm2(ctx, c) for c in ctx.deck.present("CONM2")]
     found += [_conm1(ctx, c) for c in ctx.deck.present("CONM1")]
-    if not found:
-        return Masses()
-    names = ("ids", "node", "matrix")
-    return Masses(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+    return concatenated(*(found or [Masses()]))
 
 
 def skew(x: np.ndarray) -> np.ndarray:
@@ -261,10 +253,7 @@ def bushes(ctx: Context) -> Bushes:
     """CBUSH with PBUSH, CVISC with PVISC."""
     found = [_cbush(ctx, c) for c in ctx.deck.present("CBUSH")]
     found += [_cvisc(ctx, c) for c in ctx.deck.present("CVISC")]
-    if not found:
-        return Bushes()
-    names = ("ids", "nodes", "frame", "place", "stiffness", "viscous", "loss")
-    return Bushes(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+    return concatenated(*(found or [Bushes()]))
 
 
 def _pbush(ctx: Context) -> dict[int, dict[str, np.ndarray]]:
@@ -298,8 +287,7 @@ def _stiffest(card: Cards, k: int) -> np.ndarray:
 
 def _cbush(ctx: Context, cards: Cards) -> Bushes:
     known, s = _pbush(ctx), ctx.scale
-    pid = cards.integers(2, 0)
-    pid = np.where(pid == 0, cards.integers(1), pid)
+    pid = cards.properties()
     if missing := [i for i, p in enumerate(pid.tolist()) if p not in known]:
         there = ", ".join(map(str, sorted(known)[:8])) or "none"
         raise cards.refuse(missing[0], f"there is no PBUSH {pid[missing[0]]}; there are {there}")

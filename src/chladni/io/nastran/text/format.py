@@ -1,10 +1,11 @@
 """Cards as text: eight columns a field, sixteen where eight would lose what matters."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from . import numbers
 
 Value = float | int | str | None
+Card = list[Value]  # its name, then its fields
 
 
 def card(name: str, values: Sequence[Value], tolerance: float = 1e-6) -> list[str]:
@@ -19,6 +20,12 @@ def card(name: str, values: Sequence[Value], tolerance: float = 1e-6) -> list[st
     if None in texts:
         return lines(name, [numbers.field(v, 16) for v in values], large=True)
     return lines(name, [t for t in texts if t is not None], large=False)
+
+
+def texts(cards: Iterable[Sequence[Value]], tolerance: float = 1e-6) -> Iterator[str]:
+    """Lines of some cards, each with its name first."""
+    for name, *values in cards:
+        yield from card(str(name), values, tolerance)
 
 
 def lines(name: str, texts: Sequence[str], large: bool) -> list[str]:

@@ -99,6 +99,11 @@ class Cards:
             raise self._bad(at, k, text[at], "a number of any structure")
         return values
 
+    def properties(self, blank: int | None = 0) -> np.ndarray:
+        """Ids (n,) of the properties of elements, field 2; 0 stands for the element's own id."""
+        pid = self.integers(2, blank)
+        return np.where(pid == 0, self.integers(1), pid)
+
     def _bad(self, i: int, k: int, word: bytes, kind: str) -> FileError:
         return self.refuse(i, f"{self.field_name(k)} is {word.decode('latin-1')!r}, not {kind}")
 
