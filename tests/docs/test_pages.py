@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from chladni.cli import app
 from chladni.effects import registry
@@ -199,6 +200,13 @@ def test_every_kind_of_error_has_a_cure(reference):
     kinds = {n for n, v in vars(errors).items() if isinstance(v, type)
              and issubclass(v, BaseException)}  # fmt: skip
     assert kinds == set(reference._CURES)
+
+
+def test_the_picture_of_the_readme_moves_and_is_small():
+    (path,) = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", (ROOT / "README.md").read_text())
+    with Image.open(ROOT / path) as picture:
+        assert picture.n_frames > 8
+    assert (ROOT / path).stat().st_size < 1e6
 
 
 def test_blocks_run_in_order_and_show_what_they_print(tutorial_blocks, tmp_path, monkeypatch):
