@@ -335,8 +335,10 @@ def curves_and_samples():
     H = (1 / (1 - (f / 50) ** 2 + 0.02j))[:, None, None]
     test = FRF(H, f, (f"7:+Z{EVIL}",), ("2:+Z",), coherence=np.full(H.shape, 0.875))
     x = np.linspace(1, 2, 40)
-    columns = {f"E {EVIL}": x, "t [m]": rng.permutation(x), "mode 1 [Hz]": 10 * x**2}
-    made.shared = {"samples": live_samples.samples(columns, {"mode 1 [Hz]": 20.0}, {"t [m]"})}
+    columns = {"E": x, "t": rng.permutation(x), "f1_hz": 10 * x**2}
+    labels = {"E": f"E {EVIL}", "t": "t [m]", "f1_hz": "mode 1 [Hz]"}
+    shared = live_samples.samples(columns, labels, {"f1_hz": 20.0}, {"t"})
+    made.shared = {"samples": shared}
     slopes = live_samples.influences(np.array([[2.0, -1.0]]), [EVIL], [EVIL, "t"])
     sobol = {"first": (np.array([0.8, 0.1]), np.array([0.1, 0.1]))}
     flat = live_panels.over_frequency(f, {EVIL: np.full(99, 0.5)}, f"share {EVIL}", (0, 1))
@@ -417,6 +419,42 @@ def test_samples_and_curves_hold_at_every_width_and_run_no_name(sampled):
         (("identify",), ["automac", "fit", "stabilisation"]),
         (("correlate",), ["frf", "mac", "shapes", "where"]),
         (("plan", "--sensors", "6"), ["mac", "shapes", "where"]),
+        (
+            ("study", "--vary", "t=90%:110%", "--vary", "E=80%:120%", "--samples", "6"),
+            ["parallel", "responses", "slopes"],
+        ),
+        (
+            ("study", "--vary", "t=90%:110%", "--sampler", "morris", "--samples", "8"),
+            ["indices_mu_star", "parallel", "responses", "slopes"],
+        ),
+        (
+            (
+                "bench",
+                "--excitation",
+                "stepped-sine",
+                "--resolution",
+                "2",
+                "--sweeps",
+                "2",
+                "--band",
+                "20:60",
+            ),
+            ["frf", "schedule"],
+        ),
+        (
+            (
+                "bench",
+                "--excitation",
+                "hammer",
+                "--resolution",
+                "1",
+                "--averages",
+                "2",
+                "--band",
+                "20:60",
+            ),
+            ["frf", "time"],
+        ),
     ],
 )
 def test_every_command_draws_its_page(window, folder, tmp_path, command, names):

@@ -55,6 +55,38 @@ def over_frequency(
     return panels("frequency [Hz]", [panel(title, curves, limits=limits, zero=True)])
 
 
+def over_time(t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Signals (n,) by name and unit, one below the other, over time (n,) [s]."""
+    return panels("time [s]", [panel(n, [curve(n, t, x, tint="ink")]) for n, x in signals.items()])
+
+
+def schedule(
+    frequency: np.ndarray,
+    delay: np.ndarray,
+    measure: np.ndarray,
+    drive: np.ndarray,
+    transient: np.ndarray,
+    unit: str,
+) -> dict[str, Any]:
+    """Lines of a stepped sine (n,) [Hz]: cycles waited and measured; drive, transient (k, n)."""
+
+    def sweeps(what: str, values: np.ndarray, tint: str) -> list[dict[str, Any]]:
+        rows = np.atleast_2d(values)
+        return [curve(f"{what}, sweep {k}", frequency, y, tint=tint) for k, y in enumerate(rows, 1)]
+
+    cycles = [curve("waited", frequency, delay), curve("measured", frequency, measure)]
+    left = 100 * np.maximum(transient, 1e-12)
+    return panels(
+        "frequency [Hz]",
+        [
+            panel("cycles", cycles, log=True),
+            panel(unit, sweeps("drive", drive, "after"), log=True),
+            panel("transient left [%]", sweeps("transient", left, "before"), log=True),
+        ],
+        log=True,
+    )
+
+
 def decays(modes: Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> dict[str, Any]:
     """Amplitude, frequency [Hz] and damping of critical, each (k,), of modes by name."""
     marks = {"marks": "lines+markers"}

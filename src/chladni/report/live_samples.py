@@ -12,6 +12,7 @@ MOST = 1000  # samples: a line and a hover text for each
 
 def samples(
     columns: Mapping[str, np.ndarray],
+    labels: Mapping[str, str],
     nominal: Mapping[str, float],
     logarithmic: Collection[str] = (),
 ) -> dict[str, Any]:
@@ -19,16 +20,17 @@ def samples(
 
     Parameters
     ----------
-    columns : {label: (n,)} of parameters and results
-    nominal : {label: value of the deck}
-    logarithmic : labels of columns that run over decades
+    columns : {name: (n,)} of parameters and results
+    labels : {name: its label}
+    nominal : {name: value of the deck}
+    logarithmic : names of columns that run over decades
     """
     number = np.arange(len(next(iter(columns.values()))))[:MOST]
     return {
         "number": number,
         "columns": [
             {
-                "name": name,
+                "name": labels[name],
                 "values": short(values[:MOST]),
                 "log": name in logarithmic,
                 "nominal": short(np.array([nominal.get(name, np.nan)]))[0],

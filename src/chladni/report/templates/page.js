@@ -12,7 +12,7 @@ const TINTS = ["neutral", "before", "calm", "#cc79a7", "#e69f00", "#56b4e9", "so
 const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
 const tinted = (name) => (name.startsWith("#") ? name : colour(name));
 const extent = (values) => values.reduce(([a, b], v) => (v == null ? [a, b] : [Math.min(a, v), Math.max(b, v)]), [Infinity, -Infinity]);
-const short = (v) => (v == null ? "–" : String(Number(v.toPrecision(5))));
+const short = (v) => (v == null ? "–" : v && (Math.abs(v) >= 1e6 || Math.abs(v) < 1e-3) ? String(Number(v.toPrecision(4)).toExponential()).replace("e+", "e") : String(Number(v.toPrecision(5))));
 
 async function unpacked(script) {
   const bytes = Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0));
@@ -260,7 +260,7 @@ function turned(at, to) {  // both sides are seen from the same place
 
 function responses(at, data, shared, box) {
   const names = Object.keys(data.channels[0].curves);
-  const text = (c) => c.name + (c.held ? " (held out)" : "") + Object.entries(c.off).map(([n, q]) => `, Q ${n} ${q}`).join("");
+  const text = (c) => c.name + (c.held ? " (held out)" : "") + Object.entries(c.off).map(([n, q]) => `, Q ${n} ${short(q)}`).join("");
   const list = choice(box, "channel", data.channels.map((c, k) => [k, text(c)]), (k) => show(Number(k)));
   const step = (by) => show((list.value = (Number(list.value) + by + data.channels.length) % data.channels.length));
   button(box, "previous", () => step(-1));
@@ -363,7 +363,7 @@ function panels(at, data) {
   const marks = data.panels.some((p) => p.curves.some((c) => c.marks));
   data.panels.forEach((panel, k) => {
     const n = k ? String(k + 1) : "";
-    more["yaxis" + n] = { type: panel.log ? "log" : "linear", exponentformat: "power", domain: [1 - (k + 1) / many + (k < many - 1 ? 0.04 : 0), 1 - k / many],
+    more["yaxis" + n] = { ...(panel.log ? decades(panel.curves.flatMap((c) => c.y)) : { exponentformat: "power" }), domain: [1 - (k + 1) / many + (k < many - 1 ? 0.04 : 0), 1 - k / many],
       title: { text: said(panel.title), font: { size: 11 } }, ...(panel.range ? { range: panel.range } : { rangemode: panel.zero ? "tozero" : "normal" }) };
     for (const c of panel.curves) {
       const first = !named.includes(c.name);
@@ -375,7 +375,7 @@ function panels(at, data) {
     }
   });
   at.style.height = 7 + 12 * many + (wide ? 0 : 0.8 * named.length) + "rem";
-  return draw(at, traces, { ...more, margin: { l: 60, r: 15, t: 10, b: 45 }, showlegend: named.length > 1, hovermode: marks ? "closest" : "x unified", hoversubplots: "axis",
+  return draw(at, traces, { ...more, margin: { l: 60, r: 15, t: 10, b: 45 }, showlegend: data.panels.some((p) => p.curves.length > 1), hovermode: marks ? "closest" : "x unified", hoversubplots: "axis",
     xaxis: { ...(data.x.log ? decades(data.panels.flatMap((p) => p.curves.flatMap((c) => c.x))) : { hoverformat: ".5g" }), title: { text: said(data.x.title) }, anchor: "y" + (many > 1 ? many : "") }, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 } });
 }
 
@@ -385,7 +385,7 @@ const about = (samples, n) => `sample ${samples.number[n]}<br>` + samples.column
 
 // Every sample as a line across the axes. A box drawn over an axis keeps the samples within it.
 function parallel(at, data, shared, box) {
-  const samples = shared.samples, axes = data.axes.map((k) => samples.columns[k]), state = { by: data.axes.indexOf(data.by), kept: {} };
+  const samples = shared.samples, axes = data.axes.map((k) => samples.columns[k]), state = { by: data.axes.indexOf(data.by), kept: {} }, wide = at.clientWidth > 600;
   const place = axes.map((a) => {
     const run = a.values.map((v) => (v == null ? null : a.log ? Math.log(v) : v)), [low, high] = extent(run);
     return run.map((v) => (v == null ? null : high > low ? (v - low) / (high - low) : 0.5));
@@ -401,16 +401,16 @@ function parallel(at, data, shared, box) {
     const opacity = Math.min(0.9, Math.max(0.15, 40 / Math.max(kept.length, 1)));
     const traces = [{ ...look, ...line([...whole.keys()].filter((m) => !inside[m])), mode: "lines", hoverinfo: "skip", line: { color: colour("line"), width: 0.7 } }];
     VIRIDIS.forEach((tint, k) => traces.push({ ...look, ...line(kept.filter((m) => bin(m) === k)), opacity, line: { color: tint, width: 1.2 }, marker: { color: tint, size: 4 } }));
-    traces.push({ ...look, x: [null], y: [null], hoverinfo: "skip", mode: "markers", marker: { color: [low], cmin: low, cmax: high, colorscale: "Viridis", showscale: true, colorbar: { thickness: 10, title: { text: said(axes[state.by].name), side: "right", font: { size: 11 } } } } });
+    traces.push({ ...look, x: [null], y: [null], hoverinfo: "skip", mode: "markers", marker: { color: [low], cmin: low, cmax: high, colorscale: "Viridis", showscale: wide, colorbar: { thickness: 10, title: { text: said(axes[state.by].name), side: "right", font: { size: 11 } } } } });
     traces.push({ ...look, x: [], y: [], hoverinfo: "skip", line: { color: colour("found"), width: 3 }, marker: { color: colour("found"), size: 6 } });
-    const note = (text, k, y) => ({ text, x: k, y, showarrow: false, font: { size: 10, color: colour("soft") } });
-    const ends = axes.flatMap((a, k) => extent(a.values).map((v, end) => note(short(v), k, end ? 1.06 : -0.06)));
+    const top = wide ? 1.06 : 1.1, note = (text, k, y) => ({ text, x: k, y, showarrow: false, textangle: wide ? 0 : -50, font: { size: 10, color: colour("soft") } });
+    const ends = axes.flatMap((a, k) => extent(a.values).map((v, end) => note(short(v), k, end ? top : 1 - top)));
     const upright = axes.map((_, k) => ({ type: "line", x0: k, x1: k, y0: 0, y1: 1, line: { color: colour("soft"), width: 1 } }));
     const chosen = Object.entries(state.kept).map(([k, [a, b]]) => ({ type: "rect", x0: k - 0.06, x1: Number(k) + 0.06, y0: a, y1: b, line: { width: 1, color: colour("found") }, fillcolor: colour("found"), opacity: 0.3 }));
     count.textContent = `${kept.length} of ${whole.length} samples`;
     every.disabled = !chosen.length;
-    return draw(at, traces, { shapes: [...upright, ...chosen], annotations: ends, selections: [], dragmode: "select", hovermode: "closest", margin: { l: 20, r: 15, t: 10, b: 45 },
-      xaxis: { tickvals: [...axes.keys()], ticktext: axes.map((a) => said(a.name)), tickangle: -25, range: [-0.4, axes.length - 0.6], showgrid: false, zeroline: false, fixedrange: true }, yaxis: { visible: false, range: [-0.12, 1.12], fixedrange: true } });
+    return draw(at, traces, { shapes: [...upright, ...chosen], annotations: ends, selections: [], dragmode: "select", hovermode: "closest", margin: { l: wide ? 20 : 45, r: 15, t: 10, b: 45 },
+      xaxis: { tickvals: [...axes.keys()], ticktext: axes.map((a) => said(a.name)), tickangle: wide ? -25 : -60, range: [-0.4, axes.length - 0.6], showgrid: false, zeroline: false, fixedrange: true }, yaxis: { visible: false, range: [0.95 - top, top + 0.05], fixedrange: true } });
   }
   at.redraw = show;
   return show().then(() => {
