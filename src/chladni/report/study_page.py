@@ -109,7 +109,7 @@ def _ranges(found: ParameterStudy) -> Block:
     s = found.settings
     caption = (
         f"{len(found.rows)} samples, {s.sampler}, seed {s.seed}. Mode 1 is the first elastic one; "
-        "`chladni modes` counts rigid motions too."
+        "chladni modes counts rigid motions too."
     )
     heads = ("parameter", "deck", "from", "to", "steps")
     return Table(heads, rows, words=("parameter", "steps"), caption=caption)

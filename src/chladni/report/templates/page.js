@@ -354,8 +354,8 @@ function ladder(at, data) {
   return draw(at, ["before", "after"].map(bar), { barmode: "group", xaxis: { tickvals: data.test.map((_, k) => k), ticktext: data.test.map((f) => f.toFixed(1)), title: { text: "frequency of the test [Hz]" } }, yaxis: { title: { text: "off [%]" } } });
 }
 
-// A logarithmic axis: a number at each decade, or at 1, 2 and 5 where there are few.
-const decades = (values) => (([low, high]) => ({ type: "log", dtick: high > 30 * low ? 1 : "D2", exponentformat: "power" }))(extent(values));
+// A logarithmic axis: a number at each decade, at 1, 2 and 5, or at every digit, as there are few.
+const decades = (values) => (([low, high]) => ({ type: "log", dtick: high > 30 * low ? 1 : high > 10 * low ? "D2" : "D1", exponentformat: "power" }))(extent(values));
 
 // Curves one below the other over one axis: of frequency, time or amplitude.
 function panels(at, data) {
