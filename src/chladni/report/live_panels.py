@@ -89,9 +89,9 @@ def schedule(
 
 def decays(modes: Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> dict[str, Any]:
     """Amplitude, frequency [Hz] and damping of critical, each (k,), of modes by name."""
-    marks = {"marks": "lines+markers"}
-    f = [curve(n, a, 100 * (f / f[-1] - 1), **marks) for n, (a, f, _) in modes.items()]
-    z = [curve(n, a, 100 * z, **marks) for n, (a, _, z) in modes.items()]
+    marks = "lines+markers"
+    f = [curve(n, a, 100 * (f / f[-1] - 1), marks=marks) for n, (a, f, _) in modes.items()]
+    z = [curve(n, a, 100 * z, marks=marks) for n, (a, _, z) in modes.items()]
     both = [panel("frequency, relative [%]", f), panel("damping [%]", z, zero=True)]
     return panels("amplitude of the response [SI]", both, log=True)
 
@@ -112,8 +112,10 @@ def over_levels(t: LevelTable) -> dict[str, Any]:
         if len(line):
             curves.append(curve(f"{element}, fitted to all", 1e3 * fitted[0], line, tint="after"))
         if np.isfinite(foretold).any():
-            look = {"marks": "markers", "symbol": "diamond-open", "tint": "after"}
-            curves.append(curve("predicted from the others", 1e3 * a, foretold, **look))
+            curves.append(
+                curve("predicted from the others", 1e3 * a, foretold, marks="markers",
+                      symbol="diamond-open", tint="after")
+            )  # fmt: skip
         if mean:
             ends, level = 1e3 * a[[0, -1]], np.full(2, mean)
             curves.append(curve("one linear model", ends, level, tint="before", dash="dash"))

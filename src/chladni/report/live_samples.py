@@ -7,6 +7,7 @@ import numpy as np
 
 from .live_panels import short
 
+Measures = Mapping[str, tuple[np.ndarray, np.ndarray | None]]  # values, half of the interval
 MOST = 1000  # samples: a line and a hover text for each
 
 
@@ -46,7 +47,7 @@ def influences(values: np.ndarray, rows: Sequence[str], columns: Sequence[str]) 
 
 
 def indices(
-    results: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray | None]]],
+    results: Mapping[str, Measures],
     parameters: Sequence[str],
     axis: str,
 ) -> dict[str, Any]:

@@ -154,7 +154,7 @@ def _indices(page: Page, found: ParameterStudy, measure: str) -> Block:
     shown = [s for s in found.sensitivities if np.isfinite(getattr(s, measure)).any()]
     if measure == "total":
         axis = "Sobol' index; bars of error: 95 % interval"
-        results = {
+        results: dict[str, live_samples.Measures] = {
             label(s.result): {
                 "first order": (s.first, s.first_interval),
                 "total": (s.total, s.total_interval),
