@@ -11,8 +11,9 @@ from chladni import errors
 SOURCE = Path(__file__).parents[1] / "src" / "chladni"
 GAP = "…"  # stands for what the sentence fills in: a file, a line, a name, a number
 _ROOMS = {  # what a sentence without its own cure is about, by the room that says it
-    "io": "open the file at the named line; [Nastran cards](cards.md) and [From your lab]"
-    "(../guide/from_your_lab.md) list what is read",
+    "io.nastran": "correct the deck at the named line; [Nastran cards](cards.md) says how",
+    "io": "correct the file at the named line, or export it again: [From your lab]"
+    "(../guide/from_your_lab.md)",
     "case": "correct the named word of `case.toml`; [A case, word by word](../case.md) lists all",
     "ema": "compare the recording with [From your lab](../guide/from_your_lab.md)",
     "cli": "`chladni COMMAND --help` states the form of each option; [commands](commands.md)",
@@ -47,11 +48,11 @@ class Sentence:
     def cure(self) -> str:
         """The sentence's own advice after its last semicolon, else where to look."""
         advice = self.text.rpartition("; ")[2]
-        if re.match("there (is|are) ", advice):
+        if re.match("there (is|are) |the (same )?folder has ", advice):
             return "use one of those that it lists"
         if advice not in (self.text, GAP):
             return advice
-        return _ROOMS.get(self.room.split(".")[0], _REST)
+        return _ROOMS.get(self.room) or _ROOMS.get(self.room.split(".")[0], _REST)
 
 
 def sentences(source: Path = SOURCE) -> list[Sentence]:
