@@ -414,6 +414,7 @@ def test_samples_and_curves_hold_at_every_width_and_run_no_name(sampled):
     ("command", "names"),
     [
         (("modes",), ["shapes"]),
+        (("check",), ["where"]),
         (("test",), ["frf_grid"]),
         (("frf", "--input", "2:+Z", "--output", "30:+Z", "--output", "7:+Z"), ["frf"]),
         (("identify",), ["automac", "fit", "stabilisation"]),

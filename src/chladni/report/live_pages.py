@@ -92,6 +92,17 @@ def layout(page: Page, name: str, shown: Shown, stills: Sequence[Picture]) -> Se
     return [page.live(name, "structure", data, stills, stills[0].caption if stills else "")]
 
 
+def field(
+    page: Page, shown: Shown, values: np.ndarray, limits: tuple[float, float], still: Picture,
+    title: str,
+) -> Block:  # fmt: skip
+    """Colours by a value of each face (m,)."""
+    if not page.mesh(shown):
+        return still
+    data = live_mesh.field(values, shown, limits, title)
+    return page.live(still.path.stem, "remainder", data, [still], still.caption)
+
+
 def responses(
     page: Page, name: str, curves: Mapping[str, FRF], stills: Sequence[Picture],
     bands: Sequence[Sequence[tuple[float, float]]] = ((), ()), share: int = 1,

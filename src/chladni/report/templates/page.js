@@ -156,12 +156,12 @@ function structure(at, data, shared) {
 }
 
 function remainder(at, data, shared) {
-  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step);
+  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step), title = data.title || "gain";
   const seen = (f) => value[f] != null, shown = mesh.face.filter(seen).map((f) => value[f]);
   return draw(at, [
     sheet(mesh, xyz, {}, (f) => !seen(f)),
-    sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: 0, cmax: data.top, colorscale: "YlOrRd", reversescale: true, colorbar: { thickness: 12, len: 0.8, title: { text: "gain", side: "right" } },
-      hovertemplate: "gain %{intensity:.1f}<extra></extra>" }, seen),
+    sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: data.low || 0, cmax: data.top, colorscale: title === "gain" ? "YlOrRd" : "YlGnBu", reversescale: true, colorbar: { thickness: 12, len: 0.8, title: { text: said(title), side: "right" } },
+      hovertemplate: `${said(title)} %{intensity:.4g}<extra></extra>` }, seen),
     lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz),
   ], { scene: space(at, mesh), margin: { l: 0, r: 0, t: 0, b: 0 } });
 }
