@@ -53,6 +53,12 @@ def test_many_recordings_share_the_room_of_a_page():
     shown = Shown(Surface(np.zeros((0, 3))), curves={"test": measured(None)})
     alone, of_many = (len(live_curves.frf(shown, share)["frequency"]) for share in (1, 100))
     assert of_many < alone / 2
+    f, flat = np.linspace(1, 300, N), {"a": np.zeros(N)}
+    alone, of_many = (
+        len(live_panels.over_frequency(f, flat, "x", share=share)["panels"][0]["curves"][0]["x"])
+        for share in (1, 100)
+    )
+    assert of_many < alone / 2
 
 
 def table():

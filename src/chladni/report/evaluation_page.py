@@ -97,7 +97,7 @@ def _blocks(
             path, frf.frequency, lines, "coherence [-]", (0.0, 1.02)
         )
         still = Picture(path, "Coherence: low values show noise or leakage.")
-        data = live_panels.over_frequency(frf.frequency, lines, "coherence [-]", (0.0, 1.02))
+        data = live_panels.over_frequency(frf.frequency, lines, "coherence [-]", (0.0, 1.02), share)
         blocks.append(live.panels(page, path.stem, data, still))
         files.append((path.name, "coherence"))
     distortion = r.estimate.distortion if r.estimate is not None else None
@@ -106,7 +106,7 @@ def _blocks(
         each = {o: 100 * distortion[:, i] for i, o in enumerate(frf.outputs[:_SHOWN])}
         evaluation_plots.lines_over_frequency(path, frf.frequency, each, "harmonics 2 to 5 [%]")
         still = Picture(path, "Harmonics of the responses over their fundamental.")
-        data = live_panels.over_frequency(frf.frequency, each, "harmonics 2 to 5 [%]")
+        data = live_panels.over_frequency(frf.frequency, each, "harmonics 2 to 5 [%]", share=share)
         blocks.append(live.panels(page, path.stem, data, still))
         files.append((path.name, "harmonic distortion"))
     if r.decays:

@@ -8,7 +8,7 @@ import numpy as np
 from ..ema.level_table import LevelTable
 from .live_curves import extremes
 
-_POINTS = 2000  # of a curve
+_POINTS, _LEAST = 2000, 200  # of a curve; of one among many
 
 
 def panels(x: str, of: Sequence[Mapping[str, Any]], log: bool = False) -> dict[str, Any]:
@@ -28,13 +28,18 @@ def panel(
 
 
 def curve(
-    name: str, x: np.ndarray, y: np.ndarray, sd: np.ndarray | None = None, **look: str
+    name: str,
+    x: np.ndarray,
+    y: np.ndarray,
+    sd: np.ndarray | None = None,
+    most: int = _POINTS,
+    **look: str,
 ) -> dict[str, Any]:
-    """Values y ± 2 sd (n,) over x (n,), thinned; not finite: a gap.
+    """Values y ± 2 sd (n,) over x (n,), thinned to ``most``; not finite: a gap.
 
     ``look`` holds tint, dash, symbol, and ``marks`` where points are marked.
     """
-    at = extremes(np.nan_to_num(y), _POINTS)
+    at = extremes(np.nan_to_num(y), most)
     bars = {} if sd is None else {"sd": short(sd[at])}
     return {"name": name, "x": short(x[at]), "y": short(y[at]), **bars, **look}
 
@@ -49,9 +54,11 @@ def over_frequency(
     lines: Mapping[str, np.ndarray],
     title: str,
     limits: tuple[float, float] | None = None,
+    share: int = 1,
 ) -> dict[str, Any]:
-    """Real functions of frequency (n,) [Hz] by channel."""
-    curves = [curve(name, frequency, y) for name, y in lines.items()]
+    """Real functions of frequency (n,) [Hz] by channel; ``share`` such drawings are on the page."""
+    most = max(_LEAST, _POINTS // share)
+    curves = [curve(name, frequency, y, most=most) for name, y in lines.items()]
     return panels("frequency [Hz]", [panel(title, curves, limits=limits, zero=True)])
 
 
