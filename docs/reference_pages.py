@@ -15,9 +15,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import effect_signatures
+import error_sentences
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
+SIGNATURES = "signatures"  # folder of the pictures of the effects
+BLIND_SCORE = ROOT / "docs" / "blind_score.json"  # ``score.json`` of the last blind report
 BY = "*This page is written by the program itself, from {}.*\n"
 
 
@@ -26,6 +30,7 @@ def pages() -> dict[str, Callable[[], str]]:
     return {
         "commands": commands,
         "exit-codes": exit_codes,
+        "error-sentences": refusals,
         "diagnosis-json": diagnosis_page,
         "cards": cards,
         "effects": effects,
@@ -41,6 +46,9 @@ def write(folder: Path) -> None:
         path, text = folder / f"{name}.md", page()
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
+    (folder / SIGNATURES).mkdir(exist_ok=True)
+    for name, one in signatures().items():
+        effect_signatures.draw(folder / SIGNATURES / f"{name}.png", one)
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -122,6 +130,22 @@ _CODES = {
 }
 
 
+_CURES = {  # what to do about each kind of error
+    "ChladniError": "The sentence names what to change.",
+    "ShapeError": "Give arrays and labels of the lengths that the sentence names.",
+    "LabelError": "Choose one of the names in the sentence. `chladni check CASE` lists those of a "
+    "case.",
+    "FileError": "Correct the file at the named line, or name another file. `chladni check CASE` "
+    "checks all files of a case in seconds.",
+    "ModelError": "Correct the named part of the deck: thickness, material, tie or support. "
+    "[Nastran cards](cards.md) lists what is read.",
+    "AccuracyError": "Read the reason in `distrust`. "
+    "[Troubleshooting](../guide/troubleshooting.md) leads from it to the cause.",
+    "Interrupted": "Run the command again. A study continues with the samples that are kept.",
+    "ExtensionError": "Update the named package, or uninstall it.",
+}
+
+
 def exit_codes() -> str:
     """Exit codes, and the kinds of error behind them, from the program's own constants."""
     from chladni import errors
@@ -129,7 +153,7 @@ def exit_codes() -> str:
 
     rows = [(f"`{getattr(app, name)}`", meaning) for name, meaning in _CODES.items()]
     kinds = [
-        (f"`{name}`", plain(kind.__doc__).split("\n\n")[0], _code(kind, errors, app))
+        (f"`{name}`", plain(kind.__doc__).split("\n\n")[0], _code(kind, errors, app), _CURES[name])
         for name, kind in vars(errors).items()
         if inspect.isclass(kind) and issubclass(kind, BaseException)
         and kind.__module__ == errors.__name__
@@ -142,9 +166,37 @@ def exit_codes() -> str:
             "An error is one sentence on standard error. It names the file, the line, what is "
             "wrong with it and what is possible there. In Python the same sentence is the message "
             "of an exception from `chladni.errors`:\n",
-            table(("exception", "meaning", "exit code"), kinds),
+            table(("exception", "meaning", "exit code", "cure"), kinds),
+            "[Error sentences](error-sentences.md) lists every sentence with its cure.\n",
         ]
     )
+
+
+def refusals() -> str:
+    """Every sentence that refuses something, by the room that says it."""
+    from chladni import errors
+    from chladni.cli import app
+
+    out = [
+        "# Error sentences\n",
+        BY.format("the exceptions in its source"),
+        f"`{error_sentences.GAP}` stands for a file, a line, a name or a number. The cure is the "
+        "advice of the sentence itself, after its last semicolon. Where it has none, the cure is "
+        "the place to look. Search this site for a few words of your message.\n",
+    ]
+    every = error_sentences.sentences()
+    for room in dict.fromkeys(s.room for s in every):
+        own = [s for s in every if s.room == room]
+        rows = [(_code_text(s.text), _code(vars(errors)[s.kind], errors, app), s.cure)
+                for s in own]  # fmt: skip
+        out += [f"## {room}\n", table(("sentence", "exit code", "cure"), rows)]
+    return "\n".join(out)
+
+
+def _code_text(text: str) -> str:
+    """A sentence as code, which Markdown leaves as it is."""
+    fence = "``" if "`" in text else "`"
+    return f"{fence}{text}{fence}"
 
 
 def _code(kind: type, errors: Any, app: Any) -> str:
@@ -410,6 +462,10 @@ def effects() -> str:
             "The values shown are those of a steel plate of 400 x 300 x 1.5 mm, or of two such "
             "plates that are joined. Where a scale comes from stands in "
             "[the table of scales](../method.md).\n",
+            "Each picture shows a signature: one response and the frequencies of these plates, "
+            "without and with the effect. The virtual bench drew its size and place. "
+            f"Both have {100 * effect_signatures.DAMPING:.0f} % of damping. × marks a mode "
+            "without a partner.\n",
             *(_effect(f, grounds) for f in BUILT_IN),
         ]
     )
@@ -430,6 +486,7 @@ def _effect(family: Any, grounds: "_Grounds") -> str:
         ("told apart", f"{family.settled_by}" if family.settled_by else "–"),
         ("cards", held),
         ("concealed by the bench", _first(family.conceal)),
+        ("named right in the last blind report", _named_right(family.name)),
     ]
     params = [] if example is None else _prior(example)
     heads = ("reported value", "unit", "at the prior's centre", "95 % of the prior")
@@ -439,10 +496,29 @@ def _effect(family: Any, grounds: "_Grounds") -> str:
             f"## {family.name}\n",
             f"**{kind.claim[0].upper()}{kind.claim[1:]}.**\n",
             f"{body}\n",
+            f"![Signature of {family.name}]({SIGNATURES}/{family.name}.png)\n",
             table(("", ""), rows),
             table(heads, params) if params else "",
         ]
     )
+
+
+def signatures() -> dict[str, effect_signatures.Signature]:
+    """Signature of every built-in effect by its name."""
+    from chladni.effects.registry import BUILT_IN
+
+    grounds = _Grounds()
+    return {f.name: effect_signatures.signature(f, grounds.of(f).article) for f in BUILT_IN}
+
+
+def _named_right(name: str) -> str:
+    """Share of the cases with this effect that were named right, from the kept score."""
+    if not BLIND_SCORE.is_file():
+        return "not measured: no report is kept"
+    rows = json.loads(BLIND_SCORE.read_text(encoding="utf-8"))
+    outcomes = [row["outcome"] for row in rows if row["effect"] == name]
+    right = sum(outcome == "right" for outcome in outcomes)
+    return f"{right} of {len(outcomes)}" if outcomes else "not measured: in no case of it"
 
 
 def _first(function: Any) -> str:
@@ -478,11 +554,15 @@ class _Grounds:
 
     def proposed(self, family: Any) -> tuple[bool, Any]:
         """True if natural frequencies alone suffice; and an example of the effect."""
-        ground = self._ground(self._name(family))
+        ground = self.of(family)
         by_responses = family.proposed(ground.by_responses)
         by_poles = family.proposed(ground.by_poles)
         found = [*by_responses, *by_poles]
         return bool(by_poles), found[0].effect if found else None
+
+    def of(self, family: Any) -> Any:
+        """The plates that have what an effect acts on."""
+        return self._ground(self._name(family))
 
     @staticmethod
     def _name(family: Any) -> str:

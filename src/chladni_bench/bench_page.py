@@ -1,12 +1,16 @@
 """A virtual test as a page: the test setup, the schedule, a time signal, FRFs, overloads."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from chladni.dynamics.frf import UNIT
+from chladni.report import live_pages as live
+from chladni.report import live_panels
 from chladni.report.blocks import Block, Facts, PageParts, Picture, Section, Table
+from chladni.report.live_pages import Page
 from chladni.report.words import number
 
 from .bench_recording import BenchRecording
@@ -20,7 +24,7 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
     from . import bench_plots
 
     files: list[tuple[str, str]] = []
-    first = found.recordings[0]
+    first, page = found.recordings[0], Page()
     blocks: list[Block] = [Facts(_facts(found)), _table(found)]
     if found.schedule and first.transient is not None and first.force is not None:
         path = folder / "schedule.png"
@@ -28,13 +32,18 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
         f, delay, measure = lines.T
         drive = _drive(found)
         bench_plots.sine_schedule(path, f, delay, measure, first.force, first.transient, drive)
-        blocks.append(Picture(path, "The schedule: force and transient of every line of article "
-                                    f"{first.article}, all sweeps (largest transient of any "
-                                    "channel, antiresonances included)."))  # fmt: skip
+        still = Picture(path, "The schedule: force and transient of every line of article "
+                              f"{first.article}, all sweeps (largest transient of any channel, "
+                              "antiresonances included).")  # fmt: skip
+        data = live_panels.schedule(f, delay, measure, first.force, first.transient, drive)
+        blocks.append(live.panels(page, path.stem, data, still))
         files.append((path.name, "the schedule of the stepped sine"))
     if first.sample is not None:
-        path = _time(folder / "time.png", first, _drive(found))
-        blocks.append(Picture(path, "One block of time data from the front end."))
+        path, t, signals = folder / "time.png", *_signals(first, _drive(found))
+        title = f"Article {first.article}, {first.test.excitation}"
+        bench_plots.time_histories(path, t, signals, title)
+        still = Picture(path, "One block of time data from the front end.")
+        blocks.append(live.panels(page, path.stem, live_panels.over_time(t, signals), still))
         files.append(("time.png", "one block of time data"))
     k = _typical(first)
     path = folder / "frf.png"
@@ -45,10 +54,13 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
         path, frf.frequency, frf.values[:, k, 0], first.truth[:, k], coherence, name,
         UNIT.get(frf.quantity, ""),
     )  # fmt: skip
-    blocks.append(Picture(path, "An estimated FRF, and the FRF of ideal sensors and an ideal "
-                                "front end at the same places."))  # fmt: skip
+    still = Picture(path, "An estimated FRF, and the FRF of ideal sensors and an ideal front end "
+                          "at the same places.")  # fmt: skip
+    ideal = replace(frf, values=first.truth[:, :, None], coherence=None, variance=None)
+    blocks.append(live.responses(page, path.stem, {"recorded": frf, "ideal": ideal}, [still]))
     files.append((path.name, "an FRF and its coherence"))
-    return PageParts(lead(found), [Section("The test", blocks)], found.notes, files)
+    sections = [Section("The test", blocks)]
+    return PageParts(lead(found), sections, found.notes, files, page.drawings)
 
 
 def in_words(found: BenchResult) -> PageParts:
@@ -144,13 +156,12 @@ def _drive(found: BenchResult) -> str:
     return f"{what} [{level_unit(found.inputs)}]"
 
 
-def _time(path: Path, r: BenchRecording, drive: str) -> Path:
-    from . import bench_plots
-
+def _signals(r: BenchRecording, drive: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Time [s] and signals (n,) of the first block: drive and some responses."""
     record = r.sample
     assert record is not None
     t = np.arange(record.force.shape[2]) / record.rate
-    signals: dict[str, Any] = {drive: record.force[0, 0]}
+    signals: dict[str, np.ndarray] = {drive: record.force[0, 0]}
     for k in range(min(_SHOWN, len(record.outputs))):
         signals[f"{record.outputs[k]} [m/s²]"] = record.response[0, k]
-    return bench_plots.time_histories(path, t, signals, f"Article {r.article}, {r.test.excitation}")
+    return t, signals

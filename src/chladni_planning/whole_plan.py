@@ -251,8 +251,8 @@ def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, 
     )
     if not len(below):
         raise ModelError(
-            f"no flexible mode below {settings.f_max:g} Hz; the first is at "
-            f"{above.frequency[0]:.4g} Hz"
+            f"no flexible mode below {settings.f_max:g} Hz; raise the top of the band above the "
+            f"first, at {above.frequency[0]:.4g} Hz"
         )
     return above.sel(slice(0, min(due, len(below)))), above, rigid
 

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from chladni.output import plain
+from chladni.report import live_samples
 from chladni.report.blocks import Block, Code, Facts, Items, PageParts, Picture, Section, Table
+from chladni.report.live_pages import Page
 from chladni.report.words import number, quantity, unit_text
 
 from .parameter_study import ParameterStudy
@@ -57,19 +59,19 @@ def _range(y: np.ndarray) -> dict[str, float] | None:
 
 def study_page(folder: Path, found: ParameterStudy) -> PageParts:
     """Sections of the page; its pictures are written into the folder."""
-    said = in_words(found)
+    said, page = in_words(found), Page()
     files: list[tuple[str, str]] = []
     sections = list(said.sections)
     if len(found.rows) > len(found.failed):
         sections += [
-            Section("Sensitivities", _sensitivities(folder, found, files)),
-            Section("Results over parameters", _pictures(folder, found, files)),
+            Section("Sensitivities", _sensitivities(page, folder, found, files)),
+            Section("Results over parameters", _pictures(page, folder, found, files)),
         ]
     if found.failed:
         why_not = [f"sample {k}: {why}" for k, why in found.failed[:_LISTED]]
         sections.append(Section(f"{len(found.failed)} samples failed", [Items(why_not)]))
     sections.append(Section("Read it", [Code(READ)]))
-    return PageParts(said.lead, sections, said.notes, files)
+    return PageParts(said.lead, sections, said.notes, files, page.drawings)
 
 
 def in_words(found: ParameterStudy) -> PageParts:
@@ -108,14 +110,14 @@ def _ranges(found: ParameterStudy) -> Block:
     s = found.settings
     caption = (
         f"{len(found.rows)} samples, {s.sampler}, seed {s.seed}. Mode 1 is the first elastic one; "
-        "`chladni modes` counts rigid motions too."
+        "chladni modes counts rigid motions too."
     )
     heads = ("parameter", "deck", "from", "to", "steps")
     return Table(heads, rows, words=("parameter", "steps"), caption=caption)
 
 
 def _sensitivities(
-    folder: Path, found: ParameterStudy, files: list[tuple[str, str]]
+    page: Page, folder: Path, found: ParameterStudy, files: list[tuple[str, str]]
 ) -> list[Block]:
     from . import study_plots
 
@@ -124,21 +126,21 @@ def _sensitivities(
     if lawful:
         path = folder / "slopes.png"
         values = np.stack([s.log_slope for s in lawful])
-        study_plots.slope_map(
-            path,
-            values,
-            [label(s.result) for s in lawful],
-            [_drawable(name) for name in found.names],
-            "d ln result / d ln parameter",
-        )
+        results = [label(s.result) for s in lawful]
+        names = [_drawable(name) for name in found.names]
+        study_plots.slope_map(path, values, results, names, "d ln result / d ln parameter")
         files.append((path.name, "logarithmic slopes"))
-        blocks.append(
-            Picture(path, "1: a parameter one per cent higher gives a result one per cent higher.")
-        )
+        still = Picture(
+            path, "d ln result / d ln parameter: at 1, a parameter one per cent higher gives a "
+            "result one per cent higher.",
+        )  # fmt: skip
+        data = live_samples.influences(values, results, found.names)
+        blocks.append(page.live(path.stem, "influences", data, [still], still.caption))
     for measure, title in (("total", "Total Sobol' index"), ("mu_star", "mean |effect|")):
         rows = [_row(s, measure) for s in found.sensitivities]
         if kept := [r for r in rows if any(cell != "–" for cell in r[1:])]:
             caption = f"{title}; ± is half the 95 % interval." if measure == "total" else title
+            blocks.append(_indices(page, found, measure))
             blocks.append(Table(("result", *found.names), kept, words=("result",), caption=caption))
     facts = [
         (label(s.result), f"R² {number(s.r2, 3)} of a power law, {s.used} samples")
@@ -146,6 +148,28 @@ def _sensitivities(
         if np.isfinite(s.r2) and s.r2 < 0.95
     ]
     return [*blocks, Facts(facts)] if facts else blocks
+
+
+def _indices(page: Page, found: ParameterStudy, measure: str) -> Block:
+    """Bars of a result's measure over its parameters, with the other measure of its method."""
+    shown = [s for s in found.sensitivities if np.isfinite(getattr(s, measure)).any()]
+    if measure == "total":
+        axis = "Sobol' index; bars of error: 95 % interval"
+        results: dict[str, live_samples.Measures] = {
+            label(s.result): {
+                "first order": (s.first, s.first_interval),
+                "total": (s.total, s.total_interval),
+            }
+            for s in shown
+        }
+    else:
+        axis = "elementary effect over the range, in units of the result"
+        results = {
+            label(s.result): {"mean |effect|": (s.mu_star, None), "its deviation": (s.sigma, None)}
+            for s in shown
+        }
+    data = live_samples.indices(results, found.names, axis)
+    return page.live(f"indices_{measure}", "indices", data)
 
 
 def _row(s: Sensitivity, measure: str) -> tuple[str, ...]:
@@ -170,14 +194,15 @@ def label(column: str) -> str:
     return "mass [kg]" if column == "mass_kg" else column
 
 
-def _pictures(folder: Path, found: ParameterStudy, files: list[tuple[str, str]]) -> list[Block]:
+def _pictures(
+    page: Page, folder: Path, found: ParameterStudy, files: list[tuple[str, str]]
+) -> list[Block]:
     from . import study_plots
 
     parameters = {_with_unit(v.name, v.unit): found.column(v.name) for v in found.varied[:_AXES]}
     labels = {v.name: _with_unit(v.name, v.unit) for v in found.varied}
     results = {label(c): found.column(c) for c in _drawn(found)}
     labels |= {c: label(c) for c in found.columns}
-    results = {c: y for c, y in results.items() if np.isfinite(y).any()}
     if not results:
         return []
     decades = [_with_unit(v.name, v.unit) for v in found.varied if v.log]
@@ -188,13 +213,43 @@ def _pictures(folder: Path, found: ParameterStudy, files: list[tuple[str, str]])
     if np.isfinite(np.stack(list(whole.values()))).all(axis=0).sum() > 1:
         path = study_plots.parallel_coordinates(folder / "parallel.png", whole, colour, decades)
         files.append((path.name, "parallel coordinates"))
-        blocks.append(Picture(path, f"Each line is a sample; colour: {colour}."))
+        still = Picture(path, f"Each line is a sample; colour: {colour}.")
+        blocks.append(_lines(page, found, still))
     path = study_plots.response_plots(
         folder / "responses.png", results, parameters, nominal, decades
     )
     files.append((path.name, "results over parameters"))
-    blocks.append(Picture(path, "Dots: samples; dashed: the deck's own values."))
-    return blocks
+    still = Picture(path, "Dots: samples; dashed: the deck's own values.")
+    return [*blocks, _points(page, found, still)]
+
+
+def _share(page: Page, found: ParameterStudy) -> dict[str, int]:
+    """Give the page all samples; return the position of each column in them, by its name."""
+    units = {v.name: unit_text(v.unit) for v in found.varied}
+    text = {n: f"{_shortened(n)} [{u}]" if u else _shortened(n) for n, u in units.items()}
+    text |= {c: _shortened(label(c)) for c in found.columns}
+    nominal = {k: v for k, v in plain(found.nominal).items() if isinstance(v, float)}
+    columns = {name: found.column(name) for name in text}
+    decades = [v.name for v in found.varied if v.log]
+    page.shared = {"samples": live_samples.samples(columns, text, nominal, decades)}
+    return {name: k for k, name in enumerate(text)}
+
+
+def _lines(page: Page, found: ParameterStudy, still: Picture) -> Block:
+    """Every sample as a line across parameters and results."""
+    at, results = _share(page, found), _drawn(found)
+    axes = [at[name] for name in (*(v.name for v in found.varied[:_AXES]), *results)]
+    few = f" The first {live_samples.MOST} are drawn." * (len(found.rows) > live_samples.MOST)
+    text = f"Draw a box over an axis to keep the samples within it.{few} {still.caption}"
+    data = {"axes": axes, "by": at[results[0]]}
+    return page.live("parallel", "parallel", data, [still], text)
+
+
+def _points(page: Page, found: ParameterStudy, still: Picture) -> Block:
+    """One column over another, any of them."""
+    at = _share(page, found)
+    data = {"x": at[found.names[0]], "y": at[_drawn(found)[0]]}
+    return page.live("responses", "cloud", data, [still], still.caption)
 
 
 def _with_unit(name: str, unit: str) -> str:
@@ -203,12 +258,16 @@ def _with_unit(name: str, unit: str) -> str:
 
 
 def _drawable(name: str) -> str:
-    """Shorten a user's name for a label, and prevent its reading as a formula."""
-    shown = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 12]}…{name[-11:]}"
-    return shown.replace("$", r"\$")
+    """Shorten a user's name for a picture's label, and prevent its reading as a formula."""
+    return _shortened(name).replace("$", r"\$")
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 12]}…{name[-11:]}"
 
 
 def _drawn(found: ParameterStudy) -> list[str]:
-    """Q first, then the lowest modes."""
+    """Q first, then the lowest modes; none that no sample has."""
     modes = [c for c in found.columns if c.startswith("f") and c.endswith("_hz")]
-    return (["Q"] if "Q" in found.columns else []) + modes[: _SHOWN - ("Q" in found.columns)]
+    first = (["Q"] if "Q" in found.columns else []) + modes[: _SHOWN - ("Q" in found.columns)]
+    return [c for c in first if np.isfinite(found.column(c)).any()]

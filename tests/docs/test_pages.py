@@ -1,11 +1,14 @@
 """The documents hang together, and what is written from the program is whole; without Sphinx."""
 
 import importlib.util
+import json
 import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from chladni.cli import app
 from chladni.effects import registry
@@ -20,7 +23,11 @@ def module(name):
     spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
     made = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = made
-    spec.loader.exec_module(made)
+    sys.path.insert(0, str(DOCS))  # its neighbours
+    try:
+        spec.loader.exec_module(made)
+    finally:
+        sys.path.remove(str(DOCS))
     return made
 
 
@@ -123,6 +130,83 @@ def test_an_effect_states_claim_formula_prior_and_what_it_is_mistaken_for(refere
     text = reference._effect(registry.family("point-mass"), reference._Grounds())
     for part in ("M + m Σ bᵀb", "`CONM2`", "[mass-patch](#mass-patch)", "| M | kg |", "weigh"):
         assert part in text, part
+
+
+@pytest.fixture(scope="module")
+def grounds(reference):
+    return reference._Grounds()
+
+
+def test_a_mass_lowers_every_frequency_that_it_moves(reference, grounds):
+    """Rayleigh: added mass raises no frequency; these eight modes keep their order."""
+    family = registry.family("point-mass")
+    one = reference.effect_signatures.signature(family, grounds.of(family).article)
+    assert one.shifts[:8].max() < 1e-3
+    assert one.shifts[:8].min() < -1
+    assert np.abs(one.after / one.before - 1).max() > 0.5
+
+
+def test_a_faulty_channel_moves_no_frequency_and_scales_its_response(reference, grounds, tmp_path):
+    family = registry.family("sensor-fault")
+    one = reference.effect_signatures.signature(family, grounds.of(family).article)
+    np.testing.assert_allclose(one.shifts, 0, atol=1e-9)
+    np.testing.assert_allclose(one.after / one.before, one.truth["gain"])
+    picture = reference.effect_signatures.draw(tmp_path / "a.png", one)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_effects_show_their_signature_and_how_often_they_were_named(
+    reference, grounds, tmp_path, monkeypatch
+):
+    family = registry.family("point-mass")
+    kept = tmp_path / "score.json"
+    monkeypatch.setattr(reference, "BLIND_SCORE", kept)
+    text = reference._effect(family, grounds)
+    assert "](signatures/point-mass.png)" in text
+    assert "| not measured: no report is kept |" in text
+    rows = [("point-mass", "right"), ("point-mass", "none"), ("crack", "right")]
+    kept.write_text(json.dumps([{"effect": e, "outcome": o} for e, o in rows]))
+    assert "| 1 of 2 |" in reference._effect(family, grounds)
+    assert "not measured" in reference._named_right("suspension")
+
+
+def test_every_error_sentence_has_a_cure(reference, tmp_path):
+    """That of the sentence, else a place to look, which is a page."""
+    every = reference.error_sentences.sentences()
+    assert len(every) > 500
+    assert all(s.cure for s in every)
+    text = reference.refusals()
+    for kind in ("no case.toml in the folder", "chladni init DECK RECORDING", "| `3` |"):
+        assert kind in text, kind
+    folder = DOCS / "reference"
+    made = {folder / f"{name}.md" for name in reference.pages()}
+    for link in set(re.findall(r"\]\(([^)#]+)\)", " ".join(s.cure for s in every))):
+        path = (folder / link).resolve()
+        assert path in made or path.is_file(), link
+    source = tmp_path / "io/uff/a.py"
+    source.parent.mkdir(parents=True)
+    source.write_text("def f(x):\n    raise FileError(f\"{x}: no '{x}' here; give one\")\n")
+    (found,) = reference.error_sentences.sentences(tmp_path)
+    assert (found.room, found.text, found.cure) == (
+        "io.uff",
+        "…: no '…' here; give one",
+        "give one",
+    )
+
+
+def test_every_kind_of_error_has_a_cure(reference):
+    from chladni import errors
+
+    kinds = {n for n, v in vars(errors).items() if isinstance(v, type)
+             and issubclass(v, BaseException)}  # fmt: skip
+    assert kinds == set(reference._CURES)
+
+
+def test_the_picture_of_the_readme_moves_and_is_small():
+    (path,) = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", (ROOT / "README.md").read_text())
+    with Image.open(ROOT / path) as picture:
+        assert picture.n_frames > 8
+    assert (ROOT / path).stat().st_size < 1e6
 
 
 def test_blocks_run_in_order_and_show_what_they_print(tutorial_blocks, tmp_path, monkeypatch):

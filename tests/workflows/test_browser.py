@@ -11,13 +11,18 @@ from dataclasses import replace
 from urllib.error import URLError
 from urllib.request import Request, urlopen
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from chladni.cli.app import application
+from chladni.dynamics.frf import FRF
+from chladni.report import live_pages, live_panels, live_samples
+from chladni.report.blocks import Section
 from chladni.report.diagnosis_folder import shown, write_diagnosis
 from chladni.report.live_diagnosis import drawings
-from chladni.report.page import write_page
+from chladni.report.live_pages import Page
+from chladni.report.page import write_page, write_sections
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -324,14 +329,133 @@ def test_names_are_shown_and_not_run(window, case, diagnosed, tmp_path):
     assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
 
 
+def curves_and_samples():
+    """A page with the drawings of tests and studies, its numbers small and known."""
+    rng, f, made = np.random.default_rng(2), np.linspace(1, 99, 99), Page()
+    H = (1 / (1 - (f / 50) ** 2 + 0.02j))[:, None, None]
+    test = FRF(H, f, (f"7:+Z{EVIL}",), ("2:+Z",), coherence=np.full(H.shape, 0.875))
+    x = np.linspace(1, 2, 40)
+    columns = {"E": x, "t": rng.permutation(x), "f1_hz": 10 * x**2}
+    labels = {"E": f"E {EVIL}", "t": "t [m]", "f1_hz": "mode 1 [Hz]"}
+    shared = live_samples.samples(columns, labels, {"f1_hz": 20.0}, {"t"})
+    made.shared = {"samples": shared}
+    slopes = live_samples.influences(np.array([[2.0, -1.0]]), [EVIL], [EVIL, "t"])
+    sobol = {"first": (np.array([0.8, 0.1]), np.array([0.1, 0.1]))}
+    flat = live_panels.over_frequency(f, {EVIL: np.full(99, 0.5)}, f"share {EVIL}", (0, 1))
+    blocks = [
+        live_pages.responses(made, "frf", {"test": test}, []),
+        made.live("lines", "panels", flat),
+        made.live("lanes", "parallel", {"axes": [0, 1, 2], "by": 2}),
+        made.live("cloud", "cloud", {"x": 0, "y": 2}),
+        made.live("slopes", "influences", slopes),
+        made.live("sobol", "indices", live_samples.indices({EVIL: sobol}, [EVIL, "t"], "index")),
+    ]
+    return [Section("all", blocks)], made.drawings
+
+
+@pytest.fixture
+def sampled(window, tmp_path):
+    """The page of :func:`curves_and_samples`, opened anew on a desk."""
+    sections, made = curves_and_samples()
+    window.size(1280, 900)
+    window.open(write_sections(tmp_path / "p.html", EVIL, sections, drawings=made))
+    return window
+
+
+def test_a_response_says_its_coherence_where_one_points(sampled):
+    see(sampled, "frf")
+    x, y = centre(sampled, "frf")
+    sampled.pointer(("pointerMove", x, y), ("pointerMove", x + 5, y))
+    tip = PLOT + "return plot.querySelector('.hoverlayer').textContent"
+    assert "coherence 0.875" in sampled.until(tip, "frf")
+
+
+def test_a_box_over_an_axis_keeps_the_samples_within_it(sampled):
+    """The upper half of an axis of evenly spaced values holds half of the samples."""
+    see(sampled, "lanes")
+    count = PLOT + "return plot.parentNode.querySelector('.controls span').textContent"
+    assert sampled.run(count, "lanes") == "40 of 40 samples"
+    place = (
+        PLOT
+        + """
+      const box = plot.getBoundingClientRect(), { xaxis, yaxis } = plot._fullLayout;
+      return [box.x + xaxis._offset + xaxis.l2p(0), box.y + yaxis._offset + yaxis.l2p(0.5),
+        box.y + yaxis._offset + yaxis.l2p(1.05)];"""
+    )
+    x, middle, top = sampled.run(place, "lanes")
+    sampled.pointer(
+        ("pointerMove", x - 15, top), ("pointerDown",), ("pointerMove", x + 5, top + 20),
+        ("pointerMove", x + 15, middle), ("pointerUp",),
+    )  # fmt: skip
+    sampled.until(count + " == '20 of 40 samples'", "lanes")
+    sampled.run(PLOT + "plot.parentNode.querySelector('button').click()", "lanes")
+    sampled.until(count + " == '40 of 40 samples'", "lanes")
+
+
+def test_samples_and_curves_hold_at_every_width_and_run_no_name(sampled):
+    names = sampled.run("return [...document.querySelectorAll('.live')].map(f => f.dataset.name)")
+    for width, dark in ((1280, False), (390, False), (1280, True)):
+        sampled.size(width, 900)
+        sampled.dark(dark)
+        for name in names:
+            see(sampled, name)
+            x, y = centre(sampled, name)
+            sampled.pointer(("pointerMove", x, y), ("pointerMove", x + 4, y))
+        assert sampled.run("return document.documentElement.scrollWidth") <= width
+    select(sampled, "cloud", "colour", 2)
+    hover = PLOT + "return plot.data[0].text[0].includes('&lt;b&gt;')"
+    assert sampled.run(hover, "cloud")
+    assert sampled.run("return window.hit") is None
+    assert sampled.run("return document.querySelectorAll('img[src=x], a[href^=java]').length") == 0
+    assert not [m for m in sampled.complaints() if "readback" not in m and "GPU stall" not in m]
+
+
 @pytest.mark.parametrize(
     ("command", "names"),
     [
         (("modes",), ["shapes"]),
+        (("check",), ["where"]),
+        (("test",), ["frf_grid"]),
         (("frf", "--input", "2:+Z", "--output", "30:+Z", "--output", "7:+Z"), ["frf"]),
         (("identify",), ["automac", "fit", "stabilisation"]),
         (("correlate",), ["frf", "mac", "shapes", "where"]),
         (("plan", "--sensors", "6"), ["mac", "shapes", "where"]),
+        (
+            ("study", "--vary", "t=90%:110%", "--vary", "E=80%:120%", "--samples", "6"),
+            ["parallel", "responses", "slopes"],
+        ),
+        (
+            ("study", "--vary", "t=90%:110%", "--sampler", "morris", "--samples", "8"),
+            ["indices_mu_star", "parallel", "responses", "slopes"],
+        ),
+        (
+            (
+                "bench",
+                "--excitation",
+                "stepped-sine",
+                "--resolution",
+                "2",
+                "--sweeps",
+                "2",
+                "--band",
+                "20:60",
+            ),
+            ["frf", "schedule"],
+        ),
+        (
+            (
+                "bench",
+                "--excitation",
+                "hammer",
+                "--resolution",
+                "1",
+                "--averages",
+                "2",
+                "--band",
+                "20:60",
+            ),
+            ["frf", "time"],
+        ),
     ],
 )
 def test_every_command_draws_its_page(window, folder, tmp_path, command, names):

@@ -157,6 +157,38 @@ def test_what_it_writes_is_the_case_that_was_meant(structure, frf, tmp_path, uni
     np.testing.assert_allclose(np.abs(found.values), np.abs(frf.values), rtol=0.02)
 
 
+def test_a_case_without_a_weighed_mass_can_be_used_and_says_so(deck, frf, places, tmp_path):
+    """Missing words that a case can do without do not make it complete."""
+    write_uff(tmp_path / "a.uff", frf, places)
+    done = ran("init", deck, tmp_path / "a.uff", "--out", tmp_path / "case")
+    assert "missing: the weighed mass" in done.output
+    assert "can be used" in done.output
+    assert "complete" not in done.output
+
+
+@pytest.mark.parametrize("said", ["mm-t-s", "in-lb-s"])
+def test_places_off_a_deck_in_the_wrong_units_point_to_the_units(deck, frf, tmp_path, said):
+    """The place lies on the deck as it is meant, not on a deck that is read much smaller."""
+    write_npz(tmp_path / "a.npz", frf)
+    rows = [f"{label},,0.1,0.1,0,+Z,output" for label in ENDS]
+    table = "\n".join(["label,grid,x,y,z,direction,role", *rows, "1:+Z,1,,,,+Z,input", ""])
+    (tmp_path / "sensors.csv").write_text(table)
+    text = f'[model]\ndeck = "{deck}"\noutside = true\nunits = "{{}}"\n'
+    text += '[test]\nrecordings = ["a.npz"]\nsensors = "sensors.csv"\n'
+    (tmp_path / "case.toml").write_text(text.format("SI"))
+    chladni.load_case(tmp_path)
+    (tmp_path / "case.toml").write_text(text.format(said))
+    with pytest.raises(ChladniError, match=r"another unit of length, so check .*\[model\] units"):
+        chladni.load_case(tmp_path)
+
+
+def test_a_recording_in_the_place_of_the_deck_is_named(deck, frf, tmp_path):
+    """Deck and recording are easily given in the wrong order."""
+    write_uff(tmp_path / "a.uff", frf)
+    sentence = refused("init", tmp_path / "a.uff", deck, "--out", tmp_path / "case")
+    assert "a.uff is a universal file, not a Nastran deck" in sentence
+
+
 def test_a_plan_is_read(deck, frf, tmp_path):
     """The table that plan writes takes the place of guesses, masses included."""
     words = ("--units", "SI", "--sensors", 6, "--modes", 4, "--drawn", 0)

@@ -12,6 +12,7 @@ from ..geometry.grid_normals import grid_normals
 from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
+from ..units import UNITS
 from .label_directions import ways_said
 from .node_numbers import OFF, count_channels, numbers_agree, on_structure, scaled, size_of
 from .toml_sections import TomlSection
@@ -232,6 +233,7 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
         raise LabelError(
             f"{where}: its place ({named(place.tolist())}) m is {away:.3g} m from the structure, "
             f"which is {size:.3g} m across; places are in metres, basic frame"
+            f"{_of_other_units(made, place, _FAR * size)}"
         )
     vector = sensor.direction if sensor.direction is not None else normal
     if vector is None:
@@ -239,6 +241,20 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
             f"{where}: it has no shell and so no normal; give +X, +Y, +Z or nx, ny, nz"
         )
     return grid, place if grid == 0 else made.points[row], vector, sensor
+
+
+def _of_other_units(made: Assembly, place: np.ndarray, reach: float) -> str:
+    """Advice where a place would lie within the structure in another unit of length; else ""."""
+    lengths = {u.length for u in UNITS.values()}
+    ends = np.array([made.points.min(axis=0) - reach, made.points.max(axis=0) + reach])
+    for ratio in sorted({a / b for a in lengths for b in lengths if a != b}):
+        low, high = ratio * ends
+        if (low <= place).all() and (place <= high).all():
+            return (
+                "; it would lie within it in another unit of length, so check the unit of the "
+                "place and [model] units"
+            )
+    return ""
 
 
 def _normal(made: Assembly, row: int, where: str) -> np.ndarray:

@@ -1,5 +1,6 @@
 """``chladni init``: a commented case.toml and sensors.csv from a deck and a recording."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -44,7 +45,7 @@ def run(
             write_text(job.folder / "sensors.csv", sensors_text(made))
         for sentence in _sentences(made):
             job.say(sentence)
-    say(_next(place))
+    say(_next(place, made.missing))
 
 
 def _sentences(made: CaseDraft) -> list[str]:
@@ -54,10 +55,11 @@ def _sentences(made: CaseDraft) -> list[str]:
     return [*out, *made.notes, *(f"missing: {text}" for text in made.missing)]
 
 
-def _next(place: Path) -> str:
-    """State if the case is complete, else the missing words."""
+def _next(place: Path, missing: Sequence[str]) -> str:
+    """State if the case can be used, else the words without which it cannot."""
     try:
         load_case(place)
     except ChladniError as error:
         return f"not complete yet: {error}"
-    return f"the case is complete; next: chladni check {place}"
+    said = "can be used; what is missing would improve it" if missing else "is complete"
+    return f"the case {said}; next: chladni check {place}"

@@ -1,5 +1,6 @@
 """A checked case as a page: its content, suspected errors, places of the sensors."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,9 @@ from ..output import plain
 from ..view.surface import surface
 from ..workflows.case_check import CaseCheck, CheckedDof
 from ..workflows.case_model import cords, markers
+from . import live_pages as live
 from .blocks import Block, Facts, Items, PageParts, Picture, Section, Table
+from .live_pages import Page
 from .words import counted, direction, number
 
 
@@ -28,14 +31,21 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
     from ..view import scene
 
     path = folder / "sensors.png"
-    ends = markers(case.outputs), markers(case.inputs)
-    scene.sensors(path, surface(case.assembly), *ends, cords=cords(case))
-    blocks: list[Block] = [Picture(path, "Sensors, shakers and cords; arrows: their directions.")]
+    page, at = Page(), cords(case)
+    outputs, inputs = markers(case.outputs), markers(case.inputs)
+    shown = replace(
+        live.mesh_of(surface(case.assembly), case.assembly),
+        outputs=outputs, inputs=inputs, cords=at,
+    )  # fmt: skip
+    scene.sensors(path, shown.seen, outputs, inputs, cords=at)
+    still = Picture(path, "Sensors, shakers and cords; arrows: their directions.")
+    blocks: list[Block] = [*live.layout(page, "where", shown, [still])]
     if found.dofs:
         blocks.append(_table(found.dofs))
     looks, facts, *told = in_words(found).sections
     sections = [looks, facts, Section("Sensors", blocks), *told]
-    return PageParts(_lead(found), sections, (), [(path.name, "sensors on the mesh")])
+    files = [(path.name, "sensors on the mesh")]
+    return PageParts(_lead(found), sections, (), files, page.drawings)
 
 
 def in_words(found: CaseCheck) -> PageParts:

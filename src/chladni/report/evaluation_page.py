@@ -12,8 +12,11 @@ from ..io.tables.write_tables import write_npz
 from ..io.uff.estimate_stamp import stamp
 from ..io.uff.write_uff import write_uff
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
+from . import live_pages as live
+from . import live_panels
 from .blocks import Block, PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
+from .live_pages import Page
 from .screening_blocks import lead_of, screening_section
 from .words import number
 
@@ -24,20 +27,22 @@ def evaluation_page(folder: Path, found: Evaluation) -> PageParts:
     """Sections of the page; pictures and, of time data, the FRFs are written into the folder."""
     sections = [screening_section(*(r.screening for r in found.recordings))]
     files: list[tuple[str, str]] = []
+    page, share = Page(), len(found.recordings)
     for k, r in enumerate(found.recordings):
         stem = "" if len(found.recordings) == 1 else f"_{k + 1}"
         files += _written(folder, stem, r)
-        blocks, drawn = _blocks(folder, stem, r)
+        blocks, drawn = _blocks(page, folder, stem, r, share)
         sections.append(Section(r.recording.name, blocks))
         files += drawn
         if r.levels.nonlinear:
             tables = level_tables(r.levels)
             pictures = draw_levels(folder, tables, f"_decay{stem}")
             of = f"Free decays of {r.recording.name} by amplitude"
-            sections.append(replace(level_section(tables, pictures), title=of))
+            drawings = live.levels(page, tables, pictures)
+            sections.append(replace(level_section(tables, drawings), title=of))
             files += [(path.name, "a mode over its amplitudes") for path in pictures.values()]
     lead = lead_of([r.screening for r in found.recordings])
-    return PageParts(lead, sections, found.notes, files)
+    return PageParts(lead, sections, found.notes, files, page.drawings)
 
 
 def in_words(found: Evaluation) -> PageParts:
@@ -64,7 +69,7 @@ def _written(folder: Path, stem: str, r: RecordingEvaluation) -> list[tuple[str,
 
 
 def _blocks(
-    folder: Path, stem: str, r: RecordingEvaluation
+    page: Page, folder: Path, stem: str, r: RecordingEvaluation, share: int
 ) -> tuple[list[Block], list[tuple[str, str]]]:
     from ..view import evaluation_plots, plots
 
@@ -77,22 +82,32 @@ def _blocks(
     grid = folder / f"frf_grid{stem}.png"
     curves = {n: {"test": (frf.frequency, frf.values[:, i, j])} for n, (i, j) in named.items()}
     plots.frf_grid(grid, curves, UNIT.get(frf.quantity, ""), columns=min(2, len(curves)))
-    blocks.append(Picture(grid, "FRFs."))
+    blocks.append(
+        live.responses(page, grid.stem, {"test": frf}, [Picture(grid, "FRFs.")], share=share)
+    )
     files.append((grid.name, "FRFs"))
     if frf.coherence is not None:
         path = folder / f"coherence{stem}.png"
-        lines = {n: frf.coherence[:, i, j] for n, (i, j) in named.items()}
+        alone = len(frf.inputs) == 1
+        lines = {
+            frf.outputs[i] if alone else name: frf.coherence[:, i, j]
+            for name, (i, j) in named.items()
+        }
         evaluation_plots.lines_over_frequency(
             path, frf.frequency, lines, "coherence [-]", (0.0, 1.02)
         )
-        blocks.append(Picture(path, "Coherence: low values show noise or leakage."))
+        still = Picture(path, "Coherence: low values show noise or leakage.")
+        data = live_panels.over_frequency(frf.frequency, lines, "coherence [-]", (0.0, 1.02), share)
+        blocks.append(live.panels(page, path.stem, data, still))
         files.append((path.name, "coherence"))
     distortion = r.estimate.distortion if r.estimate is not None else None
     if distortion is not None:
         path = folder / f"distortion{stem}.png"
         each = {o: 100 * distortion[:, i] for i, o in enumerate(frf.outputs[:_SHOWN])}
         evaluation_plots.lines_over_frequency(path, frf.frequency, each, "harmonics 2 to 5 [%]")
-        blocks.append(Picture(path, "Harmonics of the responses over their fundamental."))
+        still = Picture(path, "Harmonics of the responses over their fundamental.")
+        data = live_panels.over_frequency(frf.frequency, each, "harmonics 2 to 5 [%]", share=share)
+        blocks.append(live.panels(page, path.stem, data, still))
         files.append((path.name, "harmonic distortion"))
     if r.decays:
         path = folder / f"decays{stem}.png"
@@ -101,7 +116,9 @@ def _blocks(
             for d in r.decays
         }
         evaluation_plots.amplitude_dependence(path, each_decay)
-        blocks += [_decays(r.decays), Picture(path, "Frequency and damping against amplitude.")]
+        still = Picture(path, "Frequency and damping against amplitude.")
+        data = live_panels.decays(each_decay)
+        blocks += [_decays(r.decays), live.panels(page, path.stem, data, still)]
         files.append((path.name, "free decays"))
     return blocks, files
 

@@ -39,13 +39,13 @@ _AROUND = 4.0  # half bandwidths of a circle
 def identification_page(folder: Path, found: Identification) -> PageParts:
     """Sections of the page; its pictures and tables are written into the folder."""
     sections, files = [screening_section(*(r.screening for r in found.recordings))], []
-    page = Page()
+    page, share = Page(), len(found.recordings)
     for k, r in enumerate(found.recordings):
         stem, name = "" if len(found.recordings) == 1 else f"_{k + 1}", r.recording.name
         write_poles(folder / f"poles{stem}.csv", r.poles)
         files.append((f"poles{stem}.csv", f"poles of {name}"))
         pictures = _pictures(folder, stem, r)
-        sections.append(Section(name, [_table(r), *_live(page, stem, r, pictures)]))
+        sections.append(Section(name, [_table(r), *_live(page, stem, r, pictures, share)]))
         files += _modal_files(folder, stem, r)
         files += [(p.path.name, _FILES[p.path.stem.removesuffix(stem)]) for p in pictures]
     for k, study in enumerate(found.levels):
@@ -54,7 +54,7 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
         write_levels(folder / f"levels{stem}.csv", tables)
         files.append((f"levels{stem}.csv", "every mode at every level, with its intervals"))
         drawn = draw_levels(folder, tables, stem)
-        sections.insert(k, level_section(tables, drawn))
+        sections.insert(k, level_section(tables, live.levels(page, tables, drawn)))
         files += [(path.name, "a mode over levels") for path in drawn.values()]
     return PageParts(_lead(found.recordings), sections, found.notes, files, page.drawings)
 
@@ -163,8 +163,10 @@ def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Picture]:
     return blocks
 
 
-def _live(page: Page, stem: str, r: RecordingModes, pictures: Sequence[Picture]) -> list[Block]:
-    """The pictures, some of them drawn by the page."""
+def _live(
+    page: Page, stem: str, r: RecordingModes, pictures: Sequence[Picture], share: int
+) -> list[Block]:
+    """The pictures, some of them drawn by the page, which shows ``share`` recordings."""
     frf = r.recording.frf
     assert frf is not None
     low, high = r.modes.band
@@ -181,7 +183,7 @@ def _live(page: Page, stem: str, r: RecordingModes, pictures: Sequence[Picture])
         if kind == "stabilisation":
             return live.poles(page, kind + stem, r, still)
         if kind == "fit":
-            return live.responses(page, kind + stem, curves, still)
+            return live.responses(page, kind + stem, curves, still, share=share)
         if kind == "automac":
             return live.likeness(page, kind + stem, auto_mac(shapes), kept, kept, "test", [], still)
         return picture

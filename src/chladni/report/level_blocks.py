@@ -10,7 +10,7 @@ import numpy as np
 from ..ema.finding import TINY
 from ..ema.level_study import CALM
 from ..ema.level_table import ElementNumber, LevelRow, LevelTable, TriedElement
-from .blocks import Block, Items, Picture, Section, Table
+from .blocks import Block, Items, Section, Table
 from .words import interval, number
 
 SHOWN = 6  # modes that are drawn
@@ -22,12 +22,12 @@ _WHAT = (
 )
 
 
-def level_section(tables: Sequence[LevelTable], pictures: Mapping[int, Path]) -> Section:
+def level_section(tables: Sequence[LevelTable], drawn: Mapping[int, Block]) -> Section:
     """Tabulate all modes, all modes at every level, then each moving mode; none without levels.
 
     Parameters
     ----------
-    pictures : by the position of the mode
+    drawn : pictures or drawings by the position of the mode
     """
     if not tables:
         return Section("Levels", [])
@@ -37,7 +37,7 @@ def level_section(tables: Sequence[LevelTable], pictures: Mapping[int, Path]) ->
             continue
         blocks += [Items([t.sentence + "."])] if t.sentence else []
         blocks += [_levels(t)]
-        blocks += [Picture(pictures[k])] if k in pictures else []
+        blocks += [drawn[k]] if k in drawn else []
         blocks += [_elements(t)] if t.elements else []
     return Section("Levels", blocks)
 
@@ -147,14 +147,18 @@ def _percent(x: float | None) -> float | None:
     return None if x is None else 100 * x
 
 
+def moving(tables: Sequence[LevelTable]) -> list[int]:
+    """Positions of the modes that are drawn: the first that depend on the level."""
+    return [k for k, t in enumerate(tables) if t.signature not in CALM][:SHOWN]
+
+
 def draw_levels(folder: Path, tables: Sequence[LevelTable], stem: str = "") -> dict[int, Path]:
     """Pictures of the modes that move: {position of the mode: path}."""
     from ..view import level_plots
 
     made: dict[int, Path] = {}
-    for k, t in enumerate(tables):
-        if t.signature in CALM or len(made) == SHOWN:
-            continue
+    for k in moving(tables):
+        t = tables[k]
         path = folder / f"levels{stem}_{k + 1}.png"
         f = [(r.frequency_hz, r.frequency_sd_hz, r.foretold_hz) for r in t.rows]
         z = [(r.damping, r.damping_sd, r.foretold_damping) for r in t.rows]

@@ -17,12 +17,15 @@ _LINES = 300  # at least, of every channel
 _LOG_STEP, _DEGREE = 1e-3, 1.0  # a thousandth of a decade; a degree
 
 
-def frf(shown: Shown) -> dict[str, Any]:
-    """Magnitude and phase of every channel, of test and decks, and the deviation of each."""
+def frf(shown: Shown, share: int = 1) -> dict[str, Any]:
+    """Magnitude, phase and coherence of every channel, and the deviation of each curve.
+
+    ``share`` is the number of such drawings on the page.
+    """
     curves, held = dict(shown.curves), set(shown.held_out)
     test = curves.get("test", next(iter(curves.values())))
     channels = [(i, j) for j in range(len(test.inputs)) for i in range(len(test.outputs))]
-    per_channel = _VALUES // len(curves)
+    per_channel = _VALUES // len(curves) // share
     lines = thinned(test, max(_LINES, per_channel // len(channels)))
     off = {name: _off(curve, test) for name, curve in curves.items() if curve is not test}
     last = list(off.values())[-1] if off else np.abs(test.values).max(axis=0)
@@ -38,6 +41,7 @@ def frf(shown: Shown) -> dict[str, Any]:
                 "held": test.outputs[i] in held,
                 "off": {name: float(f"{q[i, j]:.3g}") for name, q in off.items()},
                 "curves": {name: _polar(c.values[lines, i, j]) for name, c in curves.items()},
+                "coherence": _coherence(test, lines, i, j),
             }
             for i, j in channels
         ],
@@ -52,14 +56,22 @@ def frf(shown: Shown) -> dict[str, Any]:
 
 def thinned(frf: FRF, most: int) -> np.ndarray:
     """Positions of at most ``most`` lines: of every block the highest and the lowest."""
-    n = len(frf.frequency)
-    if n <= most:
-        return np.arange(n)
-    size = np.log(np.maximum((np.abs(frf.values) ** 2).sum(axis=(1, 2)), 1e-300))
-    ends = np.linspace(0, n, most // 2 + 1).astype(int)
+    return extremes(np.log(np.maximum((np.abs(frf.values) ** 2).sum(axis=(1, 2)), 1e-300)), most)
+
+
+def extremes(values: np.ndarray, most: int) -> np.ndarray:
+    """Positions of at most ``most`` values (n,): of every block the highest and the lowest."""
+    if len(values) <= most:
+        return np.arange(len(values))
+    ends = np.linspace(0, len(values), most // 2 + 1).astype(int)
     blocks = list(pairwise(ends))
-    picked = [a + int(pick(size[a:b])) for a, b in blocks for pick in (np.argmin, np.argmax)]
+    picked = [a + int(pick(values[a:b])) for a, b in blocks for pick in (np.argmin, np.argmax)]
     return np.unique(picked)
+
+
+def _coherence(test: FRF, lines: np.ndarray, i: int, j: int) -> list[Any] | None:
+    """Coherence of a channel in thousandths."""
+    return None if test.coherence is None else rounded(test.coherence[lines, i, j], 1e-3)
 
 
 def _off(curve: FRF, test: FRF) -> np.ndarray:

@@ -10,9 +10,10 @@ from ..effects.estimate import Location
 from ..fem.modelled import Modelled
 from ..updating.result import Agreement, LeftPlace
 from ..workflows.diagnosis_result import DiagnosisResult
-from . import live_curves, live_mesh
+from . import live_curves, live_mesh, live_panels
 from .drawings import Drawing, Drawings
 from .figures import Shown, q_steps
+from .level_blocks import moving
 
 MOST_MODES = 60  # of a matrix that can be read
 _FRF = (
@@ -36,7 +37,7 @@ _CAPTIONS = {
 
 def drawings(case: Case, result: DiagnosisResult, shown: Shown) -> Drawings:
     """Return all drawings that the result allows."""
-    made = _modes(case, result, shown) | _scores(result)
+    made = _modes(case, result, shown) | _scores(result) | _levels(result)
     if "test" in shown.curves:
         made["frf"] = Drawing(
             "responses", "frf", live_curves.frf(shown),
@@ -51,6 +52,16 @@ def drawings(case: Case, result: DiagnosisResult, shown: Shown) -> Drawings:
             left = live_mesh.left(result.residual_localisation.gain, shown)
             made["left"] = Drawing("remainder", "scores", left, ("left",), _CAPTIONS["left"])
     return Drawings(made, shared)
+
+
+def _levels(result: DiagnosisResult) -> dict[str, Drawing]:
+    """Modes that depend on the level, over it."""
+    tables = result.levels
+    names = {k: f"levels_{k + 1}" for k in moving(tables)}
+    return {
+        name: Drawing("panels", "levels", live_panels.over_levels(tables[k]), (name,))
+        for k, name in names.items()
+    }
 
 
 def _places(result: DiagnosisResult) -> list[tuple[str, Location | LeftPlace]]:

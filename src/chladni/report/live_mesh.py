@@ -99,9 +99,17 @@ def left(gain: np.ndarray, shown: Shown) -> dict[str, Any]:
     """Gain of a local change on every face that is drawn; None where the test is blind."""
     values = np.full(len(shown.seen.faces), np.nan)
     values[: len(gain)] = gain
-    top = max(float(np.nanmax(values)), CALM)
-    drawn = values[~np.asarray(shown.seen.joint)]
-    return {"value": rounded(drawn, 0.01), "step": 0.01, "top": top}
+    return field(values, shown, (0.0, max(float(np.nanmax(values)), CALM)), "gain")
+
+
+def field(
+    values: np.ndarray, shown: Shown, limits: tuple[float, float], title: str
+) -> dict[str, Any]:
+    """Values (m,) of all faces; not finite: grey."""
+    low, top = limits
+    step = max(top - low, 1e-300) / 1000
+    drawn = rounded(values[~np.asarray(shown.seen.joint)], step)
+    return {"value": drawn, "step": step, "low": low, "top": top, "title": title}
 
 
 def shapes(

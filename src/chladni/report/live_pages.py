@@ -1,16 +1,18 @@
 """Drawings of the pages of the other commands."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..dynamics.frf import FRF
+from ..ema.level_table import LevelTable
 from ..model.assembly import Assembly
 from ..view.paired_shapes import PairedShapes
 from ..view.surface import Surface
 from ..workflows.identify import RecordingModes
-from . import live_curves, live_mesh
+from . import live_curves, live_mesh, live_panels
 from .blocks import Block, Live, Picture
 from .drawings import Drawing, Drawings
 from .figures import Shown
@@ -90,13 +92,42 @@ def layout(page: Page, name: str, shown: Shown, stills: Sequence[Picture]) -> Se
     return [page.live(name, "structure", data, stills, stills[0].caption if stills else "")]
 
 
+def field(
+    page: Page, shown: Shown, values: np.ndarray, limits: tuple[float, float], still: Picture,
+    title: str,
+) -> Block:  # fmt: skip
+    """Colours by a value of each face (m,)."""
+    if not page.mesh(shown):
+        return still
+    data = live_mesh.field(values, shown, limits, title)
+    return page.live(still.path.stem, "remainder", data, [still], still.caption)
+
+
 def responses(
     page: Page, name: str, curves: Mapping[str, FRF], stills: Sequence[Picture],
-    bands: Sequence[Sequence[tuple[float, float]]] = ((), ()),
+    bands: Sequence[Sequence[tuple[float, float]]] = ((), ()), share: int = 1,
 ) -> Live:  # fmt: skip
-    """Every channel of curves on the same lines, ``bands`` fitted and left out."""
+    """Every channel of curves on the same lines, ``bands`` fitted and left out.
+
+    ``share`` is the number of such drawings on the page.
+    """
     shown = Shown(Surface(np.zeros((0, 3))), curves=curves, fitted=bands[0], excluded=bands[1])
-    return page.live(name, "responses", live_curves.frf(shown), stills, _FRF)
+    return page.live(name, "responses", live_curves.frf(shown, share), stills, _FRF)
+
+
+def levels(
+    page: Page, tables: Sequence[LevelTable], pictures: Mapping[int, Path]
+) -> dict[int, Block]:
+    """Modes over levels by their positions, each with its picture."""
+    return {
+        k: panels(page, path.stem, live_panels.over_levels(tables[k]), Picture(path))
+        for k, path in pictures.items()
+    }
+
+
+def panels(page: Page, name: str, data: Mapping[str, Any], still: Picture) -> Live:
+    """Curves one below the other over one axis (``live_panels``)."""
+    return page.live(name, "panels", data, [still], still.caption)
 
 
 def likeness(

@@ -9,7 +9,9 @@ import numpy as np
 from ..view.surface import surface
 from ..workflows.loaded_model import on_faces
 from ..workflows.map import MappedDeck
+from . import live_pages as live
 from .blocks import Block, Facts, PageParts, Picture, Section, Table
+from .live_pages import Page
 from .words import number
 
 _HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
@@ -30,21 +32,27 @@ def map_page(folder: Path, found: MappedDeck) -> PageParts:
     """Sections of the page; its pictures are written into the folder."""
     from ..view import scene
 
-    seen, t = surface(found.after), found.after.thickness()
+    shown, t = live.mesh_of(surface(found.after), found.after), found.after.thickness()
+    seen, page = shown.seen, Page()
     change = on_faces(seen, 100 * (t / found.before.thickness() - 1))
     after = scene.thickness_map(folder / "thickness.png", seen, on_faces(seen, t))
+    limits = scene.usual_limits(seen, change)
     changed = scene.scalar_map(
-        folder / "change.png", seen, change, "change of thickness", "%", "YlGnBu_r",
-        scene.usual_limits(seen, change),
-    )  # fmt: skip
+        folder / "change.png", seen, change, "change of thickness", "%", "YlGnBu_r", limits
+    )
+    mm = on_faces(seen, 1e3 * t)
+    maps = [
+        live.field(page, shown, mm, scene.usual_limits(seen, mm), Picture(after), "t [mm]"),
+        live.field(page, shown, change, limits, Picture(changed), "change of t [%]"),
+    ]
     was, now = found.mass
     facts = [("Sheets before", f"{number(was)} kg"), ("after", f"{number(now)} kg")]
-    blocks: list[Block] = [Facts(facts), Picture(after), Picture(changed), _parts(found)]
+    blocks: list[Block] = [Facts(facts), *maps, _parts(found)]
     sections = [Section("Thickness", blocks)]
     if found.thinning is not None:
         sections.append(Section("Parts missing from the file", _guessed(found)))
     files = [("thickness.png", "thickness"), ("change.png", "change of thickness")]
-    return PageParts(_lead(found), sections, found.notes, files)
+    return PageParts(_lead(found), sections, found.notes, files, page.drawings)
 
 
 def in_words(found: MappedDeck) -> PageParts:

@@ -141,10 +141,15 @@ def _joints(result: DiagnosisResult) -> list[Block]:
     return [Table(heads, rows, caption=what)] if rows else []
 
 
-def _levels(figures: Mapping[str, Path]) -> dict[int, Path]:
-    """Pictures of modes over levels by the mode's position."""
-    numbers = {n.removeprefix(LEVELS): p for n, p in figures.items() if n.startswith(LEVELS)}
-    return {int(n) - 1: p for n, p in numbers.items() if n.isdecimal()}
+def _levels(figures: Mapping[str, Path], drawn: Mapping[str, Drawing]) -> dict[int, Block]:
+    """Pictures or drawings of modes over levels by the mode's position."""
+    names = [n for n in figures if n.startswith(LEVELS) and n.removeprefix(LEVELS).isdecimal()]
+    return {
+        int(n.removeprefix(LEVELS)) - 1: live(n, drawn[n], figures)
+        if n in drawn
+        else Picture(figures[n])
+        for n in names
+    }
 
 
 def sections(
@@ -165,11 +170,11 @@ def sections(
         return [*own, *(_picture(n, figures[n]) for n in stills if n not in replaced)]
 
     found = screening_section(result.screening)
-    of_levels = _levels(figures)
+    of_levels = _levels(figures, drawn)
     rest = [
         Picture(p, n)
         for n, p in figures.items()
-        if n not in PLACES and n != "where" and p not in of_levels.values()
+        if n not in PLACES and n != "where" and not n.startswith(LEVELS)
     ]
     return [
         Section("Reasons for doubt", [Items(result.distrust)] if result.distrust else []),

@@ -7,7 +7,12 @@ const wrapped = (text) => said(text).replace(/(.{60}\S*)\s/g, "$1<br>");
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 const hertz = (f) => (f == null ? "–" : f.toFixed(2) + " Hz");
 const scaled = (values, step) => values.map((v) => (v == null ? null : v * step));
-const CURVE = { test: "ink", before: "before", after: "after", model: "after", identified: "after" };
+const CURVE = { test: "ink", before: "before", after: "after", model: "after", identified: "after", recorded: "ink", ideal: "after" };
+const TINTS = ["neutral", "before", "calm", "#cc79a7", "#e69f00", "#56b4e9", "soft", "ink"];
+const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
+const tinted = (name) => (name.startsWith("#") ? name : colour(name));
+const extent = (values) => values.reduce(([a, b], v) => (v == null ? [a, b] : [Math.min(a, v), Math.max(b, v)]), [Infinity, -Infinity]);
+const short = (v) => (v == null ? "–" : v && (Math.abs(v) >= 1e6 || Math.abs(v) < 1e-3) ? String(Number(v.toPrecision(4)).toExponential()).replace("e+", "e") : String(Number(v.toPrecision(5))));
 
 async function unpacked(script) {
   const bytes = Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0));
@@ -151,12 +156,12 @@ function structure(at, data, shared) {
 }
 
 function remainder(at, data, shared) {
-  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step);
+  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step), title = data.title || "gain";
   const seen = (f) => value[f] != null, shown = mesh.face.filter(seen).map((f) => value[f]);
   return draw(at, [
     sheet(mesh, xyz, {}, (f) => !seen(f)),
-    sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: 0, cmax: data.top, colorscale: "YlOrRd", reversescale: true, colorbar: { thickness: 12, len: 0.8, title: { text: "gain", side: "right" } },
-      hovertemplate: "gain %{intensity:.1f}<extra></extra>" }, seen),
+    sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: data.low || 0, cmax: data.top, colorscale: title === "gain" ? "YlOrRd" : "YlGnBu", reversescale: true, colorbar: { thickness: 12, len: 0.8, title: { text: said(title), side: "right" } },
+      hovertemplate: `${said(title)} %{intensity:.4g}<extra></extra>` }, seen),
     lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz),
   ], { scene: space(at, mesh), margin: { l: 0, r: 0, t: 0, b: 0 } });
 }
@@ -255,7 +260,7 @@ function turned(at, to) {  // both sides are seen from the same place
 
 function responses(at, data, shared, box) {
   const names = Object.keys(data.channels[0].curves);
-  const text = (c) => c.name + (c.held ? " (held out)" : "") + Object.entries(c.off).map(([n, q]) => `, Q ${n} ${q}`).join("");
+  const text = (c) => c.name + (c.held ? " (held out)" : "") + Object.entries(c.off).map(([n, q]) => `, Q ${n} ${short(q)}`).join("");
   const list = choice(box, "channel", data.channels.map((c, k) => [k, text(c)]), (k) => show(Number(k)));
   const step = (by) => show((list.value = (Number(list.value) + by + data.channels.length) % data.channels.length));
   button(box, "previous", () => step(-1));
@@ -278,9 +283,11 @@ function responses(at, data, shared, box) {
       traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, x: data.frequency, y: level.map((v) => (v == null ? null : 10 ** (v / 1000))), line, hovertemplate: `${name} %{y:.3g}<extra></extra>` });
       traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, showlegend: false, x: data.frequency, y: cut, yaxis: "y2", line, hovertemplate: `${name} %{y}°<extra></extra>` });
     }
-    return draw(at, traces, { title: { text: said(text(c)), font: { size: at.clientWidth > 600 ? 13 : 10 } }, margin: { l: 60, r: 15, t: 40, b: 45 }, hovermode: "x unified", shapes: grey(), uirevision: "kept",
-      xaxis: { title: { text: "frequency [Hz]" }, anchor: "y2", hoverformat: ".2f" }, yaxis: { type: "log", domain: [0.33, 1], exponentformat: "power", title: { text: said(`${data.quantity} [${data.unit}]`) } },
-      yaxis2: { domain: [0, 0.27], range: [-190, 190], tickvals: [-180, -90, 0, 90, 180], title: { text: "phase [°]" } }, legend: at.clientWidth > 600 ? { orientation: "h", y: 1, yanchor: "bottom", x: 1, xanchor: "right" } : { orientation: "h", y: -0.15 } });
+    const low = c.coherence ? 0.24 : 0;
+    if (low) traces.push({ type: "scatter", mode: "lines", name: "coherence", showlegend: false, x: data.frequency, y: scaled(c.coherence, 0.001), yaxis: "y3", line: { color: colour("neutral"), width: 1.2 }, hovertemplate: "coherence %{y:.3f}<extra></extra>" });
+    return draw(at, traces, { title: { text: said(text(c)), font: { size: at.clientWidth > 600 ? 13 : 10 } }, margin: { l: 60, r: 15, t: 40, b: 45 }, hovermode: "x unified", hoversubplots: "axis", shapes: grey(), uirevision: "kept",
+      xaxis: { title: { text: "frequency [Hz]" }, anchor: low ? "y3" : "y2", hoverformat: ".2f" }, yaxis: { type: "log", domain: [low ? 0.49 : 0.33, 1], exponentformat: "power", title: { text: said(`${data.quantity} [${data.unit}]`) } },
+      yaxis2: { domain: [low, low ? 0.44 : 0.27], range: [-190, 190], tickvals: [-180, -90, 0, 90, 180], title: { text: "phase [°]" } }, ...(low && { yaxis3: { domain: [0, 0.19], range: [0, 1.05], title: { text: "coherence" } } }), legend: at.clientWidth > 600 ? { orientation: "h", y: 1, yanchor: "bottom", x: 1, xanchor: "right" } : { orientation: "h", y: -0.15 } });
   }
   at.redraw = () => show(Number(list.value));
   return show(0);
@@ -347,6 +354,114 @@ function ladder(at, data) {
   return draw(at, ["before", "after"].map(bar), { barmode: "group", xaxis: { tickvals: data.test.map((_, k) => k), ticktext: data.test.map((f) => f.toFixed(1)), title: { text: "frequency of the test [Hz]" } }, yaxis: { title: { text: "off [%]" } } });
 }
 
+// A logarithmic axis: a number at each decade, at 1, 2 and 5, or at every digit, as there are few.
+const decades = (values) => (([low, high]) => ({ type: "log", dtick: high > 30 * low ? 1 : high > 10 * low ? "D2" : "D1", exponentformat: "power" }))(extent(values));
+
+// Curves one below the other over one axis: of frequency, time or amplitude.
+function panels(at, data) {
+  const many = data.panels.length, named = [], traces = [], more = {}, wide = at.clientWidth > 600;
+  const marks = data.panels.some((p) => p.curves.some((c) => c.marks));
+  data.panels.forEach((panel, k) => {
+    const n = k ? String(k + 1) : "";
+    more["yaxis" + n] = { ...(panel.log ? decades(panel.curves.flatMap((c) => c.y)) : { exponentformat: "power" }), domain: [1 - (k + 1) / many + (k < many - 1 ? 0.04 : 0), 1 - k / many],
+      title: { text: said(panel.title), font: { size: 11 } }, ...(panel.range ? { range: panel.range } : { rangemode: panel.zero ? "tozero" : "normal" }) };
+    for (const c of panel.curves) {
+      const first = !named.includes(c.name);
+      if (first) named.push(c.name);
+      const look = tinted(c.tint || TINTS[named.indexOf(c.name) % TINTS.length]);
+      traces.push({ type: "scatter", mode: c.marks || "lines", name: said(c.name), legendgroup: said(c.name), showlegend: first, x: c.x, y: c.y, yaxis: "y" + n, connectgaps: false,
+        ...(c.sd && { error_y: { type: "data", array: c.sd.map((v) => 2 * v), color: look, thickness: 1 } }), line: { color: look, width: 1.3, dash: c.dash || ["solid", "dash", "dot"][Math.floor(named.indexOf(c.name) / TINTS.length) % 3] }, marker: { color: look, size: 6, symbol: c.symbol || "circle" },
+        hovertemplate: marks ? `${said(c.name)}<br>%{x:.4g}: %{y:.5g}<extra></extra>` : `${said(c.name)} %{y:.4g}<extra></extra>` });
+    }
+  });
+  at.style.height = 7 + 12 * many + (wide ? 0 : 0.8 * named.length) + "rem";
+  return draw(at, traces, { ...more, margin: { l: 60, r: 15, t: 10, b: 45 }, showlegend: data.panels.some((p) => p.curves.length > 1), hovermode: marks ? "closest" : "x unified", hoversubplots: "axis",
+    xaxis: { ...(data.x.log ? decades(data.panels.flatMap((p) => p.curves.flatMap((c) => c.x))) : { hoverformat: ".5g" }), title: { text: said(data.x.title) }, anchor: "y" + (many > 1 ? many : "") }, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 } });
+}
+
+// ---- samples of a study
+
+const about = (samples, n) => `sample ${samples.number[n]}<br>` + samples.columns.map((c) => `${said(c.name)}: ${short(c.values[n])}`).join("<br>");
+
+// Every sample as a line across the axes. A box drawn over an axis keeps the samples within it.
+function parallel(at, data, shared, box) {
+  const samples = shared.samples, axes = data.axes.map((k) => samples.columns[k]), state = { by: data.axes.indexOf(data.by), kept: {} }, wide = at.clientWidth > 600;
+  const place = axes.map((a) => {
+    const run = a.values.map((v) => (v == null ? null : a.log ? Math.log(v) : v)), [low, high] = extent(run);
+    return run.map((v) => (v == null ? null : high > low ? (v - low) / (high - low) : 0.5));
+  });
+  const whole = samples.number.map((_, n) => n).filter((n) => place.every((p) => p[n] != null)), told = whole.map((n) => about(samples, n));
+  choice(box, "colour", axes.map((a, k) => [k, a.name]), (k) => { state.by = Number(k); show(); }).value = state.by;
+  const every = button(box, "show all", () => { state.kept = {}; show(); }), count = document.createElement("span");
+  box.append(count);
+  const line = (list) => ({ x: list.flatMap(() => [...axes.keys(), null]), y: list.flatMap((m) => [...place.map((p) => p[whole[m]]), null]), text: list.flatMap((m) => [...axes.map(() => told[m]), null]), customdata: list.flatMap((m) => [...axes.map(() => m), null]) });
+  function show() {
+    const inside = whole.map((n) => Object.entries(state.kept).every(([k, [a, b]]) => a <= place[k][n] && place[k][n] <= b)), kept = [...whole.keys()].filter((m) => inside[m]);
+    const most = VIRIDIS.length - 1, bin = (m) => Math.round(most * place[state.by][whole[m]]), [low, high] = extent(axes[state.by].values), look = { type: "scatter", mode: "lines+markers", hoverinfo: "text", showlegend: false };
+    const opacity = Math.min(0.9, Math.max(0.15, 40 / Math.max(kept.length, 1)));
+    const traces = [{ ...look, ...line([...whole.keys()].filter((m) => !inside[m])), mode: "lines", hoverinfo: "skip", line: { color: colour("line"), width: 0.7 } }];
+    VIRIDIS.forEach((tint, k) => traces.push({ ...look, ...line(kept.filter((m) => bin(m) === k)), opacity, line: { color: tint, width: 1.2 }, marker: { color: tint, size: 4 } }));
+    traces.push({ ...look, x: [null], y: [null], hoverinfo: "skip", mode: "markers", marker: { color: [low], cmin: low, cmax: high, colorscale: "Viridis", showscale: wide, colorbar: { thickness: 10, title: { text: said(axes[state.by].name), side: "right", font: { size: 11 } } } } });
+    traces.push({ ...look, x: [], y: [], hoverinfo: "skip", line: { color: colour("found"), width: 3 }, marker: { color: colour("found"), size: 6 } });
+    const top = wide ? 1.06 : 1.1, note = (text, k, y) => ({ text, x: k, y, showarrow: false, textangle: wide ? 0 : -50, font: { size: 10, color: colour("soft") } });
+    const ends = axes.flatMap((a, k) => extent(a.values).map((v, end) => note(short(v), k, end ? top : 1 - top)));
+    const upright = axes.map((_, k) => ({ type: "line", x0: k, x1: k, y0: 0, y1: 1, line: { color: colour("soft"), width: 1 } }));
+    const chosen = Object.entries(state.kept).map(([k, [a, b]]) => ({ type: "rect", x0: k - 0.06, x1: Number(k) + 0.06, y0: a, y1: b, line: { width: 1, color: colour("found") }, fillcolor: colour("found"), opacity: 0.3 }));
+    count.textContent = `${kept.length} of ${whole.length} samples`;
+    every.disabled = !chosen.length;
+    return draw(at, traces, { shapes: [...upright, ...chosen], annotations: ends, selections: [], dragmode: "select", hovermode: "closest", margin: { l: wide ? 20 : 45, r: 15, t: 10, b: 45 },
+      xaxis: { tickvals: [...axes.keys()], ticktext: axes.map((a) => said(a.name)), tickangle: wide ? -25 : -60, range: [-0.4, axes.length - 0.6], showgrid: false, zeroline: false, fixedrange: true }, yaxis: { visible: false, range: [0.95 - top, top + 0.05], fixedrange: true } });
+  }
+  at.redraw = show;
+  return show().then(() => {
+    const mark = (list) => Plotly.restyle(at, (({ x, y }) => ({ x: [x], y: [y] }))(line(list)), [at.data.length - 1]);
+    at.on("plotly_hover", ({ points: [p] }) => { if (p.customdata != null) mark([p.customdata]); });
+    at.on("plotly_unhover", () => mark([]));
+    at.on("plotly_selected", (found) => {
+      if (!found?.range) return;
+      const [[a, b], [c, d]] = [found.range.x, found.range.y].map((r) => r.slice().sort((p, q) => p - q));
+      axes.forEach((_, k) => { if (a <= k && k <= b) state.kept[k] = [c, d]; });
+      show();
+    });
+    at.on("plotly_deselect", () => { state.kept = {}; show(); });
+  });
+}
+
+function cloud(at, data, shared, box) {
+  const samples = shared.samples, columns = samples.columns, state = { x: data.x, y: data.y, tint: -1 }, names = columns.map((c, k) => [k, c.name]);
+  for (const [label, key, first] of [["over", "x", []], ["result", "y", []], ["colour", "tint", [[-1, "none"]]]]) choice(box, label, [...first, ...names], (k) => { state[key] = Number(k); show(); }).value = state[key];
+  const told = samples.number.map((_, n) => about(samples, n));
+  function show() {
+    const [x, y, c] = [columns[state.x], columns[state.y], columns[state.tint]], line = (own, along) => ({ type: "line", [own + "0"]: (own === "x" ? x : y).nominal, [own + "1"]: (own === "x" ? x : y).nominal, [along + "0"]: 0, [along + "1"]: 1, [along + "ref"]: "paper", line: { color: colour("before"), width: 1, dash: "dash" } });
+    const marker = c ? { color: c.values, colorscale: "Viridis", showscale: true, colorbar: { thickness: 10, title: { text: said(c.name), side: "right" } } } : { color: colour("neutral") };
+    const axis = (one) => ({ title: { text: said(one.name) }, type: one.log ? "log" : "linear", exponentformat: "power" });
+    return draw(at, [{ type: "scatter", mode: "markers", x: x.values, y: y.values, text: told, hoverinfo: "text", marker: { size: 6, opacity: 0.75, ...marker } }], {
+      hovermode: "closest", xaxis: axis(x), yaxis: axis(y), shapes: [...(x.nominal == null ? [] : [line("x", "y")]), ...(y.nominal == null ? [] : [line("y", "x")])] });
+  }
+  at.redraw = show;
+  return show();
+}
+
+function influences(at, data) {
+  const most = Math.max(...data.values.flat().map((v) => Math.abs(v ?? 0))) || 1, tip = data.values.map((row, i) => row.map((v, j) => `${said(data.rows[i])} over ${said(data.columns[j])}: ${short(v)}`));
+  at.style.height = 9 + 1.5 * data.rows.length + "rem";
+  return draw(at, [{ type: "heatmap", z: data.values, zmin: -most, zmax: most, colorscale: "RdBu", reversescale: true, text: tip, hoverinfo: "text", texttemplate: "%{z:.2f}", colorbar: { thickness: 10 } }], {
+    xaxis: { tickvals: [...data.columns.keys()], ticktext: data.columns.map(said), tickangle: -25, showgrid: false }, yaxis: { tickvals: [...data.rows.keys()], ticktext: data.rows.map(said), autorange: "reversed", showgrid: false } });
+}
+
+function indices(at, data, shared, box) {
+  const list = choice(box, "result", data.results.map((r, k) => [k, r.name]), () => show());
+  function show() {
+    const { series } = data.results[Number(list.value)];
+    at.style.height = 8 + 1.6 * data.parameters.length * series.length + "rem";
+    return draw(at, series.map((s, k) => ({ type: "bar", orientation: "h", name: s.name, y: [...s.values.keys()], x: s.values, marker: { color: colour(["neutral", "before"][k % 2]) },
+      ...(s.half && { error_x: { type: "data", array: s.half, color: colour("soft") } }), hovertext: s.values.map((v, n) => `${said(data.parameters[n])}<br>${s.name} ${short(v)}` + (s.half ? ` ± ${short(s.half[n])}` : "")), hoverinfo: "text" })), {
+      barmode: "group", showlegend: series.length > 1, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, yaxis: { tickvals: [...data.parameters.keys()], ticktext: data.parameters.map(said), autorange: "reversed", showgrid: false }, xaxis: { title: { text: data.axis } } });
+  }
+  at.redraw = show;
+  return show();
+}
+
 // ---- tables that are sorted by a click on their heads
 
 function sortable(table) {
@@ -374,7 +489,7 @@ function sortable(table) {
 
 // ---- all of it
 
-const DRAWN = { structure, remainder, shapes, responses, assurance, poles, steps, odds, ladder };
+const DRAWN = { structure, remainder, shapes, responses, assurance, poles, steps, odds, ladder, panels, parallel, cloud, influences, indices };
 const SPATIAL = ["structure", "remainder", "shapes"];
 
 async function begin() {

@@ -57,6 +57,8 @@ def _read(path: Path, prefix: str) -> bytes:
         raise FileError(f"{prefix}{path} cannot be read: {error.strerror}") from None
     if data.count(b"\0", 0, 4096) > 8:
         raise FileError(f"{prefix}{path} is binary, not a Nastran deck")
+    if re.match(rb"\s*-1\s*\n\s*\d+", data):
+        raise FileError(f"{prefix}{path} is a universal file, not a Nastran deck")
     return data
 
 
