@@ -8,7 +8,7 @@ from pathlib import Path
 
 from chladni import errors
 
-SOURCE = Path(__file__).parents[1] / "src" / "chladni"
+SOURCE = Path(__file__).parents[1] / "src"
 GAP = "…"  # stands for what the sentence fills in: a file, a line, a name, a number
 _ROOMS = {  # what a sentence without its own cure is about, by the room that says it
     "io.nastran": "correct the deck at the named line; [Nastran cards](cards.md) says how",
@@ -17,9 +17,11 @@ _ROOMS = {  # what a sentence without its own cure is about, by the room that sa
     "case": "correct the named word of `case.toml`; [A case, word by word](../case.md) lists all",
     "ema": "compare the recording with [From your lab](../guide/from_your_lab.md)",
     "cli": "`chladni COMMAND --help` states the form of each option; [commands](commands.md)",
-    "planning": "[Planning a test](../tutorials/planning.md) shows a valid call",
-    "studies": "[Parameter studies](../studies.md) list the forms",
-    "bench": "[The virtual bench](../bench.md) lists excitations and settings",
+    "chladni_planning": "[Planning a test](../tutorials/planning.md) shows a valid call",
+    "chladni_studies": "[Parameter studies](../studies.md) list the forms",
+    "chladni_bench": "[The virtual bench](../bench.md) lists excitations and settings",
+    "chladni_evidence": "[The blind benchmark](../blind.md) states what each step needs",
+    "chladni_specimens": "[Generated structures](../specimens.md) lists sizes and options",
     "effects": "[Effects](effects.md) lists what each needs",
     "fem": "correct the named part or card of the deck; `chladni check` shows all findings",
     "model": "correct the named part or card of the deck; `chladni check` shows all findings",
@@ -35,7 +37,7 @@ class Sentence:
 
     Attributes
     ----------
-    room : package or module that raises it, with the format for those of ``io``
+    room : package that raises it, or module of ``chladni``, with the format for those of ``io``
     kind : name of the exception
     text : the sentence, ``GAP`` where it fills something in
     """
@@ -66,7 +68,9 @@ def sentences(source: Path = SOURCE) -> list[Sentence]:
 
 
 def _room(path: Path) -> str:
-    room, *rest = path.with_suffix("").parts
+    package, room, *rest = path.with_suffix("").parts
+    if package != "chladni":
+        return package
     return f"{room}.{rest[0]}" if room == "io" and rest else room
 
 
