@@ -101,10 +101,7 @@ def plan_chapter(desk: Desk, progress: Progress) -> Chapter:
     """Plan the test on the nominal deck: table 2, figures 8 and 9, the table of sensors."""
     model = desk.deck()
     settings = PlanSettings(sensors=desk.sensors)
-    with one_blas_thread():
-        found = plan(
-            model.assembly, settings, built=model.structure, unit=model.unit, progress=progress
-        )
+    found = plan(model, settings, progress=progress)
     write_text(desk.folder / SENSORS, with_drive_sensor(sensors_csv(found)))
     result = summary(found)
     every = sorted(result.actuators, key=lambda a: a.condition)
