@@ -1,7 +1,7 @@
 """Section 5.4 of the thesis: what can be identified, and the calibrations of tables 11 and 12."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -85,14 +85,15 @@ def identifiability_chapter(desk: Desk, progress: Progress) -> Chapter:
     """Information of the data at the soft and at the stiff adhesive, before any fit."""
     found: dict[str, Identifiability] = {}
     rows_of = list(every_parameter(desk, desk.deck().assembly))
+    names = [name for one, _ in rows_of for name in _names(one)]
+    verdicts = [said for one, said in rows_of for _ in _names(one)]
     for k, deck in enumerate((MAPPED, STIFF)):
         stage = within(progress, k / 2, (k + 1) / 2)
         case = desk.case(deck, band=FIT, parameters=[one for one, _ in rows_of])
         with one_blas_thread():
             problem = prepare(question_of(case), stage).problem
-            found[deck] = identifiability(about_nominal(problem))
+            found[deck] = _named(identifiability(about_nominal(problem)), names)
     soft, stiff = found[MAPPED], found[STIFF]
-    verdicts = [said for one, said in rows_of for _ in range(1 + (one["field"] == WELD_PATCH))]
     rows = [_row(a, b, said) for a, b, said in
             zip(soft.parameters, stiff.parameters, verdicts, strict=True)]  # fmt: skip
     columns = ("parameter", "thesis", "prior [%]", "single, 6 MPa [%]", "all, 6 MPa [%]",
@@ -100,7 +101,8 @@ def identifiability_chapter(desk: Desk, progress: Progress) -> Chapter:
     table = Table(
         columns, rows, ("parameter", "thesis", "6 MPa", "210 GPa"),
         "Standard deviations of ln value from the data alone, formed thickness mapped. Single: all "
-        "others known. All: every parameter free. – means more than 100 %.",
+        "others known. All: every parameter free. – means more than 100 %. Unknown here: known at "
+        "other values only.",
     )  # fmt: skip
     texts = [_along(p, at) for at, known in (("6 MPa", soft), ("210 GPa", stiff))
              for p in known.parameters if p.prior_sd > DECADES]  # fmt: skip
@@ -111,11 +113,11 @@ def identifiability_chapter(desk: Desk, progress: Progress) -> Chapter:
         "of the model free. E, rho and t of all sheets trade off in any test that weighs nothing: "
         "the thesis left t to the mapping, as here."
     )
-    numbers = {"identifiability": {k: [vars(p) for p in v.parameters] for k, v in found.items()}}
-    frozen = [p.name for p in stiff.parameters if p.frozen]
+    numbers = {"identifiability": {k: [asdict(p) for p in v.parameters] for k, v in found.items()}}
+    unknown = [p.name for p in stiff.parameters if _verdict(p) != "known"]
     lead = (
-        f"{len(frozen)} of {len(stiff.parameters)} parameters cannot be identified with a stiff "
-        f"adhesive: {', '.join(frozen) or 'none'}"
+        f"{len(unknown)} of {len(stiff.parameters)} parameters cannot be identified with a stiff "
+        f"adhesive: {', '.join(unknown) or 'none'}"
     )
     return Chapter(lead, (Section("Identifiability", [table, Items(texts)]),), numbers)
 
@@ -133,7 +135,27 @@ def _percent(sd: float | None) -> str:
 
 
 def _verdict(p: ParameterKnowledge) -> str:
-    return "frozen" if p.frozen else "known"
+    if p.frozen:
+        return "frozen"
+    return "unknown here" if p.sd_after**2 > p.prior_sd**2 / 2 else "known"
+
+
+def _names(one: dict[str, Any]) -> list[str]:
+    """Short names of what a [[parameter]] frees."""
+    patch = one["field"] == WELD_PATCH
+    return ["E of the weld patch", "R of the weld patch"] if patch else [one["name"]]
+
+
+def _named(found: Identifiability, names: Sequence[str]) -> Identifiability:
+    """The same with short names."""
+    long = [(p.name, name) for p, name in zip(found.parameters, names, strict=True)]
+    rows = []
+    for p, name in zip(found.parameters, names, strict=True):
+        why = p.why
+        for old, new in long:
+            why = why.replace(old, new)
+        rows.append(replace(p, name=name, why=why))
+    return replace(found, parameters=tuple(rows))
 
 
 def _along(p: ParameterKnowledge, at: str) -> str:

@@ -1,7 +1,7 @@
 """A chapter of the thesis retold: sections, numbers and files, kept between interrupted runs."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 from chladni.errors import FileError
 from chladni.output import own_version, write_json
 from chladni.progress import Progress, within
-from chladni.report.blocks import Block, Facts, Items, Picture, Section, Table, Text
+from chladni.report.blocks import Block, Facts, Items, Live, Picture, Section, Table, Text
 
 SETTINGS = "settings.json"
 _BLOCKS = {kind.__name__.lower(): kind for kind in (Text, Items, Facts, Table, Picture)}
@@ -92,7 +92,8 @@ class ChapterStore:
     def keep(self, name: str, chapter: Chapter) -> Chapter:
         """Write a finished chapter; return it as it will be read again."""
         sections = [
-            {"title": s.title, "blocks": [_plain(b) for b in s.blocks]} for s in chapter.sections
+            {"title": s.title, "blocks": [_plain(b) for b in _still(s.blocks)]}
+            for s in chapter.sections
         ]
         data = {"lead": chapter.lead, "sections": sections, "numbers": chapter.numbers,
                 "files": chapter.files}  # fmt: skip
@@ -117,6 +118,12 @@ class ChapterStore:
             say(f"{step.title}{note}: {found.lead}")
             out[step.name] = found
         return out
+
+
+def _still(blocks: Sequence[Block]) -> Iterator[Block]:
+    """The blocks, with pictures in place of drawings by the page."""
+    for block in blocks:
+        yield from block.pictures if isinstance(block, Live) else (block,)
 
 
 def _plain(block: Block) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from chladni.errors import FileError
 from chladni.geometry.formed_mesh import FormedMesh
 from chladni.io.nastran import write_assembly
 from chladni.progress import silent
-from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
+from chladni.report.blocks import Facts, Items, Live, Picture, Section, Table, Text
 from chladni.units import units
 from chladni_bench.sine_schedule import Stage
 from chladni_evidence.recovery import panel
@@ -79,7 +79,10 @@ def test_a_chapter_is_read_as_it_was_kept(tmp_path):
     """Every kind of block comes back, its picture from wherever the folder now lies."""
     store = ChapterStore(tmp_path)
     blocks = every_block(tmp_path)
-    made = Chapter("lead", (Section("title", blocks),), {"x": np.array([1.0])}, (("f", "what"),))
+    live = Live("map", "map", [blocks[-1]])
+    made = Chapter(
+        "lead", (Section("title", [*blocks[:-1], live]),), {"x": np.array([1.0])}, (("f", "what"),)
+    )
     kept = store.keep("one", made)
     assert kept == store.kept("one")
     assert [type(b) for b in kept.sections[0].blocks] == [type(b) for b in blocks]
@@ -202,4 +205,4 @@ def test_the_whole_story(tmp_path):
     found = json.loads((tmp_path / "thesis.json").read_text())
     assert found["hem"]["fit"] < found["calibrated"]["fit"]
     known = {p["name"]: p["frozen"] for p in found["identifiability"][STIFF]}
-    assert known["nu of sheets"]
+    assert known["E of screws"]
