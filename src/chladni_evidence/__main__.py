@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from chladni.errors import ChladniError, LabelError
+from chladni.progress import terminal
 
 from .benched_recording import PLAIN, RECORDERS
 from .blind_make import make
@@ -23,7 +24,7 @@ from .recovery import recovery
 from .replay import case_lines, likelihood_lines, narrower, rule_lines
 from .screening_evidence import TIMES
 from .screening_faults import FAULTS, tally
-from .thesis import regenerate
+from .thesis import SIZE, regenerate
 
 
 def main(words: list[str] | None = None) -> int:
@@ -74,8 +75,10 @@ def _identified(options: argparse.Namespace) -> int:
 
 
 def _thesis(options: argparse.Namespace) -> int:
-    """Write tables and figures of the thesis' test."""
-    regenerate(options.out, options.seed, _say)
+    """Tell the whole thesis: plan, test, corrections, calibration."""
+    with terminal() as progress:
+        effects = tuple(options.effects.split(",")) if options.effects else ()
+        regenerate(options.out, options.seed, _say, progress, 1e-3 * options.size, effects)
     return 0
 
 
@@ -140,8 +143,10 @@ def _parser() -> argparse.ArgumentParser:
     found.add_argument(
         "--noise", default="", help=f"only these, with semicolons: {'; '.join(NOISES)}"
     )
-    tested = commands.add_parser("thesis", help="tables 3 to 6, figures 19, 23 to 27 of the thesis")
+    tested = commands.add_parser("thesis", help="retell the thesis: its tables next to ours")
     tested.add_argument("--seed", type=int, default=1)
+    tested.add_argument("--size", type=float, default=1e3 * SIZE, help="element size [mm]")
+    tested.add_argument("--effects", default="", help="search only these at the end, with commas")
     tested.add_argument("--out", type=Path, required=True)
     known = commands.add_parser("recovery", help="calibrate to known values: coverage of intervals")
     known.add_argument("--seeds", required=True, help="first and last, as 600-619")

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.linalg import eig
 
 from chladni.fem.measured_dofs import MeasuredDofs
-from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
 from chladni.parallel import one_blas_thread
 from chladni.progress import Progress, silent
@@ -44,13 +43,7 @@ from chladni_bench import (
     swept,
     true_places,
 )
-from chladni_specimens import Skin, TailgateDesign, tailgate
 
-from .bench_of_structure import tailgate_bench
-from .mesh_transfer import Spots, rows_of_part
-
-ARTICLE = TailgateDesign(size=0.020, hem="real")  # first mode at 28.4 Hz; that of the test: 28.2
-HUNG = (0.485, 0.940)  # |y|, s of the upper bolt holes, from which the thesis hung it (figure 17)
 CORD_SD = 0.01  # of a cord's frequency from article to article: figure 19 shows a few tenths of Hz
 HELD = 0.1  # share of a cord's length that stays free when hands hold its lowest part
 CORD_BAND = (18.0, 34.0)  # [Hz], about the cords' resonances and the first mode
@@ -104,22 +97,21 @@ class ThesisTest:
     poles: np.ndarray
 
 
-def tailgate_subject(rng: np.random.Generator, f_max: float = 400.0) -> Subject:
-    """The open tailgate with a hem that holds, hung from its upper holes, sensors as planned.
+def thesis_subject(
+    assembly: Assembly, outputs: MeasuredDofs, inputs: MeasuredDofs, hangers: Sequence[int],
+    rng: np.random.Generator, f_max: float = 400.0,
+) -> Subject:  # fmt: skip
+    """The article on two cords, its sensors as planned, one of them next to the shaker.
 
     Its first fourteen modes have the damping of the thesis' table 6 (mean of three articles, by
     rank). The damping of the others is drawn from the scatter of that table.
     """
-    plan = tailgate_bench()
-    assembly = tailgate(ARTICLE)
-    drive = _dofs(plan.drive)
-    outputs = _joined(_dofs(plan.outputs), drive)
-    places = true_places(assembly, outputs, drive, AccelerometerType(), rng)
-    hangers = _hangers(assembly)
-    article = benched(assembly, outputs, drive, hangers, places, f_max, fitted(), rng)
-    hung = assembly.points[assembly.rows(hangers)]
+    places = true_places(assembly, outputs, inputs, AccelerometerType(), rng)
+    article = benched(assembly, outputs, inputs, hangers, places, f_max, fitted(), rng)
+    hung = assembly.points[assembly.rows(list(hangers))]
     near = np.linalg.norm(outputs.points[:, None] - hung, axis=2).min(axis=1)
-    return Subject(as_damped(article), len(near) - 1, int(near.argmin()), outputs.nodes)
+    drive = outputs.labels.index(inputs.labels[0])
+    return Subject(as_damped(article), drive, int(near.argmin()), outputs.nodes)
 
 
 def as_damped(article: BenchArticle) -> BenchArticle:
@@ -227,31 +219,3 @@ def _touched(one: Cord, way: Held) -> Cord:
     if way == "held":
         return replace(one, length=HELD * one.length, mass=HELD * one.mass, damping=RUBBER)
     return one
-
-
-def _hangers(assembly: Assembly) -> list[int]:
-    """Grids of the inner panel at the upper holes, left and right."""
-    skin = Skin.of(ARTICLE)
-    y, s = HUNG
-    plan = np.array([[y, s], [-y, s]])
-    holes = skin.at(np.column_stack([plan, skin.inner(plan)]))
-    rows = rows_of_part(assembly, assembly.part("inner"))
-    near = rows[nearest_points(assembly.points[rows], holes)]
-    return [int(k) for k in assembly.ids[near]]
-
-
-def _dofs(spots: Spots) -> MeasuredDofs:
-    """Places of the plan as points on the nearest shell of any mesh."""
-    n = len(spots)
-    none = np.zeros(n, dtype=np.int64)
-    return MeasuredDofs(
-        spots.labels, none, spots.points, spots.directions, np.zeros(n), np.zeros(n)
-    )
-
-
-def _joined(a: MeasuredDofs, b: MeasuredDofs) -> MeasuredDofs:
-    """Both sets of dofs, one after the other."""
-    return MeasuredDofs(
-        a.labels + b.labels, np.r_[a.grids, b.grids], np.r_[a.points, b.points],
-        np.r_[a.directions, b.directions], np.r_[a.sd, b.sd], np.r_[a.mass, b.mass],
-    )  # fmt: skip

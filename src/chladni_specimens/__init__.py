@@ -16,6 +16,7 @@ from .plates import box as box
 from .plates import folded_panel as folded_panel
 from .plates import plate as plate
 from .tailgate.design import TailgateDesign as TailgateDesign
+from .tailgate.formed_thickness import forming_mesh as forming_mesh
 from .tailgate.skin import Skin as Skin
 from .tailgate.tailgate import FormedSpecimen as FormedSpecimen
 from .tailgate.tailgate import tailgate as tailgate
@@ -32,6 +33,7 @@ __all__ = [
     "box",
     "folded_panel",
     "formed_panel",
+    "forming_mesh",
     "grip",
     "holed_plate",
     "of_pieces",

@@ -90,7 +90,7 @@ def _field(section: TomlSection) -> str:
     """The field, or why it cannot be freed."""
     what = section.text("field", due=True) or ""
     freeable = (*FIELDS, *ALIASES, *_placed_names())
-    if what in {f.name for f in families() if f.placed is None}:
+    if what not in freeable and what in {f.name for f in families() if f.placed is None}:
         raise FileError(
             f"{section.at('field')} = {what!r} has an unknown place, so calibration cannot free "
             f"it; diagnose searches for it; fields that can be freed: {', '.join(freeable)}"

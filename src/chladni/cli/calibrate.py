@@ -1,15 +1,42 @@
 """``chladni calibrate``: calibration parameters alone, no new physics."""
 
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
 from ..workflows.calibrate import calibrate
-from .run import CaseFolder, Out, diagnosed
+from .run import CaseFolder, Out, diagnosed, opened, started
 
 
 def run(
     source: CaseFolder,
+    variants: Annotated[
+        bool,
+        typer.Option(
+            "--variants",
+            help="Fit the deck with other models of its welds, adhesive and screws; compare them.",
+        ),
+    ] = False,
     out: Out = None,
 ) -> None:
     """Fit E, rho and t of the parts, or the case's parameters; write the updated deck and a page.
 
     Choose modes by their frequency: [band] fit and exclude in case.toml.
     """
-    diagnosed("calibrate", source, out, calibrate)
+    if variants:
+        _variants(source, out)
+    else:
+        diagnosed("calibrate", source, out, calibrate)
+
+
+def _variants(source: Path, out: Path | None) -> None:
+    """Calibrate the deck with every model of its joints."""
+    from ..report.joint_models_page import joint_models_page
+    from ..report.result_json import to_json
+    from ..workflows.joint_models import joint_models
+
+    with started("calibrate", source, out) as job:
+        found = joint_models(opened(source), progress=job.progress)
+        job.json("variants.json", to_json(found))
+        job.show(joint_models_page(job.folder, found))

@@ -10,11 +10,13 @@ from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from ..workflows.identify import Identification, RecordingModes
+from ..workflows.joint_models import JointModels
 from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
 from .check_page import check_json
 from .diagnosis_json import diagnosis_json
+from .joint_models_page import joint_models_json
 from .level_blocks import level_json
 from .map_page import map_json
 from .other_modes_page import other_modes_json
@@ -34,6 +36,7 @@ to_json.register(DiagnosisResult, diagnosis_json)
 to_json.register(OtherModes, other_modes_json)
 to_json.register(MappedDeck, map_json)
 to_json.register(CaseCheck, check_json)
+to_json.register(JointModels, joint_models_json)
 
 
 @to_json.register

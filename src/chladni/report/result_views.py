@@ -15,6 +15,7 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.evaluation import Evaluation
 from ..workflows.frf import FrequencyResponses
 from ..workflows.identify import Identification
+from ..workflows.joint_models import JointModels
 from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
@@ -206,6 +207,12 @@ _PAGES: Mapping[type, Paged] = {
     ),
     MappedDeck: Paged(
         "map", ".map_page", lambda m, at, x: m.map_page(at, x), "mapping.json", _mapped
+    ),
+    JointModels: Paged(
+        "calibrate",
+        ".joint_models_page",
+        lambda m, at, x: m.joint_models_page(at, x),
+        "variants.json",
     ),
     CaseCheck: Paged(
         "check", ".check_page", lambda m, at, x: m.check_page(at, x.origin, x), "check.json"

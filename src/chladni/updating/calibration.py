@@ -61,45 +61,49 @@ class Calibrated:
 
 
 def calibration(
-    problem: UpdatingProblem, progress: Progress = silent, freeze: bool = True
-) -> Calibrated:
+    problem: UpdatingProblem, progress: Progress = silent, freeze: bool = True,
+    quick: bool = False,
+) -> Calibrated:  # fmt: skip
     """Fit the calibration parameters that the data can determine; no new physics.
 
     Parameters
     ----------
     freeze : False keeps parameters free that the data do not know; they are named all the same
+    quick : fit from the prior mean alone, without further starts, profiles and bands
     """
     progress("identifiability", 0.0)
-    whole, known = problem, identifiability(_about_nominal(problem))
+    whole, known = problem, identifiability(about_nominal(problem))
     problem = _without(whole, known.frozen if freeze else ())
     progress("calibration without new physics", 0.05)
     problem, null = without_effects(problem)
     learned = getattr(getattr(null.data, "error", None), "delta", None)
     if freeze and known.frozen and learned is not None:
-        again = identifiability(_about_nominal(whole, learned))
+        again = identifiability(about_nominal(whole, learned))
         if set(again.frozen) < set(known.frozen):  # the error of form is smaller than its prior
             known = again
             problem, null = without_effects(_without(whole, known.frozen))
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
-    ends = list(_ends(problem, null, within(progress, 0.3, 0.7)))
+    ends = [] if quick else list(_ends(problem, null, within(progress, 0.3, 0.7)))
     null = _restarted(problem, null, ends)
     basins = _basins(null, ends)
     progress("profiles", 0.75)
-    profiled, predicted = tuple(profiles(problem, null)), tuple(bands(problem, null))
+    profiled = () if quick else tuple(profiles(problem, null))
+    predicted = () if quick else tuple(bands(problem, null))
     null = replace(null, fit=_with_frozen(whole, problem, null))
     found = Diagnosis(
         nominal, null, fit_of_the_deck(problem, null), (), notes=tuple(_notes(known, basins, ends))
     )
     own = calibration_positions(null.fit.effects)
     study = CalibrationStudy(
-        known, STARTS, basins[:BEST], tuple(_names(null.fit)), tuple(null.fit.x[own].tolist()),
+        known, 0 if quick else STARTS, basins[:BEST], tuple(_names(null.fit)),
+        tuple(null.fit.x[own].tolist()),
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
         profiled, predicted,
     )  # fmt: skip
     return Calibrated(problem, named_by_fits(problem, found), study)
 
 
-def _about_nominal(problem: UpdatingProblem, delta: float | None = None) -> UpdatingProblem:
+def about_nominal(problem: UpdatingProblem, delta: float | None = None) -> UpdatingProblem:
     """The problem with errors of form about the nominal state, of the median of their prior."""
     if not isinstance(problem.data, Responses):
         return problem

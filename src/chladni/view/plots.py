@@ -204,8 +204,11 @@ def fit_test(path: Path | str, rows: Mapping[str, tuple[float, float, float, flo
     return save(figure, path)
 
 
-def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None = None) -> Path:
-    """Plot the deviation Q from the nominal model, step by step, with the ``floor`` of repeats."""
+def waterfall(
+    path: Path | str, steps: Mapping[str, float], floor: float | None = None,
+    of: str = "noise floor",
+) -> Path:  # fmt: skip
+    """Plot the deviation Q from the nominal model, step by step, with a ``floor`` and its name."""
     figure = Figure(figsize=(max(4.6, 1.5 * len(steps)), 3.2), layout="constrained")
     known = {name: value for name, value in steps.items() if np.isfinite(value)}
     ax, names, Q = figure.subplots(), list(known), np.array(list(known.values()), dtype=float)
@@ -218,7 +221,7 @@ def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None 
         ax.annotate(f"{value:.4g}{gain}", (k, value), ha="center", va="bottom", fontsize=8)
     if floor is not None and np.isfinite(floor):
         ax.axhline(floor, color=TEST, lw=0.9, ls="--")
-        ax.annotate("noise floor", (len(Q) - 0.5, floor), ha="right", va="bottom", fontsize=8)
+        ax.annotate(of, (len(Q) - 0.5, floor), ha="right", va="bottom", fontsize=8)
     ax.set(ylabel="Q", ylim=(0, 1.22 * float(Q.max(initial=0.0)) or 1.0))
     ax.spines[["top", "right"]].set_visible(False)
     return save(figure, path)

@@ -101,7 +101,7 @@ class Searched:
 
 def searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    freeze: bool = True,
+    freeze: bool = True, quick: bool = False,
 ) -> Searched:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
@@ -109,6 +109,7 @@ def searched(
     ----------
     known : posterior of the shared parameters from other states
     freeze : whether a calibration holds what the data do not know; states share one set
+    quick : a calibration from one start, without profiles and bands
 
     Raises
     ------
@@ -141,17 +142,17 @@ def searched(
     stage = within(progress, 0.1, 0.85)
     if diagnosing:
         return Searched(case, question, prepared, compared(prepared.problem, stage), screening)
-    made = calibration(prepared.problem, stage, freeze)
+    made = calibration(prepared.problem, stage, freeze, quick)
     prepared = replace(prepared, problem=made.problem)
     return Searched(case, question, prepared, made.diagnosis, screening, made.study)
 
 
 def explained(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    freeze: bool = True,
+    freeze: bool = True, quick: bool = False,
 ) -> Explained:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
-    made = searched(case, diagnosing, progress, known, freeze)
+    made = searched(case, diagnosing, progress, known, freeze, quick)
     question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _apply_held_out(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
@@ -276,8 +277,7 @@ def _curves(case: Case, made: UpdatedModels, modes: MeasuredModes) -> dict[str, 
     if not case.frfs:
         return {}
     low, high = case.band or (0.0, np.inf)
-    if case.held_band is not None:
-        high = max(high, case.held_band[1])
+    high = max(high, (case.held_band or (low, high))[1])
     test = case.frfs[0].sel(band=(max(low, 1e-6), high))
 
     def response(model: Modelled) -> FRF:

@@ -25,14 +25,22 @@ from .output_only import with_natural_frequencies
 from .screening_of_case import RecordingAtFault, at_fault
 
 
-def diagnose_states(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
-    """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread."""
+def diagnose_states(
+    case: Case, diagnosing: bool, progress: Progress, quick: bool = False
+) -> DiagnosisResult:
+    """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread.
+
+    Parameters
+    ----------
+    quick : calibrate one state from one start, without profiles and bands
+    """
     with one_blas_thread():
         case = with_natural_frequencies(case)
         names = states(case.recordings)
         try:
             if len(names) < 2 or ("test", "use") in case.given:
-                return build_result(explained(case, diagnosing, progress), diagnosing, progress)
+                known = explained(case, diagnosing, progress, quick=quick)
+                return build_result(known, diagnosing, progress)
             return _in_states(case, names, diagnosing, progress)
         except RecordingAtFault as fault:
             return at_fault(case, fault.screening, diagnosing)
