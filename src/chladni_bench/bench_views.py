@@ -1,11 +1,10 @@
 """How virtual tests are shown, saved and written as JSON; importing this module registers it."""
 
-from chladni.report.result_json import to_json
+from chladni.report.result_json import of_page, to_json
 from chladni.report.result_views import Paged
 from chladni.results import show_by
 
 from .bench_folder import write_bench
-from .bench_page import bench_json
 from .bench_workflow import BenchResult
 
 _PAGED = Paged(
@@ -17,4 +16,4 @@ _PAGED = Paged(
 )
 
 show_by(BenchResult, _PAGED.view)
-to_json.register(BenchResult, bench_json)
+to_json.register(BenchResult, of_page(f"{__package__}.bench_page", "bench_json"))

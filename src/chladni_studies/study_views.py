@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from chladni.report.result_json import to_json
+from chladni.report.result_json import of_page, to_json
 from chladni.report.result_views import Paged
 from chladni.results import show_by
 
 from .parameter_study import ParameterStudy
-from .study_page import study_json
 from .study_tables import write_csv
 
 
@@ -27,4 +26,4 @@ _PAGED = Paged(
 )
 
 show_by(ParameterStudy, _PAGED.view)
-to_json.register(ParameterStudy, study_json)
+to_json.register(ParameterStudy, of_page(f"{__package__}.study_page", "study_json"))

@@ -1,5 +1,7 @@
 """What a page draws: packed and taken out again, thinned without losing a peak."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,6 +71,15 @@ def test_each_channel_says_how_far_each_deck_is_off():
     assert len(level) == len(drawn["frequency"])
     peak = drawn["frequency"][int(np.argmax(level))]
     assert peak == pytest.approx(40.0, abs=0.1)
+
+
+def test_a_channel_at_a_support_is_drawn_without_a_deviation():
+    """A response of exactly zero has no logarithm; the other channels keep theirs."""
+    free = np.array([1.0, 0.0])[None, :, None]
+    test, deck = (replace(r, values=r.values * free) for r in (resonances(), resonances(gain=2.0)))
+    moving, held = frf(seen(test=test, after=deck))["channels"]
+    assert moving["off"]["after"] == pytest.approx(np.log10(2.0) ** 2, rel=1e-2)
+    assert held["off"]["after"] == 0.0
 
 
 def test_where_channels_are_many_the_worst_stay(monkeypatch):

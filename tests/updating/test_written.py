@@ -16,7 +16,6 @@ from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.errors import ModelError
-from chladni.fem.derivative import Slope
 from chladni.fem.modelled import modelled
 from chladni.updating import deciding, verdict_models
 from chladni.updating.deciding import decided
@@ -213,8 +212,7 @@ def test_numbers_as_they_were_found_are_those_of_the_null(reduced, responses):
 def glued(reduced):
     """A hundredth of the plate's stiffness as if it were that of adhesive."""
     K, prior = reduced.structure.system.K, (Parameter("k", "-", 0.0, ADHESIVE),)
-    none = sp.csr_array(K.shape)
-    return ModelFamily(prior, "adhesive", slope=Slope(none, none, 0.01 * K))
+    return ModelFamily(prior, "adhesive", operator=sp.csr_array(0.01 * K))
 
 
 def calibration(base, data, found, changed=0.0):

@@ -75,10 +75,15 @@ def _coherence(test: FRF, lines: np.ndarray, i: int, j: int) -> list[Any] | None
 
 
 def _off(curve: FRF, test: FRF) -> np.ndarray:
-    """Q of every channel (n_out, n_in)."""
-    with np.errstate(invalid="ignore"):
-        q = np.nanmean(np.abs(deviation(curve, test)) ** 2, axis=0)
-    return np.nan_to_num(q)
+    """Q of every channel (n_out, n_in); 0 where a response is exactly zero, as at a support."""
+    out = np.zeros(test.values.shape[1:])
+    alive = np.flatnonzero((test.values * curve.values).all(axis=(0, 2)))
+    if len(alive):
+        names = [test.outputs[k] for k in alive]
+        with np.errstate(invalid="ignore"):
+            q = np.abs(deviation(curve.sel(names), test.sel(names))) ** 2
+            out[alive] = np.nan_to_num(np.nanmean(q, axis=0))
+    return out
 
 
 def _polar(H: np.ndarray) -> list[list[int | None]]:

@@ -1,6 +1,8 @@
 """Results as plain data, which every command writes with its page."""
 
+from collections.abc import Callable
 from functools import singledispatch
+from importlib import import_module
 from typing import Any
 
 from ..ema.level_table import level_tables
@@ -14,11 +16,8 @@ from ..workflows.joint_models import JointModels
 from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
-from .check_page import check_json
 from .diagnosis_json import diagnosis_json
-from .joint_models_page import joint_models_json
 from .level_blocks import level_json
-from .map_page import map_json
 from .other_modes_page import other_modes_json
 from .screening_blocks import screening_json
 
@@ -32,11 +31,20 @@ def to_json(result: Any) -> dict[str, Any]:
     raise TypeError(f"{type(result).__name__} is no result of a workflow")
 
 
+def of_page(module: str, name: str) -> Callable[[Any], dict[str, Any]]:
+    """A function of a module of pages, which is imported when a result is written."""
+
+    def made(result: Any) -> dict[str, Any]:
+        return dict(getattr(import_module(module), name)(result))
+
+    return made
+
+
 to_json.register(DiagnosisResult, diagnosis_json)
 to_json.register(OtherModes, other_modes_json)
-to_json.register(MappedDeck, map_json)
-to_json.register(CaseCheck, check_json)
-to_json.register(JointModels, joint_models_json)
+to_json.register(MappedDeck, of_page(f"{__package__}.map_page", "map_json"))
+to_json.register(CaseCheck, of_page(f"{__package__}.check_page", "check_json"))
+to_json.register(JointModels, of_page(f"{__package__}.joint_models_page", "joint_models_json"))
 
 
 @to_json.register
