@@ -22,7 +22,6 @@ from chladni.updating.calibration_result import Identifiability, ParameterKnowle
 from chladni.updating.identifiability import (
     calibration_positions,
     identifiability,
-    parameter_names,
 )
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import unknowns
@@ -54,7 +53,7 @@ _VERDICTS = {  # of section 5.4, by the field and the kind of part
     (WELD_PATCH, "welds"): "yes",
 }  # fmt: skip
 _TABLE_12 = {"E of sheets": TABLE_12["E"], "rho of sheets": TABLE_12["rho"],
-             "E of weld patch": TABLE_12["weld patch"]}  # fmt: skip
+             "E of the weld patch": TABLE_12["weld patch"]}  # fmt: skip
 _PRIOR = {"E": 0.06, "rho": 0.06, "nu": 0.1, "t": 0.05}  # of sheets; joints have wider ones
 
 
@@ -206,7 +205,8 @@ def deviation_fit(case: Case, progress: Progress) -> DeviationFit:
                           diff_step=1e-4, x_scale=0.05, max_nfev=25)  # fmt: skip
     fitted, made = x.copy(), case.assembly
     fitted[own] = found.x
-    every, names = unknowns(base), parameter_names([e for e in base if e.kind == "calibration"])
+    every = unknowns(base)
+    names = [name for free in case.parameters for name in _names(vars(free))]
     values = {
         name: (every[k].value(every[k].nominal), every[k].value(fitted[k]))
         for name, k in zip(names, own, strict=True)
@@ -282,7 +282,7 @@ def _three(names: Sequence[str]) -> Parameters:
     return [
         {"field": "E", "name": "E of sheets", "parts": list(names), "sd": FREE_SD},
         {"field": "rho", "name": "rho of sheets", "parts": list(names), "sd": FREE_SD},
-        {"field": WELD_PATCH, "name": "weld patch"},
+        {"field": WELD_PATCH, "name": "the weld patch"},
     ]
 
 
@@ -292,7 +292,7 @@ def _gauges(desk: Desk, found: DeviationFit) -> list[Block]:
     for name in sheets(nominal):
         theirs = TABLE_11.get(name, (None, None, None))
         mine = nominal.shells.part == nominal.part(name)
-        own, fitted = next(v for k, v in found.values.items() if k.startswith(f"t of {name}"))
+        own, fitted = next(v for k, v in found.values.items() if k == f"t of {name}")
         rows.append((name, *(_mm(x) for x in theirs), _mm(1e3 * fitted), _mm(1e3 * own),
                      _mm(1e3 * mapped.thickness()[mine].mean())))  # fmt: skip
     columns = ("part", "thesis: calibrated", "nominal", "mean of mapped", "ours: calibrated",
@@ -321,11 +321,10 @@ def _values(
     seen, patch = model.seen, about_welds(model)
     faces = np.isin(np.arange(len(seen.faces)), np.flatnonzero(patch))
     picture = scene.location(desk.folder / "figure_32.png", seen, faces=faces)
-    known = {c.where.split(":")[0]: c for c in weighed.calibrated}
+    known = {_called(c): c for c in weighed.calibrated}
     rows = []
     for name, value in fitted.values.items():
-        theirs = next((v for k, v in _TABLE_12.items() if name.startswith(k)), None)
-        c = known.get(name.split(":")[0])
+        theirs, c = _TABLE_12.get(name), known.get(name)
         rows.append((
             name, _NONE if theirs is None else f"{_percent_change(theirs):+.1f}",
             f"{_percent_change(value):+.1f}",
@@ -348,6 +347,11 @@ def _values(
             *weighed.distrust,
         ]),
     ]  # fmt: skip
+
+
+def _called(c: CalibratedParameter) -> str:
+    """Short name of a calibrated value."""
+    return f"{c.estimate.name} of the weld patch" if "patch" in c.where else c.where.split(":")[0]
 
 
 def _interval(c: CalibratedParameter) -> tuple[str, str]:
