@@ -249,7 +249,7 @@ def calibration_chapter(desk: Desk, progress: Progress) -> Chapter:
         "table_12": {"thesis": TABLE_12, "ours": fits["calibrated"].values,
                      "Q": fits["calibrated"].Q},
         "weighed_fit": {
-            "values": {c.where: [c.deck_value, c.estimate.value, c.estimate.low, c.estimate.high]
+            "values": {_called(c): [c.deck_value, c.estimate.value, c.estimate.low, c.estimate.high]
                        for c in weighed.calibrated},
             "verdict": weighed.verdict, "distrust": weighed.distrust,
         },
@@ -341,12 +341,21 @@ def _values(
         Items([
             "Without the mass the deviation metric alone is minimised, as FEMcali does. Density "
             "and stiffness absorb what the stand-in of the hem leaves.",
+            *_on_bounds(fitted),
             f"With the mass as a datum, by `chladni calibrate`. Its verdict: {weighed.verdict}"
             ". Where it is *nothing missing* the deck keeps its values: no change of E and rho is "
             "more probable than the error of the model.",
             *weighed.distrust,
         ]),
     ]  # fmt: skip
+
+
+def _on_bounds(fitted: DeviationFit) -> list[str]:
+    """A sentence where the fit ends on a bound."""
+    names = [k for k, (a, b) in fitted.values.items() if abs(np.log(b / a)) > 0.99 * FARTHEST]
+    if not names:
+        return []
+    return [f"On the bound of the fit: {', '.join(names)}. Such a value stands for something else."]
 
 
 def _called(c: CalibratedParameter) -> str:
