@@ -105,7 +105,7 @@ def held_back(threshold: float = 0.1) -> Agent:
     return agent
 
 
-def foretold(env: gym.Env[Any, Any]) -> Agent:
+def cross_validated(env: gym.Env[Any, Any]) -> Agent:
     """Free the parameter that raises the expected score most, while one does.
 
     The fitted data alone estimate Q of held-out data, by generalised cross-validation
@@ -119,10 +119,9 @@ def foretold(env: gym.Env[Any, Any]) -> Agent:
     def expected(freed: np.ndarray) -> float:
         problem = inner.problem
         r = problem.residual + problem.jacobian @ problem.fitted(freed)
-        known = 1 - problem.unlearned(freed) / max(freed.sum(), 1)
-        Q = np.mean(r**2) / (1 - known * freed.sum() / len(r)) ** 2
-        before = np.mean(problem.residual**2)
-        return float(np.log10(before / Q)) - inner.cost * problem.unlearned(freed)
+        unlearned = problem.unlearned(freed)
+        Q = np.mean(r**2) / (1 - (freed.sum() - unlearned) / len(r)) ** 2
+        return float(np.log10(np.mean(problem.residual**2) / Q) - inner.cost * unlearned)
 
     def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
         kept, left = info["kept"], np.flatnonzero(info["action_mask"][:-1])

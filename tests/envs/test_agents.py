@@ -183,9 +183,9 @@ def test_freeing_what_explains_the_misfit_pays():
     """On drawn problems: all subsets bound the agents; freeing everything or at random is worse."""
     env = gym.make("chladni/ParameterSelection-v0")
     seeds = range(40)
-    foretold = agents.foretold(env)
+    cross_validated = agents.cross_validated(env)
     sober = [agents.play(env, agents.held_back(), seed=s)["score"] for s in seeds]
-    foreseen = [agents.play(env, foretold, seed=s)["score"] for s in seeds]
+    foreseen = [agents.play(env, cross_validated, seed=s)["score"] for s in seeds]
     possible = [best_of_all_subsets(env, s) for s in seeds]
 
     def everything(observation, info):
@@ -232,7 +232,7 @@ def test_gauss_newton_calibrates():
 
 def test_agents_are_made_for_their_environment():
     env = gym.make("chladni/Calibration-v0")
-    for maker in (agents.exchange, agents.best_actuators, agents.foretold):
+    for maker in (agents.exchange, agents.best_actuators, agents.cross_validated):
         with pytest.raises(ShapeError, match=r"this agent .*; make it for"):
             maker(env)
 

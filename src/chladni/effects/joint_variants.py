@@ -150,7 +150,7 @@ def _blocks(assembly: Assembly, group: int, rows: np.ndarray) -> Iterator[Block]
 
 
 def _same_part(block: Block, part: dict[int, int]) -> bool:
-    """Whether both faces hang on one part: then they may be the sides of the block."""
+    """True if both faces hang on one part; they may then be the sides of the block."""
     a, b = ({part[row] for row in held if row in part} for held in block.carriers)
     return bool(a & b)
 

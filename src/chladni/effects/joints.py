@@ -54,7 +54,7 @@ class Connection:
 
     @property
     def rigid(self) -> bool:
-        """Whether it is none of the deck's: a firm spring in a rigid tie (:mod:`.rigid_ties`)."""
+        """True for a firm spring in a rigid tie (:mod:`.rigid_ties`), which no deck contains."""
         return self.ids[0] < 0
 
     @property

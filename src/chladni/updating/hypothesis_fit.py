@@ -22,7 +22,7 @@ from .reduced_problem import ReducedProblem
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 
-NEARLY = 6.0  # in -2 ln evidence: what explains poles so much worse still has a share of 5 %
+NEARLY = 6.0  # in -2 ln evidence: an optimum so much worse still has a share of 5 %
 
 
 @dataclass(frozen=True, eq=False)
