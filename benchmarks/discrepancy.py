@@ -15,10 +15,10 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 import sys
 
 from chladni import load_case
+from chladni.inference.hypothesis_fit import fitted
 from chladni.io.package_files import mesh_path
-from chladni.updating.hypothesis_fit import fitted
-from chladni.updating.preparation import prepare
-from chladni.updating.reduced_model import evaluate
+from chladni.reduced.reduced_model import evaluate
+from chladni.search.preparation import prepare
 from chladni.workflows.question_of_case import question_of
 from timing import timed
 

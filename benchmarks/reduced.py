@@ -24,9 +24,9 @@ from chladni.effects.points import MassEffect, strength
 from chladni.effects.suspension import Suspension
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
-from chladni.updating.accuracy import accuracy
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import REACH, reduced_problem
+from chladni.reduced.accuracy import accuracy
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import REACH, reduced_problem
 from chladni_specimens.plates import folded_panel
 from timing import timed
 

@@ -19,7 +19,7 @@ from itertools import combinations
 import numpy as np
 
 from chladni.io.package_files import mesh_path
-from chladni.updating.diagnosis import diagnose
+from chladni.search.diagnosis import diagnose
 from chladni_envs import agents
 from chladni_envs.parameter_selection import ParameterSelectionEnv
 from timing import timed

@@ -25,7 +25,9 @@ _ROOMS = {  # what a sentence without its own cure is about, by the room that sa
     "effects": "[Effects](effects.md) lists what each needs",
     "fem": "correct the named part or card of the deck; `chladni check` shows all findings",
     "model": "correct the named part or card of the deck; `chladni check` shows all findings",
-    "updating": "[Troubleshooting](../guide/troubleshooting.md) leads to the cause",
+    "reduced": "[Troubleshooting](../guide/troubleshooting.md) leads to the cause",
+    "inference": "[Troubleshooting](../guide/troubleshooting.md) leads to the cause",
+    "search": "[Troubleshooting](../guide/troubleshooting.md) leads to the cause",
     "workflows": "`chladni check CASE` states what the command can use",
 }
 _REST = "pass arrays, labels and names as the [Python interface](python.md) states them"

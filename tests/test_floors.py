@@ -36,10 +36,12 @@ MAY_IMPORT = {  # floor: the floors it may use, its own aside
     "io": GROUND | {"model", "geometry", "dynamics", "ema"},
     "effects": GROUND | {"model", "geometry", "dynamics", "fem", "ema"},
 }
-MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse", "decision"}
+MAY_IMPORT["reduced"] = MAY_IMPORT["effects"] | {"effects", "sparse"}
+MAY_IMPORT["inference"] = MAY_IMPORT["reduced"] | {"reduced", "decision"}
+MAY_IMPORT["search"] = MAY_IMPORT["inference"] | {"inference"}
 MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io", "effects"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
-MAY_IMPORT["workflows"] = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "case", "view"}
+MAY_IMPORT["workflows"] = MAY_IMPORT["search"] | {"search", "geometry", "io", "case", "view"}
 MAY_IMPORT["report"] = MAY_IMPORT["workflows"] | {"workflows"}
 MAY_IMPORT["cli"] = MAY_IMPORT["report"] | {"report"}
 MAY_IMPORT["__main__"] = {"cli"}

@@ -7,15 +7,15 @@ import numpy as np
 
 from chladni.effects.search_context import Candidate
 from chladni.errors import ModelError
-from chladni.updating.candidates import candidates
-from chladni.updating.diagnosis import threshold, without_effects
-from chladni.updating.discrepancy import Discrepancy
-from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem
-from chladni.updating.likelihood import Responses
-from chladni.updating.question import Prepared
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.search_round import taken
-from chladni.updating.several import price
+from chladni.inference.discrepancy import Discrepancy
+from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem
+from chladni.inference.likelihood import Responses
+from chladni.reduced.reduced_model import evaluate
+from chladni.search.candidates import candidates
+from chladni.search.diagnosis import threshold, without_effects
+from chladni.search.question import Prepared
+from chladni.search.search_round import taken
+from chladni.search.several import price
 from chladni_planning import Linearised
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from chladni.case import load_case
 from chladni.effects.effect import Effect, Parameter
 from chladni.errors import FileError
-from chladni.updating.likelihood import Responses
-from chladni.updating.reduced_model import State, evaluate
+from chladni.inference.likelihood import Responses
+from chladni.reduced.reduced_model import State, evaluate
 from chladni.workflows.loaded_model import load_model
 from chladni.workflows.question_of_case import prepared
 from chladni_planning import (

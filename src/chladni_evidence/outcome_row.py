@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from chladni.decision.reasons import Reason
-from chladni.updating.decision_in_words import REFUSED
+from chladni.search.decision_in_words import REFUSED
 
 from .blind_diagnosis import Answer
 from .pair_kinds import AND, catalogued, members

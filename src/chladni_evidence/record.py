@@ -15,7 +15,7 @@ from chladni.decision.hypothesis_table import NULL
 from chladni.decision.reasons import Decision
 from chladni.errors import ChladniError
 from chladni.parallel import one_blas_thread
-from chladni.updating.deciding import Measured, begun, decided_by
+from chladni.search.deciding import Measured, begun, decided_by
 from chladni.workflows.diagnosis_pipeline import Searched, searched
 from chladni.workflows.output_only import with_natural_frequencies
 

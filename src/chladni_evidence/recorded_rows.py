@@ -2,7 +2,7 @@
 
 A row holds the deviations of its responses with their slopes, and the prior information on the
 parameters. Evidence takes the parameters as linear about the existing fit, as in
-:mod:`chladni.updating.held_out_evidence`; nothing is fitted again.
+:mod:`chladni.inference.held_out_evidence`; nothing is fitted again.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -14,15 +14,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from chladni.errors import ModelError
-from chladni.updating.deciding import Measured
-from chladni.updating.diagnosis import Diagnosis
-from chladni.updating.discrepancy import learned
-from chladni.updating.frequency_dependent_stiffness import Dissipated
-from chladni.updating.hypothesis_fit import HypothesisFit
-from chladni.updating.likelihood import Responses
-from chladni.updating.map_fit import MassMeasurement, constants, prior_residuals
-from chladni.updating.reduced_model import State, evaluate
-from chladni.updating.sensor_errors import SensorErrors, Side
+from chladni.inference.discrepancy import learned
+from chladni.inference.hypothesis_fit import HypothesisFit
+from chladni.inference.likelihood import Responses
+from chladni.inference.map_fit import MassMeasurement, constants, prior_residuals
+from chladni.inference.sensor_errors import SensorErrors, Side
+from chladni.reduced.frequency_dependent_stiffness import Dissipated
+from chladni.reduced.reduced_model import State, evaluate
+from chladni.search.deciding import Measured
+from chladni.search.diagnosis import Diagnosis
 
 Arrays = dict[str, np.ndarray]
 Likelihood = Callable[[Responses], Responses]

@@ -9,7 +9,7 @@ from chladni.decision.decision_rules import DecisionRules, rule
 from chladni.decision.hypothesis_table import NULL, HypothesisTable, Wanted
 from chladni.decision.reasons import Decision
 from chladni.errors import FileError
-from chladni.updating.likelihood import Responses
+from chladni.inference.likelihood import Responses
 
 from .blind_diagnosis import Answer
 from .outcome_row import called, outcome_of

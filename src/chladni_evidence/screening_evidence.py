@@ -18,7 +18,7 @@ from chladni.ema.screening_lines import screening_lines
 from chladni.ema.setup import Recording
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import Modelled, modelled
-from chladni.updating.channel_screening import against_model
+from chladni.inference.channel_screening import against_model
 from chladni_bench import MeasurementChain, recorded
 from chladni_planning import even_lines
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from chladni.effects.estimate import Estimate, Location
 from chladni.geometry.formed_mesh import FormedMesh
+from chladni.inference.result import NamedEffect
 from chladni.io.dyna import write_keyword
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_csv, write_npz
@@ -22,7 +23,6 @@ from chladni.model.assembly import Assembly
 from chladni.output import plain
 from chladni.report.diagnosis_json import diagnosis_json
 from chladni.units import units
-from chladni.updating.result import NamedEffect
 from chladni.workflows.diagnosis_result import DiagnosisResult
 from chladni.workflows.frf import frf as evaluated
 from chladni.workflows.loaded_model import Model, load_model

@@ -10,24 +10,24 @@ from scipy.optimize import least_squares
 from chladni.case import Case
 from chladni.effects.joints import fasteners
 from chladni.effects.weld_patch import FIELD as WELD_PATCH
+from chladni.inference.calibration_result import Identifiability, ParameterKnowledge
+from chladni.inference.identifiability import (
+    calibration_positions,
+    identifiability,
+)
+from chladni.inference.likelihood import Responses
+from chladni.inference.map_fit import unknowns
+from chladni.inference.result import CalibratedParameter
 from chladni.io.nastran import write_deck
 from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
 from chladni.parallel import one_blas_thread
 from chladni.progress import Progress, within
+from chladni.reduced.reduced_model import evaluate, slices
 from chladni.report.blocks import Block, Items, Picture, Section, Table, Text
 from chladni.report.words import number
-from chladni.updating.calibration import about_nominal
-from chladni.updating.calibration_result import Identifiability, ParameterKnowledge
-from chladni.updating.identifiability import (
-    calibration_positions,
-    identifiability,
-)
-from chladni.updating.likelihood import Responses
-from chladni.updating.map_fit import unknowns
-from chladni.updating.preparation import prepare
-from chladni.updating.reduced_model import evaluate, slices
-from chladni.updating.result import CalibratedParameter
+from chladni.search.calibration import about_nominal
+from chladni.search.preparation import prepare
 from chladni.view import scene
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.diagnosis_result import DiagnosisResult

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from chladni.report.blocks import Block, Picture, Section, Table
 from chladni.report.words import number, quantity, rounded
-from chladni.updating.detectable import Detectable
+from chladni.search.detectable import Detectable
 from chladni.workflows.loaded_model import Model, on_faces
 
 _HEADS = ("what", "at the best place", "at half of the places", "at the worst", "nowhere found")

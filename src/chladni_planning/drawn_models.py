@@ -16,7 +16,7 @@ from chladni.effects.element_groups import element_groups
 from chladni.errors import ModelError
 from chladni.fem.assemble import Structure, structure
 from chladni.progress import Progress, silent
-from chladni.updating.reduced_model import Reduced, evaluate, reduce
+from chladni.reduced.reduced_model import Reduced, evaluate, reduce
 
 REACH = 2.0  # the basis holds the deck's modes up to this many times the highest target
 CLIP = 2.0  # standard deviations beyond which nothing is drawn

@@ -6,10 +6,10 @@ from pathlib import Path
 from chladni.case.sensor_places import sensor_masses
 from chladni.errors import FileError
 from chladni.fem.energy import mass_properties
+from chladni.inference.map_fit import MassMeasurement
 from chladni.progress import Progress, silent
-from chladni.updating.detectable import NOISE, Detectable, detectable
-from chladni.updating.map_fit import MassMeasurement
-from chladni.updating.question import Question
+from chladni.search.detectable import NOISE, Detectable, detectable
+from chladni.search.question import Question
 from chladni.workflows.frf import layout_places
 from chladni.workflows.loaded_model import Model
 from chladni.workflows.question_of_case import MASS_SD

@@ -22,8 +22,8 @@ from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.csv_table import read_table
 from chladni.io.tables.sensor_table import _OPTIONAL
 from chladni.io.tables.write_tables import write_npz
+from chladni.search.preparation import prepare
 from chladni.units import UNITS
-from chladni.updating.preparation import prepare
 from chladni.workflows.case_model import model_frf
 from chladni.workflows.question_of_case import question_of
 

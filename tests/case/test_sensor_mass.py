@@ -14,8 +14,8 @@ from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.write_tables import write_npz
+from chladni.search.preparation import prepare
 from chladni.units import UNITS
-from chladni.updating.preparation import prepare
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.case_model import model_frf
 from chladni.workflows.frf import frf, placed_layout

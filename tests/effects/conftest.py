@@ -13,7 +13,7 @@ from chladni.effects.family import Family
 from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import Assembly, RigidBody
 from chladni.model.properties import Isotropic
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
 from chladni_specimens.joints.bolts import screw
 from chladni_specimens.joints.builders import adhesive_bead, spot_welds

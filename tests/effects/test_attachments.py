@@ -10,7 +10,7 @@ from chladni.effects import point_mass
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.point_mass import SHARE, TRIED
 from chladni.effects.search_context import SearchContext
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 

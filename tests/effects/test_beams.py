@@ -22,10 +22,10 @@ from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Beams
 from chladni.model.free_parameter import FreeParameter
 from chladni.model.properties import BeamSection, Part
-from chladni.updating.accuracy import products
-from chladni.updating.matrix_stack import weighted
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.accuracy import products
+from chladni.reduced.matrix_stack import weighted
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.forms import FORMS
 from chladni_specimens.forms.tube_frame import STEEL, pipe
 from chladni_specimens.plates import plate

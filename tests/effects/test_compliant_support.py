@@ -24,9 +24,9 @@ from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
 from chladni.model.assembly import RigidBody
 from chladni.model.properties import Isotropic
-from chladni.updating.accuracy import accuracy
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.accuracy import accuracy
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import grid, plate, sheet
 
 L, B, T, E, RHO = 0.2, 0.01, 0.002, 70e9, 2700.0  # a strip so narrow that it is a beam

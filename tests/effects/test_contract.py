@@ -36,8 +36,8 @@ from chladni.fem.modelled import solved
 from chladni.geometry.refine import refined
 from chladni.model.assembly import Assembly
 from chladni.model.free_parameter import FreeParameter
-from chladni.updating.reduced_model import Reduced, evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_model import Reduced, evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below

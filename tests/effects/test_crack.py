@@ -20,11 +20,11 @@ from chladni.effects.crack import (
 )
 from chladni.effects.element_groups import element_groups
 from chladni.fem.assemble import structure
+from chladni.inference.likelihood import Responses
+from chladni.inference.scan import baseline, bending_slopes, direction_scores
 from chladni.model.properties import Isotropic
-from chladni.updating.likelihood import Responses
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
-from chladni.updating.scan import baseline, bending_slopes, direction_scores
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel, plate
 
 TOP = 300.0

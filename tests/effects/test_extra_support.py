@@ -11,8 +11,8 @@ from chladni.effects.effect import WIDER
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.fem.assemble import structure
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 

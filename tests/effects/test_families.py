@@ -24,16 +24,16 @@ from chladni.effects.rigid_ties import on_firm_springs
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.geometry.sampling import farthest_point_sample
+from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
+from chladni.inference.likelihood import Responses
+from chladni.inference.pole_data import Poles
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
 from chladni.model.assembly import Assembly
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import ReducedProblem, reduced_problem
+from chladni.search.candidates import UpdatingContext
 from chladni.units import UNITS
-from chladni.updating.candidates import UpdatingContext
-from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
-from chladni.updating.likelihood import Responses
-from chladni.updating.pole_data import Poles
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import ReducedProblem, reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below

@@ -22,8 +22,12 @@ from chladni.effects.joints import (
 from chladni.effects.model_families import joint_families
 from chladni.effects.weld_compliance import WeldCompliance, WeldMissing, of_one, proposed
 from chladni.fem.assemble import structure
-from chladni.updating.candidates import Scan
-from chladni.updating.fastener_scan import (
+from chladni.inference.likelihood import Responses
+from chladni.inference.scan import baseline
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
+from chladni.search.candidates import Scan
+from chladni.search.fastener_scan import (
     AT_ONCE,
     batched,
     loosened_receptance,
@@ -31,10 +35,6 @@ from chladni.updating.fastener_scan import (
     singles,
     together,
 )
-from chladni.updating.likelihood import Responses
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
-from chladni.updating.scan import baseline
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
 from chladni_specimens.joints.builders import spot_welds
 from chladni_specimens.plates import STEEL
@@ -139,7 +139,7 @@ def test_rows_are_solved_for_in_groups():
 
 def test_every_run_of_a_long_line_lies_in_one_row(seam, monkeypatch):
     """And every fastener alone is what it is in a row of its own."""
-    monkeypatch.setattr("chladni.updating.fastener_scan.AT_ONCE", MOST_RUN + 1)
+    monkeypatch.setattr("chladni.search.fastener_scan.AT_ONCE", MOST_RUN + 1)
     ground = reduced_problem(seam, TOP)
     rows = loosened_rows(ground)
     assert len(rows) > 1

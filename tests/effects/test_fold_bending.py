@@ -11,7 +11,7 @@ from chladni.effects.element_groups import element_groups
 from chladni.effects.fold_bending import FoldBending, fold_bending
 from chladni.fem.assemble import structure
 from chladni.geometry.folds import share_at_folds
-from chladni.updating.reduced_model import evaluate, reduce
+from chladni.reduced.reduced_model import evaluate, reduce
 from chladni_specimens.plates import box, folded_panel, grid, plate
 
 

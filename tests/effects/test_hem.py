@@ -10,7 +10,7 @@ from chladni.effects.hem_contact import along_stretch, everywhere
 from chladni.effects.hem_line import hem_lines
 from chladni.fem.assemble import structure
 from chladni.fem.energy import rigid_motions
-from chladni.updating.reduced_model import evaluate
+from chladni.reduced.reduced_model import evaluate
 from chladni_specimens.forms import FORMS
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate

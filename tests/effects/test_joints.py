@@ -22,16 +22,16 @@ from chladni.effects.weld_compliance import (
     of_one,
 )
 from chladni.fem.assemble import structure
-from chladni.updating.fastener_scan import (
+from chladni.inference.likelihood import Responses
+from chladni.inference.scan import baseline
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
+from chladni.search.fastener_scan import (
     fastener_scores,
     loosened_receptance,
     loosened_rows,
     singles,
 )
-from chladni.updating.likelihood import Responses
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
-from chladni.updating.scan import baseline
 from chladni_specimens.forms import FORMS
 
 TOP = 300.0

@@ -12,9 +12,9 @@ from chladni.effects.points import with_springs
 from chladni.fem.assemble import structure
 from chladni.fem.derivative import by_part, by_radius, by_spring, with_radius
 from chladni.model.assembly import Average, Masses
-from chladni.updating.accuracy import accuracy, products
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.accuracy import accuracy, products
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel, plate
 
 TOP = 200.0

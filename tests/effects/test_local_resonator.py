@@ -9,10 +9,10 @@ from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.point_mass import PointMass
 from chladni.fem.assemble import structure
-from chladni.updating.accuracy import LIMIT, accuracy
-from chladni.updating.likelihood import Responses
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.inference.likelihood import Responses
+from chladni.reduced.accuracy import LIMIT, accuracy
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0

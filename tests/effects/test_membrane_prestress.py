@@ -19,8 +19,8 @@ from chladni.effects.membrane_prestress import (
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Scalars
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0

@@ -17,7 +17,7 @@ from chladni.effects.model_families import (
 )
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Bushes
-from chladni.updating.reduced_model import evaluate, reduce
+from chladni.reduced.reduced_model import evaluate, reduce
 from chladni_specimens.plates import folded_panel
 
 

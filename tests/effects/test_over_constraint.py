@@ -16,9 +16,9 @@ from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
 from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import RigidBody
-from chladni.updating.fastener_scan import loosened_rows, singles
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
+from chladni.search.fastener_scan import loosened_rows, singles
 from chladni.workflows.diagnosis_pipeline import as_it_is
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
 from chladni_specimens.joints.bolts import screw

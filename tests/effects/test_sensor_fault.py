@@ -7,9 +7,9 @@ import pytest
 import scipy.sparse as sp
 
 from chladni.effects.sensor_fault import candidates, sensor_fault
-from chladni.updating.likelihood import Responses
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.inference.likelihood import Responses
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 

@@ -16,11 +16,11 @@ from chladni.effects.search_context import best_starts
 from chladni.effects.shaker_restraint import MOST_DRIVES, shaker_restraint
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
+from chladni.inference.hypothesis_fit import UpdatingProblem
+from chladni.inference.likelihood import Responses
 from chladni.model.point_masses import with_masses
-from chladni.updating.hypothesis_fit import UpdatingProblem
-from chladni.updating.likelihood import Responses
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below

@@ -9,8 +9,8 @@ from chladni.effects.mass_patch import MassPatch, spread_mass
 from chladni.effects.property_bands import BANDS, levels
 from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.fem.energy import mass_properties
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel, plate
 
 WIDE = np.log(1e4)  # of ln R: q is one everywhere

@@ -14,9 +14,9 @@ from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Beams, Bushes, Solids
 from chladni.model.free_parameter import FreeParameter
 from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
-from chladni.updating.accuracy import products
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.accuracy import products
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 200.0

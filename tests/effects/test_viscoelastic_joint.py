@@ -26,14 +26,14 @@ from chladni.effects.viscoelastic_joint import (
 )
 from chladni.fem.assemble import structure
 from chladni.geometry.sampling import farthest_point_sample, nearest_points
+from chladni.inference.damping_scatter import ModalDamping
+from chladni.inference.likelihood import Responses
+from chladni.inference.map_fit import constants, prior_residuals
 from chladni.model.assembly import Bushes
-from chladni.updating.accuracy import products
-from chladni.updating.damping_scatter import ModalDamping
-from chladni.updating.frequency_dependent_stiffness import Dissipated
-from chladni.updating.likelihood import Responses
-from chladni.updating.map_fit import constants, prior_residuals
-from chladni.updating.matrix_stack import along
-from chladni.updating.reduced_model import evaluate
+from chladni.reduced.accuracy import products
+from chladni.reduced.frequency_dependent_stiffness import Dissipated
+from chladni.reduced.matrix_stack import along
+from chladni.reduced.reduced_model import evaluate
 
 FLEXIBLE = slice(6, 12)
 USUAL = 0.01

@@ -9,10 +9,10 @@ from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
 from chladni.model.free_parameter import FreeParameter
-from chladni.updating.accuracy import accuracy, products
-from chladni.updating.preparation import carrying
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.reduced.accuracy import accuracy, products
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
+from chladni.search.preparation import carrying
 from chladni_specimens.plates import plate
 
 FREE = FreeParameter("patch", "weld-patch")

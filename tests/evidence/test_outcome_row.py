@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chladni.decision.reasons import Reason
-from chladni.updating.decision_in_words import REFUSED
+from chladni.search.decision_in_words import REFUSED
 from chladni_evidence.blind_diagnosis import Answer
 from chladni_evidence.outcome_row import line, row
 from chladni_evidence.outcome_table import (

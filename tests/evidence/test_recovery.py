@@ -5,8 +5,8 @@ import pytest
 
 from chladni.effects.estimate import Estimate
 from chladni.fem.energy import mass_properties
-from chladni.updating.calibration_result import CalibrationStudy
-from chladni.updating.result import CalibratedParameter
+from chladni.inference.calibration_result import CalibrationStudy
+from chladni.inference.result import CalibratedParameter
 from chladni.workflows.diagnosis_result import DiagnosisResult
 from chladni_evidence.recovery import COARSE, article, compared_with, drawn, panel, summary
 

@@ -10,6 +10,7 @@ from html.parser import HTMLParser
 import pytest
 
 from chladni.errors import FileError
+from chladni.inference.result import FrequencyError
 from chladni.output import plain
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
 from chladni.report.diagnosis_json import diagnosis_json, from_json, read_diagnosis
@@ -18,7 +19,6 @@ from chladni.report.sentence import sentence
 from chladni.report.states_table import states_table
 from chladni.report.typed_fields import wrong_field
 from chladni.report.verdict import HEADING
-from chladni.updating.result import FrequencyError
 from chladni.view import plots
 from chladni.workflows.diagnosis_result import StateResult
 

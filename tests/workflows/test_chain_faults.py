@@ -11,8 +11,8 @@ import chladni
 from chladni.dynamics.frf import FRF
 from chladni.effects.points import with_masses
 from chladni.ema.finding import Finding, Screening
+from chladni.inference.chain_hypotheses import chain_faults, without_modes
 from chladni.io.nastran import write_assembly
-from chladni.updating.chain_hypotheses import chain_faults, without_modes
 from chladni.workflows.screening_of_case import instead_of_effects
 
 SENSORS = (2, 4, 7, 18, 24, 30, 36, 43, 47)
@@ -118,7 +118,7 @@ def test_a_delay_is_not_taken_for_another_error(sound, model):
 
 def test_phases_say_that_the_quantity_is_wrong_and_the_model_which_it_is(sound, model, monkeypatch):
     """Though no reading fits the model as it should."""
-    monkeypatch.setattr("chladni.updating.chain_hypotheses.EXPLAINED", 0.0)
+    monkeypatch.setattr("chladni.inference.chain_hypotheses.EXPLAINED", 0.0)
     frf = replace(sound.frfs[0], quantity="mobility")
     words = (frf, sound.lines(frf.frequency), model, sound.outputs, sound.inputs)
     assert chain_faults(*words)[0] == []

@@ -8,7 +8,7 @@ import pytest
 import chladni
 from chladni.dynamics.frf import FRF
 from chladni.fem.modelled import modelled
-from chladni.updating.measured_modes import MeasuredModes
+from chladni.search.measured_modes import MeasuredModes
 from chladni.workflows.case_model import model_frf
 
 ZETA = np.array([0.002, 0.004, 0.006, 0.008])

@@ -1,7 +1,7 @@
 """An effect that stays, one that moves or grows, one that is in some states only."""
 
 from chladni.effects.estimate import Estimate, Location
-from chladni.updating.result import NamedEffect
+from chladni.inference.result import NamedEffect
 from chladni.workflows.diagnosis_result import DiagnosisResult, StateResult
 from chladni.workflows.effects_by_state import by_state
 

@@ -10,7 +10,7 @@ import chladni
 from chladni.case.make_case import WORDS
 from chladni.case.schema import SCHEMA
 from chladni.errors import ChladniError
-from chladni.updating.preparation import prepare
+from chladni.search.preparation import prepare
 from chladni.workflows.given_case import given_case
 from chladni.workflows.question_of_case import question_of
 

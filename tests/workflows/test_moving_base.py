@@ -14,8 +14,8 @@ from chladni.errors import FileError
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni.report.diagnosis_folder import write_diagnosis
-from chladni.updating.preparation import prepare
-from chladni.updating.written_scores import seen, written_Q
+from chladni.search.preparation import prepare
+from chladni.search.written_scores import seen, written_Q
 from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import plate
 

@@ -15,13 +15,13 @@ from chladni.dynamics.frf import FRF
 from chladni.ema.describing_functions import micro_slip
 from chladni.fem.energy import part_energies
 from chladni.fem.modelled import modelled
+from chladni.inference.result import NamedEffect
 from chladni.io.nastran import read_deck, write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.diagnosis_json import diagnosis_json, from_json
 from chladni.report.level_blocks import level_section, read_levels
-from chladni.updating.question import Prepared, Question
-from chladni.updating.result import NamedEffect
+from chladni.search.question import Prepared, Question
 from chladni.workflows.diagnosis_result import DiagnosisResult, UpdatedModels
 from chladni.workflows.over_levels import over_levels
 from chladni_specimens.plates import plate

@@ -11,9 +11,9 @@ from tests.builders.commands import ran
 import chladni
 from chladni.errors import AccuracyError, FileError
 from chladni.io.nastran import write_assembly
+from chladni.reduced.accuracy import Accuracy
+from chladni.search import basis_refinement
 from chladni.units import UNITS, units
-from chladni.updating import basis_refinement
-from chladni.updating.accuracy import Accuracy
 from chladni.workflows.unit_check import refuse_other_units
 from chladni_specimens.plates import plate
 

@@ -12,10 +12,10 @@ import scipy.sparse.linalg as spl
 import chladni
 from chladni.fem.energy import mass_properties
 from chladni.model.point_masses import with_masses
+from chladni.reduced.accuracy import LIMIT
 from chladni.report.diagnosis_folder import write_diagnosis
-from chladni.updating.accuracy import LIMIT
-from chladni.updating.preparation import ZETA_Q, prepare
-from chladni.updating.written_scores import noise_Q, seen, written_Q
+from chladni.search.preparation import ZETA_Q, prepare
+from chladni.search.written_scores import noise_Q, seen, written_Q
 from chladni.workflows.diagnosis_pipeline import _article_mass
 from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import plate

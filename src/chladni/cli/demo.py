@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from ..inference.result import NamedEffect
 from ..io.package_files import mesh_path
-from ..updating.result import NamedEffect
 from ..workflows.diagnose import diagnose
 from ..workflows.diagnosis_result import DiagnosisResult
 from .console import say

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-SCATTER = 0.33  # sd of ln ζ among modes of one structure, see updating/damping_scatter.py
+SCATTER = 0.33  # sd of ln ζ among modes of one structure, see inference/damping_scatter.py
 TAILS = 5.0  # degrees of freedom of Student's t: ln of that sd is itself known to 0.3 only
 LEVEL_SD = 1.0  # of ln of the damping common to all modes over the median of the identified ratios
 SAME = 0.01  # relative width in natural frequency for pairing a model mode with an identified one

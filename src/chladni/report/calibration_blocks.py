@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
-from ..updating.calibration_result import CalibrationStudy, Identifiability, ParameterKnowledge
+from ..inference.calibration_result import CalibrationStudy, Identifiability, ParameterKnowledge
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Items, Section, Table
 from .words import number, quantity

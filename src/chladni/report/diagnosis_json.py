@@ -7,8 +7,8 @@ from typing import Any, TypeVar, cast
 
 from ..effects.estimate import Estimate, Location
 from ..errors import FileError
-from ..updating.level_effects import LinearJoint
-from ..updating.result import (
+from ..inference.level_effects import LinearJoint
+from ..inference.result import (
     Adequacy,
     Agreement,
     Alternative,

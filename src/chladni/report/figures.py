@@ -10,8 +10,8 @@ from ..dynamics.frf import FRF, UNIT
 from ..effects.estimate import Location
 from ..ema.correlation import deviation
 from ..geometry.cells import point_means
-from ..updating.calibration_result import CalibrationStudy
-from ..updating.result import Alternative, NamedEffect, Scores
+from ..inference.calibration_result import CalibrationStudy
+from ..inference.result import Alternative, NamedEffect, Scores
 from ..view import annotations, calibration_plots, plots, scene
 from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF, UNIT
 from ..ema.correlation import deviation
-from ..updating.result import Alternative, FrequencyRow, NamedEffect, Scores
+from ..inference.result import Alternative, FrequencyRow, NamedEffect, Scores
 from .drawings import rounded
 from .figures import Shown
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..case import Case
 from ..effects.estimate import Location
 from ..fem.modelled import Modelled
-from ..updating.result import Agreement, LeftPlace
+from ..inference.result import Agreement, LeftPlace
 from ..workflows.diagnosis_result import DiagnosisResult
 from . import live_curves, live_mesh, live_panels
 from .drawings import Drawing, Drawings

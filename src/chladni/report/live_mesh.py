@@ -9,8 +9,8 @@ from ..effects.estimate import Location
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..geometry.cells import directed_edges
-from ..updating.measured_modes import MeasuredModes
-from ..updating.result import FrequencyRow, LeftPlace
+from ..inference.result import FrequencyRow, LeftPlace
+from ..search.measured_modes import MeasuredModes
 from ..view.annotations import Marker
 from ..view.camera import best_view
 from ..view.paired_shapes import PairedShapes

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ..effects.registry import families
 from ..ema.level_study import SETTLED_BY
 from ..errors import named
-from ..updating.result import CalibratedParameter
+from ..inference.result import CalibratedParameter
 from ..workflows.diagnosis_result import DiagnosisResult
 from .words import interval, percent, quantity
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..effects.registry import families
-from ..updating.result import Agreement, NamedEffect, Scores
+from ..inference.result import Agreement, NamedEffect, Scores
 from ..workflows.diagnosis_result import DiagnosisResult
 from .words import number
 

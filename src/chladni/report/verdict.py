@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..effects.estimate import Estimate, Location
-from ..updating.calibration_result import ParameterKnowledge
-from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect
+from ..inference.calibration_result import ParameterKnowledge
+from ..inference.result import Adequacy, Agreement, LeftPlace, NamedEffect
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Live, Picture, Section, Table, Text
 from .calibration_blocks import study_sections

@@ -1,7 +1,7 @@
 """Lead from a case to the result of a diagnosis or calibration, on one path for all.
 
 1. The recording is read and the held-out data are chosen (``prepare``).
-2. Hypotheses are fitted and compared by evidence (``updating.diagnosis``).
+2. Hypotheses are fitted and compared by evidence (``search.diagnosis``).
 3. The reported fit is repeated if it left the reduced model's range of validity (``refined``).
 4. The decision is made on rows of numbers, and requests the fits that it needs (``decided``).
 5. The result is written into the deck, and every number is taken from the decks as written.
@@ -17,33 +17,32 @@ from ..ema.finding import Screening
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
+from ..inference.calibration_result import CalibrationStudy
+from ..inference.hypothesis_fit import HypothesisFit
+from ..inference.implausible_values import implausible_values, in_doubt, strained
+from ..inference.joint_fit import Posterior, informed
+from ..inference.likelihood import Responses
+from ..inference.pole_data import Poles
+from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
+from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..io.nastran.edit.changes import Add
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
-from ..sparse.freed_memory import give_back_freed_memory
-from ..updating.basis_refinement import Refinement, refined
-from ..updating.calibration import calibration
-from ..updating.calibration_result import CalibrationStudy
-from ..updating.compensation import compensating
-from ..updating.deciding import decided
-from ..updating.decision_in_words import concluded
-from ..updating.diagnosis import Diagnosis
-from ..updating.diagnosis import diagnose as compared
-from ..updating.frequency_table import frequency_error, frequency_rows
-from ..updating.hypothesis_fit import HypothesisFit
-from ..updating.implausible_values import implausible_values, in_doubt, strained
-from ..updating.joint_fit import Posterior, informed
-from ..updating.likelihood import Responses
-from ..updating.measured_modes import MeasuredModes, measured_modes
-from ..updating.other_recordings import scored_others
-from ..updating.pole_data import Poles
-from ..updating.preparation import NOT_WEIGHED, prepare
-from ..updating.question import Prepared, Question
-from ..updating.residual_localisation import ResidualLocalisation, residual_localisation
-from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
-from ..updating.result_parts import (
+from ..search.basis_refinement import Refinement, refined
+from ..search.calibration import calibration
+from ..search.compensation import compensating
+from ..search.deciding import decided
+from ..search.decision_in_words import concluded
+from ..search.diagnosis import Diagnosis
+from ..search.diagnosis import diagnose as compared
+from ..search.frequency_table import frequency_error, frequency_rows
+from ..search.measured_modes import MeasuredModes, measured_modes
+from ..search.other_recordings import scored_others
+from ..search.preparation import NOT_WEIGHED, prepare
+from ..search.question import Prepared, Question
+from ..search.result_parts import (
     agreement,
     alternatives,
     calibrated,
@@ -52,8 +51,9 @@ from ..updating.result_parts import (
     otherwise,
     remainder,
 )
-from ..updating.verdict_models import fitted_scores, held_out, models, real_poles, with_deck
-from ..updating.written_scores import noise_Q, written_Q
+from ..search.verdict_models import fitted_scores, held_out, models, real_poles, with_deck
+from ..search.written_scores import noise_Q, written_Q
+from ..sparse.freed_memory import give_back_freed_memory
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels

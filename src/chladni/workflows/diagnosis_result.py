@@ -13,13 +13,10 @@ from ..ema.finding import Screening
 from ..ema.level_table import LevelTable
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
-from ..io.nastran.edit.changes import Change
-from ..results import Result
-from ..updating.calibration_result import CalibrationStudy
-from ..updating.level_effects import LinearJoint
-from ..updating.measured_modes import MeasuredModes
-from ..updating.residual_localisation import ResidualLocalisation
-from ..updating.result import (
+from ..inference.calibration_result import CalibrationStudy
+from ..inference.level_effects import LinearJoint
+from ..inference.residual_localisation import ResidualLocalisation
+from ..inference.result import (
     Adequacy,
     Agreement,
     Alternative,
@@ -31,6 +28,9 @@ from ..updating.result import (
     RecordingScore,
     Remainder,
 )
+from ..io.nastran.edit.changes import Change
+from ..results import Result
+from ..search.measured_modes import MeasuredModes
 
 Compared = Literal["responses", "frequencies"]
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..effects.estimate import Estimate
-from ..updating.result import NamedEffect
+from ..inference.result import NamedEffect
 from .diagnosis_result import StateResult
 
 

@@ -29,7 +29,7 @@ from ..errors import AccuracyError, FileError
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
 from ..results import Result
-from ..updating.measured_frequencies import LEAST_DELTA_CHI2
+from ..search.measured_frequencies import LEAST_DELTA_CHI2
 from .recordings_of import read_source
 
 TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted

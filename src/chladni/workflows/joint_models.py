@@ -12,11 +12,11 @@ from ..case.make_case import CaseWords, Measured
 from ..case.recording_groups import states
 from ..effects.joint_variants import JointVariant, joint_variants
 from ..errors import ChladniError, FileError
+from ..inference.result import Scores
 from ..io.nastran import assembly, read_deck, write_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
 from ..results import Result
-from ..updating.result import Scores
 from .diagnosis_result import DiagnosisResult
 from .given_case import Source, given_case
 from .states import diagnose_states

@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from ..ema.level_table import level_tables
+from ..inference.level_effects import LinearJoint, joint_comment, level_effects, linear_joints
 from ..io.nastran.edit.changes import Add
-from ..updating.level_effects import LinearJoint, joint_comment, level_effects, linear_joints
-from ..updating.question import Prepared, Question
+from ..search.question import Prepared, Question
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from ..case import Case
 from ..case.recording_groups import relation
 from ..errors import FileError
-from ..updating.map_fit import MassMeasurement
-from ..updating.preparation import prepare
-from ..updating.question import OtherRecording, Prepared, Question
+from ..inference.map_fit import MassMeasurement
+from ..search.preparation import prepare
+from ..search.question import OtherRecording, Prepared, Question
 from .unit_check import refuse_other_units
 
 

@@ -11,11 +11,11 @@ from ..ema.recording_screening import screened
 from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
+from ..inference.chain_hypotheses import explains, smoothed
+from ..inference.channel_screening import against_model
+from ..inference.result import NamedEffect
 from ..model.point_masses import with_mass_pairs
-from ..updating.chain_hypotheses import explains, smoothed
-from ..updating.channel_screening import against_model
-from ..updating.question import Prepared
-from ..updating.result import NamedEffect
+from ..search.question import Prepared
 from .case_model import REACH
 from .diagnosis_result import DiagnosisResult
 

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 from ..case import Case
 from ..case.recording_groups import of_state, states
+from ..inference.hypothesis_fit import HypothesisFit
+from ..inference.joint_fit import JointFit, joint_fit
+from ..inference.result import CalibratedParameter
+from ..inference.written_hypothesis import as_written
 from ..parallel import one_blas_thread
 from ..progress import Progress, within
-from ..updating.diagnosis import Diagnosis
-from ..updating.hypothesis_fit import HypothesisFit
-from ..updating.joint_fit import JointFit, joint_fit
-from ..updating.result import CalibratedParameter
-from ..updating.result_parts import shared_values
-from ..updating.written_hypothesis import as_written
+from ..search.diagnosis import Diagnosis
+from ..search.result_parts import shared_values
 from .diagnosis_pipeline import Explained, build_result, explained
 from .diagnosis_result import DiagnosisResult, StateResult
 from .effects_by_state import by_state

@@ -14,9 +14,9 @@ from chladni.effects.effect_context import EffectContext, Setup
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
+from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
 from chladni.units import UNITS
-from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
 from chladni_evidence.bench_of_structure import SPECIMENS, Specimen
 from chladni_evidence.blind_make import made_of
 from chladni_evidence.evidence_sets import Order

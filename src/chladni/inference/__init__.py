@@ -1,0 +1,1 @@
+"""Likelihood, model-form error, fits and their evidence, test of fit."""

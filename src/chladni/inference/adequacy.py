@@ -1,0 +1,271 @@
+"""Does the best explanation fit at all: a test of the model against its own predictions.
+
+Under the model the residual is r = -J (x - x̂) + δ W g + e with x, ln δ, g and e drawn from their
+priors.  Each draw is fitted as the recording, and gives equal statistics.  The p value is the rank
+of the recording's least likely statistic among those of the draws (Gelman, Meng and Stern 1996,
+Statistica Sinica 6, 733-807). The prior replaces the posterior, so p is uniform for a true model.
+
+A residual below that of the known errors is reported but refuses nothing: errors were overstated.
+A model does not fit if its form error is far beyond the differences between formulations.
+It does not fit either if its modal damping would scatter more than that of one structure.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.stats import norm
+
+from ..reduced.reduced_model import State, evaluate
+from .complex_modes import ModeCoupling
+from .damping_scatter import FEWEST, ModalDamping
+from .discrepancy import RIGID, Discrepancy, learned
+from .hypothesis_fit import HypothesisFit
+from .likelihood import Responses
+from .map_fit import MassMeasurement, prior_residuals, unknowns
+from .pole_data import SCALE, SCALE_SD, Poles
+from .result import FitStatistic
+from .whitening import Span, Whitening
+
+LEAST_P = 0.01  # p below which an explanation does not fit
+DRAWS = 300
+ALIKE = 0.88  # correlation of noise on neighbouring lines, where no span says it
+BELOW = 0.7  # of the first flexible mode: what rings lower swings on its suspension
+
+
+@dataclass(frozen=True)
+class FitTest:
+    """Test of fit of an explanation: p, and the place of the largest residual if it fails."""
+
+    passes: bool
+    p: float
+    what: str
+    where: str
+    statistics: tuple[FitStatistic, ...] = ()
+    modes_hz: tuple[float, ...] = ()  # natural frequencies nearest to what stands out
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """A linearised fit: residuals of the data and of the prior information."""
+
+    error: Discrepancy
+    known: Whitening | None
+    J: np.ndarray
+    J0: np.ndarray
+    use: np.ndarray
+    inputs: int
+
+    @property
+    def span(self) -> Span | None:
+        """Space of the data, where it is known."""
+        return None if self.known is None else self.known.span
+
+    def noise(self, rng: np.random.Generator) -> np.ndarray:
+        """Noise of unit variance (n,): white in the space of the data.
+
+        Without a span it is similar on neighbouring lines, because it passed through the modes.
+        """
+        if self.span is not None:
+            return self.span.projected(rng.normal(size=len(self.J)))
+        fresh = np.sqrt(1 - ALIKE**2) * rng.normal(size=(*self.use.shape, self.inputs, 2))
+        fresh[0] /= np.sqrt(1 - ALIKE**2)
+        return np.moveaxis(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0)[self.use], -1, 0).ravel()
+
+    def misfit(self, error: Discrepancy, z: np.ndarray) -> float:
+        """Mean square of the whitened residual z.
+
+        Within a span it is rᵀ C⁻¹ V Vᵀ C⁻¹ r = rᵀ C⁻¹ r - |C⁻¹ r|² with C = I + V Vᵀ.
+        Directions with known errors below the unexplained rest I do not count.
+        """
+        if self.known is None or self.span is None:
+            return float(z @ z) / len(z)
+        q = self.known.transposed(error.whitened(z))
+        return float(z @ z - q @ q) / len(z)
+
+    def statistics(self, r: np.ndarray, r0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Size of the error, misfit, worst line, worst channel (4,).
+
+        And the mean square of the whitened residual by line and channel (n_f, n_out).
+        """
+        error = self.error.with_delta(learned(self.error, r, self.J, r0, self.J0).delta)
+        J, z = error.whitened(self.J), error.whitened(r)
+        A, g = J.T @ J + self.J0.T @ self.J0, J.T @ z + self.J0.T @ r0
+        dx = np.linalg.solve(A, g)
+        z = z - J @ dx
+        square = np.zeros((*self.use.shape, self.inputs, 2))
+        square[self.use] = np.moveaxis(z.reshape(2, -1, self.inputs), 0, -1)
+        square = (square**2).mean(axis=(2, 3))
+        used = np.maximum(self.use.sum(axis=1), 1), np.maximum(self.use.sum(axis=0), 1)
+        line, channel = square.sum(axis=1) / used[0], square.sum(axis=0) / used[1]
+        values = (error.delta, self.misfit(error, z), line.max(), channel.max())
+        return np.array(values), square
+
+
+STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
+TWO_SIDED = (0, 1)  # within a span: a fit better than its errors allow has wrong errors
+NAMES = (
+    "the form error must be {0:.1%}; formulations of one structure differ by 0.3 to 4 %",
+    "the residual is {2:.1f} times that of the known errors",
+    "the residual of one spectral line is {2:.1f} times that of the known errors",
+    "the residual of one channel is {2:.1f} times that of the known errors",
+)
+
+
+def adequacy(
+    hypothesis: HypothesisFit,
+    mass_measurement: MassMeasurement | None,
+    labels: tuple[str, ...],
+    draws: int = DRAWS,
+    damping: ModalDamping | None = None,
+    coupling: ModeCoupling | None = None,
+) -> FitTest | None:
+    """The test of one explanation; None where errors of the model have no place.
+
+    Parameters
+    ----------
+    labels : of the outputs, to say where
+    damping, coupling : of the modes, which are tested beside the fit where they are given
+    """
+    data, fit = hypothesis.data, hypothesis.fit
+    if isinstance(data, Poles):
+        return of_poles(data, fit.state)
+    if not isinstance(data, Responses) or data.error is None:
+        return None
+    state = evaluate(hypothesis.model, fit.effects, fit.x)
+    r, J = data.scaled(state, True)
+    r0, J0 = prior_residuals(fit.effects, mass_measurement, fit.x, state)
+    model = _Linear(data.error, data.known, J, J0, data.use, data.values.shape[2])
+    seen, square = model.statistics(r, r0)
+    rng = np.random.default_rng(20250103)
+    sd = np.array([p.sd for p in unknowns(fit.effects)])
+    own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
+    p, least, better = ranked(seen, np.array(own), TWO_SIDED if model.span else ())
+    where, worst = _where(data, square, labels)
+    ranges = np.quantile(own, (0.5, 0.005, 0.995), axis=0).T
+    rows = tuple(
+        FitStatistic(name, float(value), *map(float, row))
+        for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
+    )
+    usual = rows[least].median
+    what = NAMES[least].format(seen[least], usual, seen[least] / usual)
+    test = FitTest(better or p >= LEAST_P, p, what, where, rows, _modes_near(worst, fit.state))
+    if damping is not None:
+        test = _evenly_damped(test, damping.above(_first(data, fit.state)))
+    return test if coupling is None else _coupled_by_damping(test, coupling)
+
+
+def _first(data: Responses, state: State) -> float:
+    """Well below the first flexible mode of the model [Hz]."""
+    omega = np.sqrt(np.maximum(state.lam, 0))
+    flexible = omega[omega > RIGID * data.s.imag.max()]
+    return BELOW * float(flexible.min()) / (2 * np.pi) if len(flexible) else 0.0
+
+
+def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
+    """The test, or that of the damping where it is the less likely of the two."""
+    if len(damping.ratio) < FEWEST:
+        return test
+    p, row = damping.tested()
+    test = replace(test, statistics=(*test.statistics, row))
+    if p >= min(test.p, LEAST_P):
+        return test
+    what, where, modes = damping.said()
+    return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
+
+
+def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
+    """The test, or that of complex modes where it is the less likely of the two."""
+    p, row, what, modes = coupling.tested()
+    test = replace(test, statistics=(*test.statistics, row))
+    if p >= min(test.p, LEAST_P):
+        return test
+    what += ": a part rotates or is driven by itself, or channels are delayed"
+    where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
+    return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
+
+
+def of_poles(data: Poles, state: State) -> FitTest:
+    """Test of natural frequencies: their error, and the number of poles without a partner.
+
+    p is the smaller of two probabilities: of a spread of ln f at least as large as the fitted one,
+    and of at least as many poles without a partner among the modes of ``state``. Each pole is
+    spurious with its own probability.
+    """
+    closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
+    poles = np.flatnonzero(data.use)
+    alone = np.setdiff1d(poles, data.pairs(state)[0])
+    share = np.broadcast_to(data.spurious, data.frequency.shape)[poles]
+    often = at_least(len(alone), share)
+    if often < closely:
+        what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
+        where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
+        return FitTest(often >= LEAST_P, often, what, where)
+    what = (
+        f"natural frequencies agree to {data.scale:.1%}; models of one structure differ by about "
+        f"{SCALE:.1%}"
+    )
+    return FitTest(closely >= LEAST_P, closely, what, "over all modes")
+
+
+def at_least(count: int, chance: np.ndarray) -> float:
+    """P of so many events or more, each with its own chance (n,).
+
+    >>> round(at_least(1, np.array([0.5, 0.5])), 6)
+    0.75
+    """
+    number = np.ones(1)
+    for p in chance:
+        number = np.convolve(number, [1 - p, p])
+    return float(min(1.0, number[count:].sum()))
+
+
+def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator) -> np.ndarray:
+    """Statistics of a recording drawn from the model: x at its prior mean, the truth drawn."""
+    dx = sd * rng.normal(size=len(sd))
+    error = model.error
+    delta = error.prior.drawn(rng)
+    r = delta * error.U @ (np.sqrt(error.s) * rng.normal(size=len(error.s)))
+    r = r + model.noise(rng) - model.J @ dx
+    r0 = np.zeros(known)
+    r0[len(sd) :] = rng.normal(size=known - len(sd)) - model.J0[len(sd) :] @ dx
+    return model.statistics(r, r0)[0]
+
+
+def ranked(
+    seen: np.ndarray, drawn: np.ndarray, two_sided: tuple[int, ...] = ()
+) -> tuple[float, int, bool]:
+    """P of the least likely statistic of ``seen`` (k,) among ``drawn`` (n, k), and which it is.
+
+    The last value is true if it is smaller than in the draws. Each statistic is ranked (large =
+    unlikely; ``two_sided`` ones also if small). The smallest rank is ranked again among those of
+    the draws, so p is uniform for any dependence between the statistics.
+    """
+    every = np.vstack([seen, drawn])
+    share = (every[None] >= every[:, None]).mean(axis=1)
+    below = (every[None] <= every[:, None]).mean(axis=1)[:, two_sided]
+    small = below < share[:, two_sided]
+    share[:, two_sided] = 2 * np.minimum(share[:, two_sided], below)
+    least = int(np.argmin(share[0]))
+    better = least in two_sided and bool(small[0, two_sided.index(least)])
+    return float(np.mean(share.min(axis=1) <= share[0, least])), least, better
+
+
+WORST = 3  # lines whose nearest modes are reported
+
+
+def _where(data: Responses, square: np.ndarray, labels: tuple[str, ...]) -> tuple[str, np.ndarray]:
+    """The line and the channel that leave most, and the frequencies of the worst lines [Hz]."""
+    f = data.s.imag / (2 * np.pi)
+    by_line = square.sum(axis=1) / np.maximum(data.use.sum(axis=1), 1)
+    channel = int(np.argmax(square.sum(axis=0) / np.maximum(data.use.sum(axis=0), 1)))
+    name = labels[channel] if channel < len(labels) else f"channel {channel + 1}"
+    worst = f[np.argsort(-by_line)[:WORST]]
+    return f"largest near {worst[0]:.0f} Hz and on {name}", worst
+
+
+def _modes_near(frequency: np.ndarray, state: State) -> tuple[float, ...]:
+    """The natural frequencies of the model nearest to some frequencies [Hz], each once."""
+    own = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
+    nearest = {float(own[np.argmin(np.abs(own - f))]) for f in frequency}
+    return tuple(sorted(round(f, 2) for f in nearest))

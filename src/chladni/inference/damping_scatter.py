@@ -1,0 +1,106 @@
+"""Test of the scatter of modal damping, which changes of stiffness and mass cannot explain.
+
+Modal damping of one structure scatters about its median.  The standard deviation of ln ζ is 0.22 to
+0.41 for three plates of spruce, and 0.31 to 0.37 for the three tailgates of Echaniz Granado (2015,
+"Model calibration of a vehicle tailgate using frequency response functions", table 6). Foam, a
+joint that slips or another rubbing part damps some modes many times as much. A test on that scatter
+detects them even where the model fits frequencies and shapes.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from ..effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
+from ..ema.identification import Identified
+from ..reduced.reduced_model import State
+from .result import FitStatistic
+
+LOG_SD = 0.3  # prior sd of ln of the standard deviation of ln ζ, about its median SCATTER
+FEWEST = 5  # modes below which the scatter is not tested
+UNSURE = 0.3  # sd of ln ζ from the identification above which a mode is left out
+STRONG = 0.02  # of the median share of χ²: a weaker pole may be spurious
+DRAWS = 4000
+LEAST_LEFT = 0.1  # of a damping ratio remains at least when an effect's dissipation is removed
+
+
+@dataclass(frozen=True, eq=False)
+class ModalDamping(IdentifiedDamping):
+    """Identified damping of the modes that are compared, and tests of its scatter."""
+
+    def beyond(self, state: State) -> Self:
+        """Damping without the dissipation ζ_e of the effects of a state: ζ ζ_0 / (ζ_0 + ζ_e).
+
+        ζ_0 is the median of ζ - ζ_e.
+        """
+        if state.dissipated is None:
+            return self
+        f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
+        more = paired_with(self.frequency, f)[0] @ state.dissipated.ratio
+        usual = float(np.median(np.maximum(self.ratio - more, LEAST_LEFT * self.ratio)))
+        return replace(self, ratio=self.ratio * usual / (usual + more))
+
+    def tested(self) -> tuple[float, FitStatistic]:
+        """P-value of damping so uneven above its median, and its statistic.
+
+        The smaller of two p-values: of the rms of the excess of ln ζ over its median, and of the
+        largest excess.
+        """
+        rng = np.random.default_rng(20250104)
+        scatter = SCATTER * np.exp(LOG_SD * rng.normal(size=(DRAWS, 1)))
+        own = _statistics(np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(self.ratio))))
+        seen = _statistics(np.log(self.ratio)[None])[0]
+        p = (1 + (own >= seen).sum(axis=0)) / (1 + DRAWS)
+        median, low, high = np.quantile(own[:, 0], (0.5, 0.005, 0.995))
+        row = FitStatistic("uneven damping", float(seen[0]), float(median), float(low), float(high))
+        return float(p.min()), row
+
+    def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
+        """P-value that damping follows a share (n,) of the modes by scatter alone; its statistic.
+
+        The statistic is exp of the component of ln ζ along the share, scaled to unit norm and mean
+        zero.  It is the factor by which modes with more of the share are damped more.
+        """
+        along = share - share.mean()
+        along = along / max(float(np.linalg.norm(along)), 1e-300)
+        rng = np.random.default_rng(20250105)
+        scatter = SCATTER * np.exp(LOG_SD * rng.normal(size=(DRAWS, 1)))
+        drawn = np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(share)))
+        own, seen = np.exp(drawn @ along), float(np.exp(np.log(self.ratio) @ along))
+        median, low, high = np.quantile(own, (0.5, 0.005, 0.995))
+        row = FitStatistic(
+            "damping where it is compliant", seen, float(median), float(low), float(high)
+        )
+        return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
+
+    def said(self) -> tuple[str, str, tuple[float, ...]]:
+        """Sentence on the modes that stand out, their place, and their frequencies [Hz]."""
+        excess = np.log(self.ratio) - np.median(np.log(self.ratio))
+        out = np.flatnonzero(excess > 3 * SCATTER)
+        out = out if len(out) else np.array([int(np.argmax(excess))])
+        usual = float(np.median(self.ratio))
+        least, most = self.ratio[out].min(), self.ratio[out].max()
+        span = f"{most:.1%}" if len(out) == 1 else f"{least:.1%} to {most:.1%}"
+        what = (
+            f"{len(out)} of {len(self.ratio)} modes have a damping of {span}, the others about "
+            f"{usual:.1%}: stiffness and mass cannot explain this dissipation"
+        )
+        modes = tuple(float(f) for f in self.frequency[out])
+        return what, "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz", modes
+
+
+def _statistics(log_ratio: np.ndarray) -> np.ndarray:
+    """Rms and largest excess over the median of each row (k, 2)."""
+    excess = np.maximum(log_ratio - np.median(log_ratio, axis=1, keepdims=True), 0)
+    return np.stack([np.sqrt((excess**2).mean(axis=1)), excess.max(axis=1)], axis=1)
+
+
+def modal_damping(identified: Identified, low: float, high: float) -> ModalDamping:
+    """Damping of the strong, well-identified modes between two frequencies [Hz]."""
+    f, share = identified.frequency, identified.relative_delta_chi2
+    keep = (f >= low) & (f <= high) & (identified.damping > 0)
+    if keep.any():
+        keep &= share > STRONG * np.median(share[keep])
+    sd = identified.damping_sd / np.where(keep, identified.damping, 1.0)
+    return ModalDamping(f, identified.damping, sd).of(keep & (sd < UNSURE))

@@ -1,0 +1,368 @@
+"""The problem of a diagnosis, and the fit of one hypothesis."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from ..effects.effect import Effect
+from ..effects.effect_context import EffectContext, Setup
+from ..effects.family import Family
+from ..effects.registry import catalogue
+from ..reduced.reduced_model import Reduced, State, evaluate
+from ..reduced.reduced_problem import ReducedProblem
+from .complex_modes import ModeCoupling
+from .damping_scatter import ModalDamping
+from .discrepancy import MEDIAN, learned
+from .likelihood import Data, Responses
+from .map_fit import Fit, MassMeasurement, constants, fit, prior_residuals
+from .pole_data import SCALE, SCALE_SD, Poles
+
+ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
+
+
+NEARLY = 6.0  # in -2 ln evidence: an optimum so much worse still has a share of 5 %
+
+
+@dataclass(frozen=True, eq=False)
+class LocalOptimum:
+    """An effect at one optimum of its family: its parameters and standard deviations (n_p,)."""
+
+    effect: Effect
+    neg2_log_evidence: float
+    x: np.ndarray
+    sd: np.ndarray
+
+    def same(self, other: "LocalOptimum") -> bool:
+        """True if both are one optimum: places or parameters agree within their uncertainty."""
+        if self.effect.text == other.effect.text:
+            sd = np.maximum(self.sd, other.sd)
+            return bool((np.abs(self.x - other.x) <= 2 * sd).all())
+        mine, its = (v.effect.location(v.x, v.sd) for v in (self, other))
+        if None in (mine.point_m, its.point_m, mine.radius_m, its.radius_m):
+            return False
+        apart = np.linalg.norm(np.subtract(mine.point_m, its.point_m))  # type: ignore[arg-type]
+        return bool(apart <= max(mine.radius_m, its.radius_m))  # type: ignore[type-var, operator]
+
+
+@dataclass(frozen=True, eq=False)
+class HypothesisFit:
+    """One hypothesis after its fit: the effect, the fit and the model used for it.
+
+    ``found_before`` are effects found earlier; the hypothesis is all of them together.
+    ``optima`` are other optima of the family: other places, or another pairing of the same poles.
+    The prior of a place is one over the number of places, so that the evidence of the family is the
+    sum over its optima.
+    """
+
+    effect: Effect
+    fit: Fit
+    model: Reduced
+    found_before: tuple[Effect, ...] = ()
+    optima: tuple[LocalOptimum, ...] = ()
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """All effects of the hypothesis."""
+        return (self.effect, *self.found_before)
+
+    @property
+    def name(self) -> str:
+        """Their names in words."""
+        return " and ".join(e.name for e in self.effects)
+
+    @property
+    def physics(self) -> bool:
+        """True if it changes the model, and not only the test."""
+        return any(e.kind != "test" for e in self.effects)
+
+    @property
+    def verdict(self) -> str:
+        """The public verdict if it is named."""
+        return "missing physics" if self.physics else "measurement fault"
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels of its effects, if every effect is one of channels."""
+        every = [e.channels for e in self.effects]
+        return tuple(c for each in every for c in each) if all(every) else ()
+
+    @property
+    def own(self) -> LocalOptimum:
+        """The optimum of the fit."""
+        x, sd = self.fit.of(self.effect), self.fit.sd(self.effect)
+        return LocalOptimum(self.effect, self.fit.neg2_log_evidence, x, sd)
+
+    @property
+    def nearly(self) -> tuple[LocalOptimum, ...]:
+        """Other optima that are nearly as probable."""
+        most = self.fit.neg2_log_evidence + NEARLY
+        return tuple(v for v in self.optima if v.neg2_log_evidence < most)
+
+    def among(self, other: "HypothesisFit") -> "HypothesisFit":
+        """Keep the optima of another fit of the same family, each once."""
+        kept = [self.own]
+        for v in sorted(
+            (other.own, *self.optima, *other.optima), key=lambda v: v.neg2_log_evidence
+        ):
+            if not any(v.same(known) for known in kept):
+                kept.append(v)
+        return replace(self, optima=tuple(kept[1:]))
+
+    def refitted(self, fit: Fit) -> "HypothesisFit":
+        """A copy with another fit; the other optima keep their distance in evidence."""
+        shift = fit.neg2_log_evidence - self.fit.neg2_log_evidence
+        optima = (replace(v, neg2_log_evidence=v.neg2_log_evidence + shift) for v in self.optima)
+        return replace(self, fit=fit, optima=tuple(optima))
+
+    @property
+    def data(self) -> Data:
+        """The fitted data."""
+        return self.fit.data
+
+    @property
+    def neg2_log_evidence(self) -> float:
+        """-2 ln evidence of the family, summed over its optima."""
+        each = [self.fit.neg2_log_evidence, *(v.neg2_log_evidence for v in self.optima)]
+        return float(-2 * logsumexp(-np.array(each) / 2))
+
+
+@dataclass(frozen=True, eq=False)
+class UpdatingProblem:
+    """Data and model of a diagnosis.
+
+    Attributes
+    ----------
+    base : calibration parameters and nuisances, free in every fit
+    nuisance : the nuisances alone
+    damping, coupling : of the identified modes, if responses are compared
+    found : effects found earlier and now in the base, each with its parameters
+    families : of effects that are tried
+    """
+
+    reduced: ReducedProblem
+    data: Responses | Poles
+    mass_measurement: MassMeasurement | None
+    base: tuple[Effect, ...]
+    nuisance: tuple[Effect, ...]
+    setup: Setup
+    labels: tuple[str, ...] = ()
+    damping: ModalDamping | None = None
+    coupling: ModeCoupling | None = None
+    found: tuple[tuple[Effect, np.ndarray], ...] = ()
+    families: tuple[Family, ...] = field(default_factory=catalogue)
+
+    @property
+    def where(self) -> EffectContext:
+        """The structure and its test, as effects see them."""
+        reduced = self.reduced
+        shapes = reduced.shapes
+        return EffectContext(
+            reduced.groups, reduced.grids, reduced.candidates, self.setup,
+            reduced.frequency[: shapes.shape[1]], shapes,
+        )  # fmt: skip
+
+    def allowing_errors(self, state: State, delta: float = MEDIAN) -> "UpdatingProblem":
+        """Return the problem with errors of the model's form, linearised about this state."""
+        if not isinstance(self.data, Responses):
+            return self
+        data = self.data.allowing_errors(state, delta)
+        if data.identified is not None:
+            wide = replace(self.data, identified=None).allowing_errors(state, delta)
+            data = replace(data, wide=wide)
+        return replace(self, data=data)
+
+    def exactly(self) -> "UpdatingProblem":
+        """Return the problem for a model without errors of form."""
+        if not isinstance(self.data, Responses):
+            return self
+        return replace(self, data=self.data.exactly())
+
+    def begun_wide(self) -> "UpdatingProblem":
+        """Return the problem with the wider likelihood in which searches begin."""
+        wide = getattr(self.data, "wide", None)
+        return self if wide is None else replace(self, data=wide)
+
+    def holding(self, found: Sequence[tuple[Effect, np.ndarray]]) -> "UpdatingProblem":
+        """Return the problem with effects in its base, and their changes in its model."""
+        problem = self
+        for effect, x in found:
+            model = problem.reduced.model_for(effect, x)
+            problem = replace(
+                problem, reduced=replace(problem.reduced, model=model),
+                data=problem.data.rebased(model), base=(*problem.without(effect), effect),
+                found=(*problem.found, (effect, x)),
+            )  # fmt: skip
+        return problem
+
+    def mean(self) -> np.ndarray:
+        """Prior mean of the base parameters; found effects keep their fitted values."""
+        return self.begun(self.base)
+
+    def begun(self, effects: Sequence[Effect]) -> np.ndarray:
+        """Starting values of these effects: fitted values if found, else the prior mean."""
+        known = {id(e): x for e, x in self.found}
+        each = [known.get(id(e), np.array([p.mean for p in e.parameters])) for e in effects]
+        return np.concatenate([np.zeros(0), *each])
+
+    def fitted_with(
+        self, effect: Effect, start: np.ndarray, base: np.ndarray, max_steps: int = 30
+    ) -> HypothesisFit:
+        """Fit one effect together with the base, from these starts."""
+        model = self.reduced.model_for(effect, start)
+        data = self.data.rebased(model)
+        kept = self.without(effect)
+        inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
+        x0 = np.concatenate([base[inside.astype(bool)], start])
+        effects, mass = [*kept, effect], self.mass_measurement
+        x0 = wide_start(model, effects, data, mass, x0)
+        fit = fitted(model, effects, data, mass, x0, max_steps)
+        return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
+
+    def about_itself(self, hypothesis: HypothesisFit, max_steps: int = 30) -> HypothesisFit:
+        """Fit a hypothesis again with errors of the model's form about its own state.
+
+        Comparisons of many hypotheses use the errors about the null's state. A strong effect
+        changes the structure: a support turns rigid modes into flexible ones, with their errors.
+        """
+        data, found = hypothesis.data, hypothesis.fit
+        if not isinstance(data, Responses) or data.error is None:
+            return hypothesis
+        data = data.allowing_errors(found.state, data.error.delta, data.curved)
+        mass = self.mass_measurement
+        fit = fitted(hypothesis.model, found.effects, data, mass, found.x, max_steps)
+        return hypothesis.refitted(fit)
+
+    def without(self, effect: Effect) -> list[Effect]:
+        """Return the base without the effects that this one replaces; found effects stay."""
+        found = [e for e, _ in self.found]
+        return [e for e in self.base if e in found or e.text not in effect.replaces]
+
+
+def fitted(
+    model: Reduced, effects: Sequence[Effect], data: Data,
+    mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int = 30,
+) -> Fit:  # fmt: skip
+    """Fit a model; for poles, the irreducible spread is fitted too."""
+    if isinstance(data, Poles):
+        found = _fit_poles(model, effects, data, mass_measurement, x)
+    elif isinstance(data, Responses) and data.error is not None:
+        found = _fit_responses(model, effects, data, mass_measurement, x, max_steps)
+    else:
+        found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
+    return found.kept()
+
+
+def wide_start(
+    model: Reduced, effects: Sequence[Effect], data: Data,
+    mass_measurement: MassMeasurement | None, x: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Return the start of a fit, found with the wide likelihood of independent samples."""
+    wide = data.wide if isinstance(data, Responses) else None
+    return x if wide is None else fitted(model, effects, wide, mass_measurement, x, ROUGH).x
+
+
+ROUNDS, CLOSE = 3, 0.15  # fits in turn with δ, until ln δ changes by no more
+
+
+def _fit_responses(
+    model: Reduced, effects: Sequence[Effect], data: Responses,
+    mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int,
+) -> Fit:  # fmt: skip
+    """Fit parameters and the size δ of the model's error in turn; evidence integrates δ out."""
+    assert data.error is not None
+    for _ in range(ROUNDS):
+        found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
+        r0, J0 = prior_residuals(effects, mass_measurement, found.x, found.state)
+        likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
+        change = abs(np.log(likely.delta / data.error.delta))
+        data = replace(data, error=data.error.with_delta(likely.delta))
+        S = likely.neg2_log_evidence + constants(effects) + data.log_det
+        found = replace(found, neg2_log_evidence=S, data=data)
+        if max_steps <= ROUGH or change < CLOSE:
+            break
+        x = found.x
+    return found
+
+
+SCALES = np.geomspace(0.003, 0.2, 25)
+
+
+def _fit_poles(
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Poles,
+    mass_measurement: MassMeasurement | None,
+    x: np.ndarray,
+) -> Fit:
+    """Alternate the fit with the most probable scale of the irreducible spread."""
+    options = []
+    for road in ROADS:
+        there = x
+        for scale in road:
+            given = replace(data, scale=scale)
+            there = fit(model, effects, given, mass_measurement, there, max_steps=8).x
+        options.append(_settled(model, effects, data, mass_measurement, there))
+    return min(options, key=lambda f: f.neg2_log_evidence)
+
+
+ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settles
+
+
+def _settled(
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Poles,
+    mass_measurement: MassMeasurement | None,
+    x: np.ndarray,
+) -> Fit:
+    """Fit scale and parameters in turn until the evidence stays constant."""
+    best = None
+    for _ in range(4):
+        scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
+        now = fit(model, effects, replace(data, scale=scale), mass_measurement, x)
+        S = over_scales(
+            data, now.state, *prior_residuals(effects, mass_measurement, now.x, now.state)
+        )
+        S += constants(effects)
+        now = replace(now, neg2_log_evidence=S)
+        if best is not None and now.neg2_log_evidence > best.neg2_log_evidence - 0.05:
+            break
+        best, x = now, now.x
+    return best if best is not None else now
+
+
+def over_scales(data: Poles, state: State, r0: np.ndarray, J0: np.ndarray) -> float:
+    """-2 ln evidence of poles with the irreducible spread integrated out.
+
+    Few poles determine that spread poorly. A model of several free numbers can make its most
+    probable value very small; held there, it would reject deviations of a per cent.  Parameters
+    are linear about their fit; ``r0``, ``J0`` are residual and slope of the other knowledge.
+    """
+    every = []
+    for scale in SCALES:
+        given = replace(data, scale=scale)
+        r, J = given.residual(state, True)
+        A, g = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0
+        cost = r @ r + r0 @ r0 - g @ np.linalg.solve(A, g)
+        widths = 2 * np.log(given.std()[data.use]).sum()
+        every.append(cost + np.linalg.slogdet(A)[1] + widths + _scale_prior(scale))
+    step = np.log(SCALES[1] / SCALES[0]) / (SCALE_SD * np.sqrt(np.pi))
+    return float(-2 * (logsumexp(-np.array(every) / 2) + np.log(step)))
+
+
+def _likely_scale(data: Poles, state: State) -> float:
+    """The scale at which the pairing as a whole is most probable."""
+    return float(min(SCALES, key=lambda scale: neg2_log_mixture(replace(data, scale=scale), state)))
+
+
+def neg2_log_mixture(data: Poles, state: State) -> float:
+    """-2 ln p(poles | modes, best assignment, scale) p(scale), up to a constant."""
+    r, _ = data.residual(state, False)
+    widths = 2 * np.log(data.std()[data.use]).sum()
+    return float(r @ r + widths) + _scale_prior(data.scale)
+
+
+def _scale_prior(scale: float, median: float = SCALE) -> float:
+    return float((np.log(scale / median) / SCALE_SD) ** 2)

@@ -1,0 +1,167 @@
+"""Joint fit of several states of one object with shared parameters.
+
+-2 ln posterior = Σ_states |r_s(x_shared, x_s)|² + priors.  The residuals of all states are stacked.
+E, rho, t of a part, mesh error and the like are one unknown for all states, and their prior counts
+once. An effect or a gain belongs to its state.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..effects.effect import Effect
+from ..reduced.reduced_model import State, evaluate
+from .hypothesis_fit import HypothesisFit
+from .map_fit import MassMeasurement, descend, prior_residuals
+
+SharedKey = tuple[str, str, int]  # an effect's name, where it acts, number of the parameter
+Posterior = dict[SharedKey, tuple[float, float]]  # mean and standard deviation
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """All states at their most probable x.
+
+    Attributes
+    ----------
+    x, covariance : (n,), (n, n)   of every unknown
+    where : for each state, positions of its parameters in x
+    shared : {(effect, text, number): position in x} of parameters that the states share
+    fits : the states one by one, with their part of x and of the covariance
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    where: tuple[np.ndarray, ...]
+    shared: dict[SharedKey, int]
+    fits: tuple[HypothesisFit, ...]
+
+    def posterior(self) -> Posterior:
+        """Mean and standard deviation of the shared parameters."""
+        sd = np.sqrt(np.diag(self.covariance))
+        return {key: (float(self.x[k]), float(sd[k])) for key, k in self.shared.items()}
+
+
+def joint_fit(
+    states: Sequence[HypothesisFit], masses: Sequence[MassMeasurement | None],
+    *, max_steps: int = 30, tol: float = 0.05,
+) -> JointFit:  # fmt: skip
+    """Fit all states at once, starting from the fit of each.
+
+    Parameters
+    ----------
+    states : one fit each; the first that has a shared parameter sets its prior
+    masses : weighed mass of each state
+    """
+    where, shared, first = _positions(states)
+    n = 1 + max(int(at.max(initial=-1)) for at in where)
+    start, priors = np.zeros(n), [p for p, _ in sorted(first, key=lambda pair: pair[1])]
+    for fit, at in zip(reversed(states), reversed(where), strict=True):
+        start[at] = fit.fit.x
+    mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
+
+    def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, list[State]]:
+        found, rows, slopes = [], [(x - mean) / sd], [np.diag(1 / sd)]
+        for one, at, mass in zip(states, where, masses, strict=True):
+            state = evaluate(one.model, one.fit.effects, x[at], gradient)
+            r, J = one.data.residual(state, gradient)
+            weighed, slope = _weighed(one, mass, x[at], state)
+            found.append(state)
+            rows += [r, weighed]
+            if gradient:
+                slopes += [_spread(J, at, n), _spread(slope, at, n)]
+        return np.concatenate(rows), np.concatenate(slopes), found
+
+    limit = np.array([p.step for p in priors])
+    x, _, J, found, _ = descend(objective, start, limit, max_steps, tol)
+    covariance = np.linalg.inv(J.T @ J)
+    fits = tuple(
+        _of_state(one, x[at], covariance[np.ix_(at, at)], state)
+        for one, at, state in zip(states, where, found, strict=True)
+    )
+    return JointFit(x, covariance, tuple(where), shared, fits)
+
+
+def _weighed(
+    one: HypothesisFit, mass: MassMeasurement | None, x: np.ndarray, state: State
+) -> tuple[np.ndarray, np.ndarray]:
+    """The residual and slope of the weighing alone."""
+    r, J = prior_residuals(one.fit.effects, mass, x, state)
+    return r[len(x) :], J[len(x) :]
+
+
+def _spread(J: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
+    """The columns of one state placed among the columns of all states."""
+    out = np.zeros((len(J), n))
+    out[:, at] = J
+    return out
+
+
+def _positions(
+    states: Sequence[HypothesisFit],
+) -> tuple[list[np.ndarray], dict[SharedKey, int], list]:
+    """Positions of every state's and of the shared parameters, and (prior, position) of all."""
+    shared: dict[SharedKey, int] = {}
+    where, first, n = [], [], 0
+    for one in states:
+        at = []
+        for effect in one.fit.effects:
+            common = effect is not one.effect and of_the_object(effect)
+            for k, p in enumerate(effect.parameters):
+                key = (effect.name, effect.text, k)
+                known = shared.get(key) if common else None
+                if known is None:
+                    known, n = n, n + 1
+                    first.append((p, known))
+                    if common:
+                        shared[key] = known
+                at.append(known)
+        where.append(np.array(at, dtype=int))
+    return where, shared, first
+
+
+def of_the_object(effect: Effect) -> bool:
+    """True where an effect belongs to the object in all its states, not to one test of it."""
+    idle = effect.outputs(np.zeros(len(effect.parameters)))
+    return effect.kind in ("calibration", "nuisance") and idle is None
+
+
+def _of_state(
+    one: HypothesisFit, x: np.ndarray, covariance: np.ndarray, state: State
+) -> HypothesisFit:
+    fit = replace(one.fit, x=x, covariance=covariance, state=state).kept()
+    return replace(one, fit=fit)
+
+
+def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:
+    """The effects with the posterior of other states as their prior.
+
+    Laplace's standard deviations are too narrow, so they are widened.  No prior becomes wider than
+    it was.
+    """
+    return [_informed(e, posterior) if of_the_object(e) else e for e in effects]
+
+
+def _informed(effect: Effect, posterior: Posterior) -> Effect:
+    estimates = [
+        posterior.get((effect.name, effect.text, k), (p.mean, p.sd))
+        for k, p in enumerate(effect.parameters)
+    ]
+    wide = effect.widened(np.array([sd for _, sd in estimates]))
+    own = [
+        replace(p, mean=mean, sd=float(sd))
+        for p, (mean, _), sd in zip(effect.parameters, estimates, wide, strict=True)
+    ]
+    return replace(effect, parameters=tuple(own))
+
+
+def with_priors(effects: Sequence[Effect], known: Sequence[Effect]) -> list[Effect]:
+    """The effects with the priors of the calibration parameters of the same name in ``known``."""
+    priors = {(e.name, e.text): e.parameters for e in known if e.kind == "calibration"}
+    return [
+        replace(e, parameters=priors.get((e.name, e.text), e.parameters))
+        if e.kind == "calibration"
+        else e
+        for e in effects
+    ]

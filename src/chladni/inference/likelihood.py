@@ -1,0 +1,289 @@
+"""Compare a recording with a state of the reduced model: whitened residuals and their slopes.
+
+:class:`Responses` are the complex log10 deviation of the damping-equalised FRF on s = ω (ζ + i).
+This is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides. The same
+interface serves natural frequencies alone (:class:`.pole_data.Poles`).
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Protocol, Self
+
+import numpy as np
+
+from ..dynamics.modal_sum import modal_sum
+from ..ema.correlation import wrapped
+from ..ema.identification import DERIVATIVES
+from ..ema.recording_noise import EqualisedError
+from ..reduced.matrix_stack import each_times
+from ..reduced.reduced_model import Reduced, State
+from .discrepancy import LARGEST, MEDIAN, USUAL, Discrepancy, curvature, discrepancy
+from .likely_sensor_errors import LikelyErrors, likely_errors
+from .sensor_errors import SensorErrors, columns, variance
+from .whitening import Span, Whitening, by_input, spanned, whitening
+
+LN10 = np.log(10.0)
+RESOLVED = 3e-4  # sd of log10 H below which no model of a structure is known to be right
+LOCAL = 0.1  # of the upper residual of a channel: the compliance round a point knows the mesh
+
+
+class Data(Protocol):
+    """Residuals of a state, whitened so that their expected square is one."""
+
+    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """r (n,) and ∂r/∂x (n, n_p)."""
+
+    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals divided by the spread of each sample, with their dependence still present."""
+
+    def rebased(self, model: Reduced) -> Self:
+        """Return the data with rows in another basis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """Damping-equalised FRFs.
+
+    Attributes
+    ----------
+    values : (n_f, n_out, n_in) complex    H_X(s)
+    s : (n_f,) complex                     [rad/s]
+    outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
+    direct : (n_out, n_in)                 rigid motion with a moving base, 0 for forces
+    use : (n_f, n_out) bool                lines and channels the fit may see
+    sigma_model : float                    sd of log10 H that neither noise nor δ explains
+    noise : (n_f, n_out, n_in)             sd of log10 H of independent samples, spread included
+    spread : (n_f, n_out, n_in)            sd of log10 H between repeats or articles
+    identified : EqualisedError            of H_X, whose columns span the data; replaces ``noise``
+    """
+
+    values: np.ndarray
+    s: np.ndarray
+    outputs: object
+    inputs: object
+    use: np.ndarray
+    quantity: str = "accelerance"
+    sigma_model: float = 0.003
+    a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
+    b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    noise: np.ndarray | None = None
+    spread: np.ndarray | None = None
+    identified: EqualisedError | None = None
+    curved: float = USUAL  # δ of those errors
+    bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
+    error: Discrepancy | None = None  # covariance of the lines and channels in use
+    about: State | None = None  # from which the errors of form spread
+    direct: np.ndarray | float = 0.0
+    sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
+    likely: LikelyErrors | None = None  # those errors about which log10 H is linearised
+    raw: np.ndarray | None = None  # values as measured, where ``values`` are linear in the errors
+    known: Whitening | None = None  # of what those errors do to the lines and channels in use
+    wide: "Responses | None" = None  # the same with independent noise: fits begin there
+
+    @property
+    def power(self) -> int:
+        """Power of s by which the receptance is multiplied."""
+        return DERIVATIVES[self.quantity]
+
+    def rebased(self, model: Reduced) -> Self:
+        """Rows of sensors and shakers in the basis of this model."""
+        sensors = None if self.sensors is None else self.sensors.rebased(model)
+        wide = None if self.wide is None else self.wide.rebased(model)
+        a, b = model.rows(self.outputs), model.rows(self.inputs)  # type: ignore[arg-type]
+        return replace(self, a=a, b=b, sensors=sensors, wide=wide)
+
+    def model(self, state: State) -> np.ndarray:
+        """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in).
+
+        If effects dissipate, the modes are complex (:mod:`.frequency_dependent_stiffness`).
+        """
+        H = self.receptance(state, *self.modal(state))
+        return self.s[:, None, None] ** self.power * H + self.direct
+
+    def receptance(
+        self, state: State, phi_o: np.ndarray, phi_i: np.ndarray, d: np.ndarray
+    ) -> np.ndarray:
+        """Receptance of the modes of :meth:`modal`, made complex by dissipation."""
+        H = modal_sum(phi_o, d, phi_i)
+        lost = state.dissipated
+        return H if lost is None else H + lost.seen(self.s, d, phi_o, phi_i)
+
+    def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r).
+
+        φ_i of a moving base is its load, which depends on the mass of the state.
+        """
+        d = 1 / (state.lam + self.s[:, None] ** 2)
+        phi_o = self.a @ state.phi
+        phi_i = self.b @ state.phi if state.drive is None else state.drive
+        if state.moved is None:
+            return phi_o, phi_i, d
+        moved_o, moved_i = self._of_test(state.moved)
+        return phi_o + moved_o, phi_i + moved_i if state.drive is None else phi_i, d
+
+    def _of_test(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Split an array over all places into outputs and inputs."""
+        return places[: len(self.a)], places[len(self.a) :]
+
+    def deviation(self, state: State) -> np.ndarray:
+        """δ = log10(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in)."""
+        delta = np.log(self.model(state) / self.values) / LN10
+        if state.offset is not None:
+            delta = delta + state.offset[:, None]
+        return wrapped(delta)
+
+    def std(self) -> np.ndarray:
+        """Standard deviation of δ of each sample, without their dependence."""
+        if self.about is not None and self.identified is not None:
+            out, more = np.full(self.values.shape, RESOLVED**2), [self.spread, self.bent]
+        else:
+            rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
+            out = self.sigma_model**2 * (1 + (0.6 * rms / np.abs(self.values)) ** 2)
+            more = [self.noise, self.bent]
+        return np.sqrt(sum((z**2 for z in more if z is not None), out))
+
+    def allowing_errors(
+        self, state: State, delta: float = MEDIAN, curved: float | None = None
+    ) -> Self:
+        """Return these responses for a model with an error of form of size δ about a state.
+
+        Errors of the sensors are included. ``curved`` is the δ of second-order terms, if not δ.
+        Hypotheses whose evidence is compared share it: these terms count as independent, and a
+        smaller δ would gain on every sample.
+        """
+        plain = self.exactly()
+        if curved is None:
+            curved = USUAL if plain.identified is None else min(delta, LARGEST)
+        bent = curvature(plain, state, curved)
+        data = replace(plain, bent=bent, about=state, curved=curved)
+        if plain.identified is not None and plain.sensors is not None:
+            slopes, _ = columns(plain.sensors, plain, state, np.ones(plain.values.shape))
+            sd = LN10 * replace(plain, identified=None).std()
+            errors = likely_errors(slopes, plain, 10 ** -plain.deviation(state), sd)
+            values = plain.values * 10**-errors.excess
+            data = replace(data, likely=errors, raw=plain.values, values=values)
+        return data._spread(state, delta)
+
+    def _spread(self, about: State, delta: float) -> Self:
+        """Covariance of the lines and channels in use."""
+        data = replace(self, known=None, error=None)
+        own, common = data._errors(about)
+        if len(own) + len(common):
+            span, known = None, self.identified
+            if known is not None:
+                span = spanned(data, by_input(known.own), known.common, data.std())
+            data = replace(data, known=whitening(data, own, common, span))
+        return replace(data, error=discrepancy(data, about).with_delta(delta))
+
+    def _errors(self, about: State) -> tuple[np.ndarray, np.ndarray]:
+        """d log10 H over its spread per standard deviation: of each output, common to all."""
+        own, common, scale = [], [], LN10 * self.std()
+        if self.sensors is not None:
+            outputs, inputs = columns(self.sensors, self, about, scale)
+            if self.likely is not None:
+                outputs = outputs / self.likely.factor
+            own, common = [outputs], [inputs]
+        if (known := self.identified) is not None:
+            every = np.concatenate([known.own, LOCAL * known.upper[None]])
+            own.append(by_input(every) / scale)
+            common.append(known.common / scale)
+        no = np.zeros((0, *self.values.shape))
+        return np.concatenate([no, *own]), np.concatenate([no, *common])
+
+    def wrong(self, state: State) -> np.ndarray | float:
+        """E|d ln H|² of the independent errors of sensors (n_f, n_out, n_in)."""
+        return 0.0 if self.sensors is None else variance(self.sensors, self, state)
+
+    def exactly(self) -> Self:
+        """Return these responses for a model and a test without errors of form."""
+        values = self.values if self.raw is None else self.raw
+        return replace(
+            self, values=values, bent=None, error=None, about=None, likely=None, raw=None,
+            known=None, wide=None,
+        )  # fmt: skip
+
+    def using(self, use: np.ndarray) -> Self:
+        """Return other lines and channels, with the same errors of the model's form."""
+        data = replace(self, use=use)
+        if self.error is None or self.about is None:
+            return data
+        if self.likely is not None:
+            again = data.allowing_errors(self.about, self.error.delta, self.curved)
+            return replace(again, wide=self.wide)
+        return data._spread(self.about, self.error.delta)
+
+    @property
+    def span(self) -> Span | None:
+        """Space of the residuals, if it is smaller than that of the samples."""
+        return None if self.known is None else self.known.span
+
+    @property
+    def log_det(self) -> float:
+        """Ln det of the covariance with known errors, if the evidence counts it."""
+        return 0.0 if self.known is None or self.identified is None else self.known.log_det
+
+    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """δ over its spread, with the errors of the model's form whitened out."""
+        r, J = self.scaled(state, gradient)
+        if self.error is None:
+            return r, J
+        return self.error.whitened(r), self.error.whitened(J) if gradient else J
+
+    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """δ over its spread on used samples, real and imaginary, sensors' errors whitened out."""
+        sd = self.std()
+        r = self.stacked(self.deviation(state)[None] / sd)[:, 0]
+        if not gradient:
+            return r, np.zeros((len(r), 0))
+        return r, self.stacked(self._slopes(state) / sd[None])
+
+    def stacked(self, z: np.ndarray) -> np.ndarray:
+        """Columns of residuals (n, k) of k complex deviations over their spread (k, n_f, ...)."""
+        picked = z[:, self.use].reshape(len(z), self.use.sum() * z.shape[-1]).T
+        columns = np.concatenate([picked.real, picked.imag])
+        return columns if self.known is None else self.known.whitened(columns)
+
+    def _slopes(self, state: State) -> np.ndarray:
+        """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
+
+        dK and dM are multiplied in the basis with Φ D φ_i on their right, which avoids a full
+        projection on the modes. dφ_i is that of a moving base. dφ_o and dφ_i also occur
+        if shapes change where they are measured.
+        """
+        phi_o, phi_i, d = self.modal(state)
+        H = self.receptance(state, phi_o, phi_i, d)
+        H = H + self.direct / self.s[:, None, None] ** self.power
+        assert state.dK is not None
+        assert state.dM is not None
+        out = np.empty((len(state.dK), *H.shape), complex)
+        left = phi_o * d[:, None]  # φ_o D (n_f, n_out, r)
+        from_basis, vectors = left @ state.vectors.T, state.vectors
+        for j in range(len(phi_i)):
+            q = vectors @ (phi_i[j] * d).T
+            W = each_times(state.dK, q)
+            W += each_times(state.dM, q * self.s**2)
+            W = np.ascontiguousarray(W.transpose(2, 1, 0))  # or it is no product of BLAS
+            out[:, :, :, j] = -(from_basis @ W).transpose(2, 0, 1)
+            if state.ddrive is not None:
+                out[:, :, :, j] += np.einsum("for,pr->pfo", left, state.ddrive[:, j], optimize=True)
+        if state.dissipated is not None:
+            for p, seen in state.dissipated.seen_slopes(self.s, d, phi_o, phi_i):
+                out[p] += seen
+        for p, moved in state.dmoved.items():
+            moved_o, moved_i = self._of_test(moved)
+            out[p] += modal_sum(moved_o, d, phi_i)
+            if state.drive is None:
+                out[p] += modal_sum(phi_o, d, moved_i)
+        out /= H * LN10
+        if state.doffset is not None:
+            out += state.doffset.T[:, None, :, None]
+        return out
+
+    def only(self, use: np.ndarray) -> Self:
+        """Return these responses on other lines and channels, without errors of form."""
+        return replace(self.exactly(), use=use)
+
+    def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
+        """Mean |δ|² over the lines and channels in use (``real`` is for poles)."""
+        if not use.any():
+            return float("nan")
+        return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))

@@ -1,0 +1,68 @@
+"""Test of whether a named elastic effect also dissipates.
+
+A crack, a missing weld, a soft patch or a spring to ground changes stiffness alone.  A joint that
+slips or a viscous layer is compliant at the same place, foam or rubber is stiff there, and all of
+these dissipate.  The damping ratio of a mode grows by half the loss factor times its share of the
+strain energy there.  Its eigenvalue moves by the same share (Ungar and Kerwin 1962, J. Acoust. Soc.
+Am. 34, 954-957).  So an elastic effect is not the full explanation where the modes that it changes
+most are also damped most, beyond the scatter of damping.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..reduced.reduced_model import evaluate
+from .adequacy import LEAST_P, FitTest
+from .damping_scatter import FEWEST, ModalDamping
+from .hypothesis_fit import HypothesisFit
+
+NEAR_MODE = (
+    0.05  # largest relative distance of natural frequencies between a pole and its model mode
+)
+
+
+def damping_test_along_effect(
+    test: FitTest, hypothesis: HypothesisFit, damping: ModalDamping | None
+) -> FitTest:
+    """The given test, or the test of damping along the effect where its p-value is smaller."""
+    elastic = [e.name for e in hypothesis.effects if e.elastic]
+    if damping is None or not elastic:
+        return test
+    lowest = float(damping.frequency.min(initial=np.inf))
+    frequency, shift = shifted(hypothesis, (1 - NEAR_MODE) * lowest)
+    off = np.abs(frequency / damping.frequency[:, None] - 1)
+    own = off.min(axis=1, initial=np.inf) < NEAR_MODE
+    if own.sum() < FEWEST:
+        return test
+    kept = damping.of(own)
+    near = shift[off[own].argmin(axis=1)]
+    p, row = kept.following(np.abs(near))
+    test = replace(test, statistics=(*test.statistics, row))
+    if p >= min(test.p, LEAST_P):
+        return test
+    gives = "is compliant and dissipates, as a slipping joint or a viscous layer"
+    holds = "is stiff and dissipates, as foam or rubber"
+    what = (
+        f"the modes that {' and '.join(elastic)} changes most have the highest damping: the "
+        f"material or joint there {gives if near.sum() > 0 else holds}; a recording at another "
+        "level of excitation would distinguish them"
+    )
+    return replace(test, passes=False, p=p, what=what, where=hypothesis.effect.text)
+
+
+def shifted(hypothesis: HypothesisFit, above: float) -> tuple[np.ndarray, np.ndarray]:
+    """Natural frequencies [Hz] above a limit (m,), and the relative change of λ without the effect.
+
+    The change is φᵀK₀φ / φᵀM₀φ / λ - 1 with the modes φ as fitted, K₀ and M₀ without the effect. It
+    is positive where the effect softens the mode, negative where it stiffens it.
+    """
+    fit = hypothesis.fit
+    kept = [(e, fit.of(e)) for e in fit.effects if e not in hypothesis.effects or not e.elastic]
+    x = np.concatenate([np.zeros(0), *(own for _, own in kept)])
+    idle, state = evaluate(hypothesis.model, [e for e, _ in kept], x, False), fit.state
+    frequency = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
+    seen = frequency > above
+    T = np.linalg.solve(idle.vectors, state.vectors[:, seen])
+    energy, mass = idle.lam @ T**2, (T**2).sum(axis=0)
+    return frequency[seen], energy / mass / state.lam[seen] - 1

@@ -1,0 +1,215 @@
+"""Maximum a posteriori fits of effects: Levenberg-Marquardt on whitened residuals and priors.
+
+-2 ln posterior = |r(x)|² + ((m(x) - m_weighed)/σ_m)² + Σ ((x - μ)/σ)²; the evidence is Laplace's
+(MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 27-28).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any, Self
+
+import numpy as np
+
+from ..effects.effect import Effect, Parameter
+from ..errors import ModelError
+from ..reduced.matrix_stack import along
+from ..reduced.reduced_model import Reduced, State, evaluate, slices
+from .likelihood import Data
+
+APART = 1.96  # standard deviations of a weighing: a mass farther off has left the scales
+
+
+class Status(Enum):
+    """Outcome of a fit."""
+
+    CONVERGED = "converged"
+    OUT_OF_STEPS = "ran out of steps; raise max_steps or start nearer"
+    STALLED = "no step improves the fit; the start may be near a local optimum"
+
+
+@dataclass(frozen=True)
+class MassMeasurement:
+    """Weighed mass and its standard deviation [kg]; it counts as a datum like any other."""
+
+    mass: float
+    sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Effects at their most probable x.
+
+    Attributes
+    ----------
+    effects : tuple of Effect      in the order of x
+    x : (n_p,)                     most probable parameters
+    covariance : (n_p, n_p)        of x, Laplace's
+    misfit : float                 |r|² of the data alone
+    neg2_log_evidence : float      -2 ln evidence up to a constant common to all fits of the data
+    state : State                  the reduced model there
+    data : Data                    what was fitted
+    """
+
+    effects: tuple[Effect, ...]
+    x: np.ndarray
+    covariance: np.ndarray
+    misfit: float
+    neg2_log_evidence: float
+    state: State
+    data: Data
+    status: Status
+
+    def of(self, effect: Effect) -> np.ndarray:
+        """The part of x that belongs to one effect."""
+        return self.x[self.slice(effect)]
+
+    def slice(self, effect: Effect) -> slice:
+        """Positions of an effect's parameters in x."""
+        at = 0
+        for other in self.effects:
+            if other is effect:
+                return slice(at, at + len(other.parameters))
+            at += len(other.parameters)
+        raise ModelError(f"{effect.name} is not part of this fit")
+
+    def kept(self) -> Self:
+        """The fit without ∂K and ∂M of its state, so that a search can keep many fits."""
+        return replace(self, state=self.state.without_slopes())
+
+    def sd(self, effect: Effect) -> np.ndarray:
+        """Standard deviations of an effect's parameters."""
+        return np.sqrt(np.diag(self.covariance)[self.slice(effect)])
+
+
+def unknowns(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
+    """All parameters, in the order of x."""
+    return tuple(p for effect in effects for p in effect.parameters)
+
+
+def prior_residuals(
+    effects: Sequence[Effect], mass_measurement: MassMeasurement | None, x: np.ndarray, state: State
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened residuals and slopes of information besides the data: priors and the weighing."""
+    priors = unknowns(effects)
+    mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
+    r, J = [(x - mean) / sd], [np.diag(1 / sd)]
+    if mass_measurement is not None:
+        J.append(state.dweight[None] / mass_measurement.sd)
+        r.append(np.array([(state.weight - mass_measurement.mass) / mass_measurement.sd]))
+    for off, slope in _by_effects(effects, x, state):
+        r.append(off)
+        J.append(slope)
+    return np.concatenate(r), np.concatenate(J)
+
+
+def _by_effects(
+    effects: Sequence[Effect], x: np.ndarray, state: State
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Residuals and slopes of the information that effects add to the data."""
+    lost = state.dissipated
+    if lost is None:
+        return
+    for effect, at in slices(effects):
+        known = effect.auxiliary_residual(x[at], state.lam, lost.ratio)
+        if known is None:
+            continue
+        slope = np.zeros((len(known.r), len(x)))
+        if state.dK is not None and state.dM is not None:
+            dlam = along(state.dK, state.vectors) - state.lam * along(state.dM, state.vectors)
+            slope = known.by_lam @ dlam.T + known.by_dissipated @ lost.slopes.T
+            slope[:, at] += known.gradient
+        yield known.r, slope
+
+
+def constants(effects: Sequence[Effect]) -> float:
+    """Terms of -2 ln evidence from the effects: prior widths, number of places, extra data.
+
+    An effect may be compared with extra data, such as measured damping.  Only the likelihood ratio
+    with and without the effect counts there, so all hypotheses are compared on the same data.
+    """
+    widths = sum(2 * np.log(p.sd) for p in unknowns(effects))
+    return float(widths + sum(2 * np.log(e.trials_factor) - e.neg2_log_without for e in effects))
+
+
+def fit(
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Data,
+    mass_measurement: MassMeasurement | None,
+    start: np.ndarray,
+    *,
+    max_steps: int = 30,
+    tol: float = 0.05,
+) -> Fit:
+    """Most probable x from one start, and the evidence there.
+
+    Parameters
+    ----------
+    start : (n_p,)      initial x
+    tol : float        stop when a step improves -2 ln posterior by less
+    """
+    limit = np.array([p.step for p in unknowns(effects)])
+
+    def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, State]:
+        state = evaluate(model, effects, x, gradient)
+        r, J = data.residual(state, gradient)
+        r0, J0 = prior_residuals(effects, mass_measurement, x, state)
+        return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
+
+    x, r, J, state, status = descend(objective, start, limit, max_steps, tol)
+    cost = float(r @ r)
+    A = J.T @ J
+    S = cost + np.linalg.slogdet(A)[1] + constants(effects)
+    own = r[: len(r) - len(prior_residuals(effects, mass_measurement, x, state)[0])]
+    return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
+
+
+Objective = Callable[[np.ndarray, bool], tuple[np.ndarray, np.ndarray, Any]]
+
+
+def descend(
+    objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Any, Status]:
+    """Levenberg-Marquardt: final x, its residuals, slopes, third value of the objective, status.
+
+    Parameters
+    ----------
+    objective : x, True for slopes -> residuals (n,), slopes (n, n_p), any third value
+    limit : (n_p,)     longest step
+    tol : stop when a step improves the sum of squares by less
+    """
+    x, damping = start.copy(), 1e-2
+    status = Status.OUT_OF_STEPS if len(x) else Status.CONVERGED
+    r, J, state = objective(x, True)
+    cost = float(r @ r)
+    for _ in range(max_steps if len(x) else 0):
+        found = _step(objective, x, r, J, cost, damping, limit)
+        if found is None:
+            status = Status.STALLED if np.abs(J.T @ r).max() > 1e-2 * cost else Status.CONVERGED
+            break
+        improved, x, damping = found
+        del state  # its slopes take as much memory as the next ones
+        r, J, state = objective(x, True)
+        cost = float(r @ r)
+        if improved < tol:
+            status = Status.CONVERGED
+            break
+    return x, r, J, state, status
+
+
+def _step(objective, x, r, J, cost, damping, limit):  # type: ignore[no-untyped-def]
+    """One accepted Levenberg-Marquardt step: (improvement, new x, new damping), or None."""
+    A, g = J.T @ J, J.T @ r
+    for _ in range(8):
+        dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)
+        dx = dx / max(1.0, np.abs(dx / limit).max())
+        try:
+            trial = objective(x + dx, False)[0]
+        except ModelError:
+            trial = np.array([np.inf])
+        new = float(trial @ trial)
+        if new < cost:
+            return cost - new, x + dx, damping / 6
+        damping = max(damping, 1e-4) * 6
+    return None

@@ -1,0 +1,231 @@
+"""Scan of all places at once, by exact low-rank re-analysis with linear marginalisation.
+
+The structure with a dynamic stiffness D(s) at b has the receptance G_of - G_ob (1/D + G_bb)⁻¹ G_bf.
+D is a spring k, a mass m s² or a mass on a spring, m s² ω²/(ω² + s²).  G_bb includes the residual
+flexibility beyond the basis.  Calibration parameters, scatter and the errors of the model's form
+are marginalised: C = I + W Wᵀ with W the slopes times the prior standard deviations (Woodbury).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..dynamics.modal_sum import modal_sum
+from ..effects.effect import Effect, FieldChange, Parameter
+from ..effects.effect_context import ElementGrids
+from ..reduced.reduced_model import Reduced, State, evaluate
+from .likelihood import LN10, Data, Responses
+from .map_fit import MassMeasurement, unknowns
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A state of the base effects, linearised to score small changes.
+
+    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|².  ``slopes`` (n, n_p) are those of the
+    residual.  Both include the row of the weighing.
+    """
+
+    effects: tuple[Effect, ...]
+    x: np.ndarray
+    state: State
+    residual: np.ndarray
+    slopes: np.ndarray
+    Z: np.ndarray
+    mass_measurement: MassMeasurement | None
+
+    def score(self, residuals: np.ndarray) -> np.ndarray:
+        """rᵀ C⁻¹ r of every column (n, m) -> (m,)."""
+        return (residuals**2).sum(axis=0) - ((self.Z @ residuals) ** 2).sum(axis=0)
+
+    def with_mass(self, r: np.ndarray, added: np.ndarray | float) -> np.ndarray:
+        """The data's residuals (n_data, m) with the row of the weighing below them."""
+        if self.mass_measurement is None:
+            return r
+        row = (self.state.weight + added - self.mass_measurement.mass) / self.mass_measurement.sd
+        return np.concatenate([r, np.broadcast_to(row, (1, r.shape[1]))])
+
+
+def baseline(
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Data,
+    mass_measurement: MassMeasurement | None,
+    x: np.ndarray,
+) -> Baseline:
+    """Linearise the base effects at x."""
+    state = evaluate(model, effects, x)
+    r, J = data.scaled(state, True)
+    shapes = np.zeros((len(r), 0))
+    if isinstance(data, Responses) and (error := data.error) is not None:
+        shapes = error.U * (error.delta * np.sqrt(error.s))
+    if mass_measurement is not None:
+        r = np.append(r, (state.weight - mass_measurement.mass) / mass_measurement.sd)
+        J = np.concatenate([J, state.dweight[None] / mass_measurement.sd])
+        shapes = np.concatenate([shapes, np.zeros((1, shapes.shape[1]))])
+    W = np.concatenate([J * np.array([p.sd for p in unknowns(effects)]), shapes], axis=1)
+    L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
+    Z = np.linalg.solve(L, W.T)
+    return Baseline(tuple(effects), x, state, r, J, Z, mass_measurement)
+
+
+def point_scores(
+    base: Baseline, model: Reduced, data: Responses, places: ElementGrids, matrix: str,
+    strengths: np.ndarray, residual_flexibility: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Score of one mass or spring of each strength at each place (n_places, n_strengths).
+
+    Parameters
+    ----------
+    strengths : [kg] or [N/m]
+    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
+    """
+    at = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
+    out = np.empty((len(places), len(strengths)))
+    for k, c in enumerate(strengths):
+        D, added = (c * data.s**2, c) if matrix == "M" else (c + 0 * data.s, 0.0)
+        out[:, k] = base.score(at.residuals(D, added))
+    return out
+
+
+def oscillator_scores(
+    base: Baseline, model: Reduced, data: Responses, places: ElementGrids, mass: float,
+    hertz: np.ndarray, residual_flexibility: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Best mass on a spring at each place, and the score with it (n_places, n_hertz).
+
+    The responses are taken as linear in the mass along the secant from none to ``mass`` [kg].
+
+    Parameters
+    ----------
+    hertz : (k,)                    frequencies of the mass on its spring, with a fixed base
+    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
+    """
+    at = reanalysis(base, model, data, places, residual_flexibility, True)
+    amount, score = np.empty((2, len(places), len(hertz)))
+    for k, omega2 in enumerate((2 * np.pi * hertz) ** 2):
+        D = mass * data.s**2 * omega2 / (omega2 + data.s**2)
+        secant = at.residuals(D, mass) - base.residual[:, None]
+        amount[:, k], score[:, k] = direction_scores(base, secant)
+    return mass * amount, score
+
+
+@dataclass(frozen=True, eq=False)
+class Reanalysis:
+    """Responses of a state with a dynamic stiffness added at one of many places.
+
+    Attributes
+    ----------
+    H : (n_f, n_out, n_in)                     receptances of the state
+    G_ob, G_bi : (n_places, n_f, n_out or n_in)  from the places to outputs, from inputs to them
+    G_bb : (n_places, n_f)                     of the places themselves
+    """
+
+    base: Baseline
+    data: Responses
+    H: np.ndarray
+    G_ob: np.ndarray
+    G_bi: np.ndarray
+    G_bb: np.ndarray
+
+    def residuals(self, D: np.ndarray, added: float) -> np.ndarray:
+        """Residuals (n, n_places) with the dynamic stiffness D (n_f,) and ``added`` kg of mass."""
+        share = D / (1 + D * self.G_bb)
+        change = self.G_ob[..., None] * (share[:, :, None, None] * self.G_bi[:, :, None, :])
+        r = whitened(self.data, self.base.state, self.H[None] - change)
+        return self.base.with_mass(r, added)
+
+
+def reanalysis(
+    base: Baseline, model: Reduced, data: Responses, places: ElementGrids,
+    residual_flexibility: np.ndarray, massive: bool,
+) -> Reanalysis:  # fmt: skip
+    """Receptances between the places, the outputs and the inputs.
+
+    A ``massive`` addition is also loaded by base motion; a spring only by the structure's motion.
+    """
+    phi_o, phi_i, d = data.modal(base.state)
+    phi_b = model.rows(places.rows) @ base.state.phi
+    G_bi = modal_sum(phi_b, d, phi_i).transpose(1, 0, 2)
+    if massive and model.base is not None:
+        moved_with_base = model.base.motion.moved_with_base(places.rows)
+        G_bi = G_bi + moved_with_base[:, None] / (data.s**2)[:, None]
+    return Reanalysis(
+        base,
+        data,
+        data.receptance(base.state, phi_o, phi_i, d),
+        modal_sum(phi_o, d, phi_b).transpose(2, 0, 1),
+        G_bi,
+        (phi_b**2) @ d.T + residual_flexibility[:, None],
+    )
+
+
+def whitened(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
+    """Whitened residuals of many responses (m, n_f, n_out, n_in) as columns (n, m)."""
+    from ..ema.correlation import wrapped
+
+    H = data.s[:, None, None] ** data.power * H + data.direct
+    delta = np.log(H / data.values) / LN10
+    if state.offset is not None:
+        delta = delta + state.offset[:, None]
+    return data.stacked(wrapped(delta) / data.std())
+
+
+@dataclass(frozen=True, eq=False)
+class _Probe(Effect):
+    """A field such as t, E or rho, with one parameter for every group."""
+
+    field: str = "t"
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """The logarithm of the field in each group is one parameter."""
+        return (FieldChange(self.field, x, np.eye(len(x))),)
+
+
+def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.ndarray:
+    """∂r/∂ln t, E or rho of every group, including the row of the weighing (n, n_groups)."""
+    n = len(model.groups)
+    unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in range(n))
+    probe = _Probe(unknown, field=field)
+    state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
+    _, J = data.scaled(state, True)
+    if base.mass_measurement is not None:
+        J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
+    return J[:, -n:]
+
+
+AT_ONCE = 64  # number of changes whose slopes are in memory at a time
+
+
+def bending_slopes(
+    base: Baseline, model: Reduced, data: Data, sets: Sequence[np.ndarray]
+) -> np.ndarray:
+    """∂r/∂a of a·B added to K, with B the bending stiffness of each set of shells (n, n_sets)."""
+    groups, r, m = model.groups, model.vectors.shape[1], len(base.state.lam)
+    dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), 24)
+    out = [np.zeros((len(base.residual), 0))]
+    for k in range(0, len(sets), AT_ONCE):
+        chunk = sets[k : k + AT_ONCE]
+        dK = np.zeros((len(chunk), m, m))
+        for j, shells in enumerate(chunk):
+            V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
+            bent = groups.cubic[shells] @ V.reshape(len(shells), 24, r)
+            dK[j, :r, :r] = V.T @ bent.reshape(-1, r)
+        # stiffness changes no load of a base, and no shapes except those of the modes
+        lost = None if base.state.dissipated is None else base.state.dissipated.held
+        still = replace(base.state, doffset=None, ddrive=None, dmoved={}, dissipated=lost)
+        state = replace(still, dK=dK, dM=np.zeros_like(dK))
+        J = data.scaled(state, True)[1]
+        rest = len(base.residual) - len(J)  # the row of the weighing does not change
+        out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
+    return np.concatenate(out, axis=1)
+
+
+def direction_scores(base: Baseline, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Best amount a of each column c, and its score min_a (r + a c)ᵀ C⁻¹ (r + a c)."""
+    Zc, Zr = base.Z @ columns, base.Z @ base.residual
+    cc = (columns**2).sum(axis=0) - (Zc**2).sum(axis=0)
+    cr = columns.T @ base.residual - Zc.T @ Zr
+    amount = -cr / np.maximum(cc, 1e-12)
+    return amount, base.score(base.residual[:, None])[0] - cr**2 / np.maximum(cc, 1e-12)

@@ -1,0 +1,128 @@
+"""Errors of sensors and force gauges themselves: gain, tilt and place of each.
+
+A model need not explain these errors, and parameters should not adapt to them. They are small,
+independent and of known size, and their effect on log10 H is linear. Let e be the relative error of
+the gain, θ the tilt, x the error of the place, and u, v normal to the direction n = u x v:
+
+d(ln H) = e + (θ_u H_u + θ_v H_v + x_u ∂H/∂u + x_v ∂H/∂v) / H.
+
+H_u is the response along u.  The slopes of the sheet ∂H/∂u = -φ_v, ∂H/∂v = φ_u follow from its
+rotations (w(x + dx) = w + θ × dx · n). The covariance V Vᵀ of the errors is whitened out of the
+residuals before anything is fitted (C = I + V Vᵀ). The five errors of each output come first, one
+channel at a time.  The errors of the inputs follow, which act on all channels.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.modal_sum import modal_sum
+from ..ema.setup import SensorAccuracy
+from ..fem.assemble import Structure
+from ..fem.measured_dofs import MeasuredDofs
+from ..reduced.reduced_model import Reduced, State
+from .discrepancy import Lines
+
+WAYS = 4  # tilts about u and v, places along u and v
+LN10 = np.log(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """Errors of the outputs, or of the inputs.
+
+    Attributes
+    ----------
+    gain : relative standard deviation
+    rows : four (k, n)     motions added by tilts and wrong places, times standard deviations
+    with_base : (4, k, n_in) rigid-body share of these motions under a moving base
+    modal : (4, k, r)      the rows in a basis
+    """
+
+    gain: float
+    rows: tuple[sp.csr_array, ...]
+    with_base: np.ndarray
+    modal: np.ndarray
+
+    def rebased(self, model: Reduced) -> Self:
+        """The rows in the basis of this model."""
+        return replace(self, modal=np.stack([model.rows(rows) for rows in self.rows]))
+
+
+def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy) -> Side:
+    """Errors of all outputs, or of all inputs; a place's own sd, if any, replaces the usual one."""
+    u, v = dofs.across()
+    place, turn = sp.diags_array(np.where(dofs.sd > 0, dofs.sd, known.position)), known.direction
+    rows = (
+        turn * u.rows(built), turn * v.rows(built),
+        place @ v.rows(built, turning=True), place @ u.rows(built, turning=True),
+    )  # fmt: skip
+    still = np.zeros((len(dofs.labels), len(inputs.labels)))
+    with_base = np.stack(
+        [turn * u.moved_with_base(inputs), turn * v.moved_with_base(inputs), still, still]
+    )
+    return Side(known.gain, tuple(map(sp.csr_array, rows)), with_base, np.zeros((WAYS, 0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class SensorErrors:
+    """Errors of all sensors and of all force gauges."""
+
+    outputs: Side
+    inputs: Side
+
+    def rebased(self, model: Reduced) -> Self:
+        """The errors with their rows in the basis of this model."""
+        return replace(self, outputs=self.outputs.rebased(model), inputs=self.inputs.rebased(model))
+
+
+def sensor_errors(
+    outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
+) -> SensorErrors:
+    """Expected errors of sensors and force gauges of this accuracy."""
+    return SensorErrors(side(outputs, inputs, built, known), side(inputs, inputs, built, known))
+
+
+def columns(
+    errors: SensorErrors, data: Lines, state: State, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns d ln H / scale per sd: for each output (5, *H), for the inputs (k, *H)."""
+    H = data.model(state)
+    outputs = _of_outputs(errors.outputs, data, state, H, scale)
+    return outputs, _of_inputs(errors.inputs, data, state, H, scale)
+
+
+def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
+    """Expected |d ln H|² from the sensor errors (n_f, n_out, n_in)."""
+    both = columns(errors, data, state, np.ones(data.values.shape))
+    return np.asarray(sum((np.abs(z) ** 2).sum(axis=0) for z in both))
+
+
+def _of_outputs(
+    errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """Change of the deviation of each output by one sd of each of its errors (5, *H)."""
+    _, phi_i, d = data.modal(state)
+    out = [errors.gain / scale]
+    for modal, with_base in zip(errors.modal, errors.with_base, strict=True):
+        G = modal_sum(modal @ state.phi, d, phi_i)
+        out.append((data.s[:, None, None] ** data.power * G + with_base) / (H * scale))
+    return np.stack(out)
+
+
+def _of_inputs(
+    errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """Change by the errors of each input, zero for other inputs; a moving base has gain alone."""
+    phi_o, phi_i, d = data.modal(state)
+    out = []
+    for i in range(len(phi_i)):
+        one = np.arange(len(phi_i)) == i
+        out.append(errors.gain / scale * one)
+        for modal in errors.modal[:, i] if state.drive is None else ():
+            G = modal_sum(phi_o, d, (modal @ state.phi)[None])
+            z = data.s[:, None, None] ** data.power * G / (H * scale)
+            out.append(z * one)
+    return np.stack(out)

@@ -1,0 +1,1 @@
+"""Reduced model of a structure and its derivatives by the parameters."""

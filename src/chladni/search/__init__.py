@@ -1,0 +1,1 @@
+"""Preparation of a question, search for hypotheses, the answer and its words."""

@@ -1,0 +1,130 @@
+"""Renewal of a fit where the reduced model is no longer accurate."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import ModelError
+from ..fem.modelled import modelled
+from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
+from ..inference.joint_fit import with_priors
+from ..inference.likelihood import Responses
+from ..inference.pole_data import Poles
+from ..reduced.accuracy import LIMIT, Accuracy, accuracy
+from ..reduced.reduced_model import evaluate
+from ..reduced.reduced_problem import reduced_problem
+from .nuisances import measured_on, mesh_hidden, nuisances
+from .preparation import SOLVED, updating_problem
+from .question import Prepared, Question
+
+TRIES = 3  # times the basis is extended by its missing vectors
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """A hypothesis fitted again on a more accurate reduced model.
+
+    Attributes
+    ----------
+    hypothesis : HypothesisFit
+    note : sentence on the error of the reduced model
+    worst : largest remaining relative frequency error
+    """
+
+    hypothesis: HypothesisFit
+    note: str
+    worst: float
+
+    @property
+    def distrust(self) -> tuple[str, ...]:
+        """Reason not to trust the result; empty where the reduced model is accurate enough."""
+        if self.worst <= LIMIT:
+            return ()
+        return (
+            "the frequencies of the reduced model differ from the full model by "
+            f"{self.worst:.2%}, above the limit of {LIMIT:.2%}: do not trust the result; narrow "
+            "the band, or correct the deck first",
+        )
+
+
+def refined(
+    question: Question, prepared: Prepared, hypothesis: HypothesisFit, held: bool = False
+) -> Refinement:
+    """Fit a hypothesis again on an accurate reduced model, and report the model's error.
+
+    Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
+    computed again where the effect changes that structure. Otherwise the basis is extended by its
+    missing vectors until its error is at most ``LIMIT``. All parameters are then fitted again from
+    their last values, or ``held`` at them.
+    """
+    problem = prepared.problem
+    if any(e.remakes_structure for e in hypothesis.effects):
+        problem, hypothesis = _on_new_structure(question, problem, hypothesis)
+    found = _accuracy(problem, hypothesis)
+    note = _said(found)
+    for _ in range(TRIES):
+        if found.serves():
+            break
+        model, begun = found.refined(hypothesis.model), hypothesis.fit
+        data = hypothesis.data.rebased(model)
+        try:
+            if held:
+                state = evaluate(model, begun.effects, begun.x)
+                fit = replace(begun, state=state, data=data)
+            else:
+                fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
+        except ModelError as error:  # the coarse basis hid an impossible structure
+            note = f"{note}; the fit on the refined basis failed: {error}"
+            break
+        hypothesis = replace(hypothesis, fit=fit, model=model)
+        found = _accuracy(problem, hypothesis)
+        note = f"{note}; on the refined basis {found.worst:.2%}"
+    return Refinement(hypothesis, note, found.worst)
+
+
+def _accuracy(problem: UpdatingProblem, hypothesis: HypothesisFit) -> Accuracy:
+    model, fit = hypothesis.model, hypothesis.fit
+    return accuracy(problem.reduced, model, fit.effects, fit.x, problem.setup.f_max)
+
+
+def _said(found: Accuracy) -> str:
+    return (
+        "the frequencies of the reduced model differ from the full model by at most "
+        f"{found.worst:.2%} (limit {LIMIT:.2%})"
+    )
+
+
+def _on_new_structure(
+    question: Question, old: UpdatingProblem, hypothesis: HypothesisFit
+) -> tuple[UpdatingProblem, HypothesisFit]:
+    """Fit a strong change again on a structure that includes it, with the other named effects."""
+    assembly, found = question.assembly, []
+    for effect in hypothesis.effects:
+        x = hypothesis.fit.of(effect)
+        if effect.remakes_structure:
+            assembly, effect = effect.apply(assembly, x), effect.with_reference_state(x)
+        found.append((effect, x))
+    changed = replace(question, assembly=assembly)
+    data, f_max = hypothesis.data, old.setup.f_max
+    assert isinstance(data, (Responses, Poles))
+    model = modelled(changed.searched(changed.assembly), SOLVED * f_max)
+    rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
+    mesh = mesh_hidden(model, f_max, measured_on(changed) if rows else None)
+    reduced = reduced_problem(
+        model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
+        base=question.base,
+    )  # fmt: skip
+    of_test = [e for e in old.nuisance if e.outputs(np.zeros(len(e.parameters))) is not None]
+    fresh = updating_problem(
+        changed,
+        reduced,
+        data.rebased(reduced.model),
+        [*nuisances(reduced, model, mesh, None if rows else f_max), *of_test],
+        f_max,
+    )
+    fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
+    (first, start), *others = found
+    fresh = fresh.holding(others)
+    refined = fresh.fitted_with(first, start, fresh.mean())
+    return fresh, replace(refined, optima=hypothesis.refitted(refined.fit).optima)

@@ -1,0 +1,329 @@
+"""Calibration without new physics: what can be known, many starts, and how sure the result is.
+
+1. Parameters that the data cannot know are frozen at its prior (:mod:`.identifiability`).
+2. The null hypothesis of a diagnosis is fitted: free parameters and all nuisances.
+3. Fits from a Latin hypercube of starts map the basins of the same objective.
+4. The covariance counts the priors of frozen parameters as well.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from ..effects.effect import Effect
+from ..errors import ModelError
+from ..inference.calibration_result import (
+    Basin,
+    CalibrationStudy,
+    Identifiability,
+    LikelihoodProfile,
+    NamedValue,
+    ResponseBand,
+)
+from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted, wide_start
+from ..inference.identifiability import calibration_positions, identifiability, parameter_names
+from ..inference.likelihood import Responses
+from ..inference.map_fit import Fit, MassMeasurement, descend, fit, prior_residuals, unknowns
+from ..inference.pole_data import Poles
+from ..parallel import in_parallel
+from ..progress import Progress, silent, within
+from ..reduced.reduced_model import evaluate
+from .diagnosis import (
+    Diagnosis,
+    best_base_fit,
+    fit_of_the_deck,
+    named_by_fits,
+    nominal_starts,
+    without_effects,
+)
+
+STARTS = 12  # of the Latin hypercube
+BEST = 10  # basins that are reported
+REACH = 0.02  # probability beyond each end of the hypercube: two standard deviations of a prior
+SAME = 1.0  # in -2 ln evidence and in standard deviations: fits as near as that are one basin
+PROFILED = (-2.0, -1.0, 1.0, 2.0)  # standard deviations from the best at which a profile is taken
+BANDS, DRAWS = 4, 60  # channels whose predicted response is kept, and draws of the posterior
+PROFILE_STEPS = 6  # of a fit with one parameter held; it starts where the covariance says
+SEED = 20250102
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A calibration: the problem with its free parameters, the diagnosis without effects."""
+
+    problem: UpdatingProblem
+    diagnosis: Diagnosis
+    study: CalibrationStudy
+
+
+def calibration(
+    problem: UpdatingProblem, progress: Progress = silent, freeze: bool = True,
+    quick: bool = False,
+) -> Calibrated:  # fmt: skip
+    """Fit the calibration parameters that the data can determine; no new physics.
+
+    Parameters
+    ----------
+    freeze : False keeps parameters free that the data do not know; they are named all the same
+    quick : fit from the prior mean alone, without further starts, profiles and bands
+    """
+    progress("identifiability", 0.0)
+    whole, known = problem, identifiability(about_nominal(problem))
+    problem = _without(whole, known.frozen if freeze else ())
+    progress("calibration without new physics", 0.05)
+    problem, null = without_effects(problem)
+    learned = getattr(getattr(null.data, "error", None), "delta", None)
+    if freeze and known.frozen and learned is not None:
+        again = identifiability(about_nominal(whole, learned))
+        if set(again.frozen) < set(known.frozen):  # the error of form is smaller than its prior
+            known = again
+            problem, null = without_effects(_without(whole, known.frozen))
+    nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
+    ends = [] if quick else list(_ends(problem, null, within(progress, 0.3, 0.7)))
+    null = _restarted(problem, null, ends)
+    basins = _basins(null, ends)
+    progress("profiles", 0.75)
+    profiled = () if quick else tuple(profiles(problem, null))
+    predicted = () if quick else tuple(bands(problem, null))
+    null = replace(null, fit=_with_frozen(whole, problem, null))
+    found = Diagnosis(
+        nominal, null, fit_of_the_deck(problem, null), (), notes=tuple(_notes(known, basins, ends))
+    )
+    own = calibration_positions(null.fit.effects)
+    study = CalibrationStudy(
+        known, 0 if quick else STARTS, basins[:BEST], tuple(_names(null.fit)),
+        tuple(null.fit.x[own].tolist()),
+        tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
+        profiled, predicted,
+    )  # fmt: skip
+    return Calibrated(problem, named_by_fits(problem, found), study)
+
+
+def about_nominal(problem: UpdatingProblem, delta: float | None = None) -> UpdatingProblem:
+    """The problem with errors of form about the nominal state, of the median of their prior."""
+    if not isinstance(problem.data, Responses):
+        return problem
+    state = evaluate(problem.reduced.model, problem.base, problem.mean(), False)
+    problem = problem.allowing_errors(state)
+    data = problem.data
+    assert isinstance(data, Responses)
+    assert data.error is not None
+    error = data.error.with_delta(data.error.prior.median if delta is None else delta)
+    return replace(problem, data=replace(data, error=error))
+
+
+def _without(problem: UpdatingProblem, frozen: Sequence[str]) -> UpdatingProblem:
+    """The problem without the frozen parameters, which keep their prior means."""
+    kept = tuple(e for e in problem.base if not _frozen(e, frozen))
+    return replace(problem, base=kept)
+
+
+def _frozen(effect: Effect, frozen: Sequence[str]) -> bool:
+    names = parameter_names([effect])
+    return effect.kind == "calibration" and bool(names) and all(n in frozen for n in names)
+
+
+def _with_frozen(whole: UpdatingProblem, problem: UpdatingProblem, null: HypothesisFit) -> Fit:
+    """The fit with a covariance that counts the priors of frozen parameters.
+
+    H = [[H_ff, H_fz], [H_zf, ·]] is the information of data and priors.  Frozen parameters z move
+    the fit by -G z, G = H_ff⁻¹ H_fz.  With their prior covariance P, C = H_ff⁻¹ + G P Gᵀ
+    (Tapley, Schutz and Born 2004, Statistical Orbit Determination, ch. 6: consider covariance).
+    """
+    found = null.fit
+    frozen = [e for e in whole.base if e not in problem.base]
+    if not frozen:
+        return found
+    effects = [*found.effects, *frozen]
+    z = unknowns(frozen)
+    x = np.concatenate([found.x, [p.mean for p in z]])
+    state = evaluate(null.model, effects, x)
+    J = found.data.residual(state, True)[1]
+    J = np.concatenate([J, prior_residuals(effects, whole.mass_measurement, x, state)[1]])
+    n = len(found.x)
+    moved = np.linalg.solve(J[:, :n].T @ J[:, :n], J[:, :n].T @ J[:, n:])
+    spread = moved * [p.sd for p in z]
+    return replace(found, covariance=found.covariance + spread @ spread.T)
+
+
+def latin_hypercube(problem: UpdatingProblem, count: int = STARTS) -> list[np.ndarray]:
+    """Starts that fill the priors of the calibration parameters evenly, the rest at its mean.
+
+    McKay, Beckman and Conover (1979), Technometrics 21, 239-245; a fixed seed.
+    """
+    own, every = calibration_positions(problem.base), unknowns(problem.base)
+    if not len(own):
+        return []
+    u = qmc.LatinHypercube(len(own), seed=SEED).random(count)
+    z = ndtri(REACH + (1 - 2 * REACH) * u)
+    out = np.tile(problem.mean(), (count, 1))
+    out[:, own] += z * [every[k].sd for k in own]
+    return list(out)
+
+
+def _ends(problem: UpdatingProblem, null: HypothesisFit, progress: Progress) -> Iterator[Fit]:
+    """Fits from every start to the same likelihood; a start that is no structure has none."""
+    model, mass, starts = null.model, problem.mass_measurement, latin_hypercube(problem)
+    data = null.data
+
+    def one(x: np.ndarray) -> Fit | None:
+        try:
+            if isinstance(data, Poles):
+                return fitted(model, problem.base, problem.data, mass, x)
+            begun = wide_start(model, problem.base, problem.data, mass, x)
+            return fit(model, problem.base, data, mass, begun).kept()
+        except ModelError:
+            return None
+
+    for k, end in enumerate(in_parallel(one, starts)):
+        progress(f"start {k + 1} of {len(starts)}", (k + 1) / len(starts))
+        if end is not None:
+            yield end
+
+
+def _restarted(problem: UpdatingProblem, null: HypothesisFit, ends: Sequence[Fit]) -> HypothesisFit:
+    """The null, or the fit from the best start where that is better."""
+    best = min(ends, key=lambda f: f.neg2_log_evidence, default=null.fit)
+    if best.neg2_log_evidence > null.fit.neg2_log_evidence - SAME:
+        return null
+    again = best_base_fit(problem, problem.base, [best.x])
+    return min((null, again), key=lambda t: t.neg2_log_evidence)
+
+
+def _basins(null: HypothesisFit, ends: Sequence[Fit]) -> tuple[Basin, ...]:
+    """The ends that are one place together, best first."""
+    own = calibration_positions(null.fit.effects)
+    if not len(own):
+        return ()
+    sd = np.sqrt(np.diag(null.fit.covariance)[own])
+    basins: list[list[Fit]] = []
+    for end in sorted(ends, key=lambda f: f.neg2_log_evidence):
+        for basin in basins:
+            apart = np.abs(end.x[own] - basin[0].x[own]) / sd
+            if apart.max() < SAME and end.neg2_log_evidence < basin[0].neg2_log_evidence + SAME:
+                basin.append(end)
+                break
+        else:
+            basins.append([end])
+    return tuple(
+        Basin(
+            b[0].neg2_log_evidence - basins[0][0].neg2_log_evidence, len(b),
+            tuple(_values(null.fit.effects, b[0].x)),
+        )
+        for b in basins
+    )  # fmt: skip
+
+
+def _names(found: Fit) -> list[str]:
+    return parameter_names([e for e in found.effects if e.kind == "calibration"])
+
+
+def _values(effects: Sequence[Effect], x: np.ndarray) -> Iterator[NamedValue]:
+    """Physical values of the calibration parameters."""
+    names = iter(parameter_names([e for e in effects if e.kind == "calibration"]))
+    at = 0
+    for effect in effects:
+        own = x[at : at + len(effect.parameters)]
+        at += len(effect.parameters)
+        if effect.kind != "calibration":
+            continue
+        rows = effect.reported(own, np.array([p.sd for p in effect.parameters]))
+        for k, p in enumerate(effect.parameters):
+            value, unit = (
+                (rows[k].value, rows[k].unit) if k < len(rows) else (p.value(own[k]), p.unit)
+            )
+            yield NamedValue(next(names), float(value), unit, float(own[k]))
+
+
+def _notes(known: Identifiability, basins: Sequence[Basin], ends: Sequence[Fit]) -> Iterator[str]:
+    """Sentences on what was frozen and on how many starts agree."""
+    for p in known.parameters:
+        if p.frozen:
+            yield f"frozen at the deck's value: {p.why}"
+    if basins:
+        yield (
+            f"{basins[0].starts} of {len(ends)} starts of a Latin hypercube ended in the best "
+            "basin: within 1 of its -2 ln evidence and one standard deviation of its parameters"
+        )
+
+
+def profiles(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[LikelihoodProfile]:
+    """LikelihoodProfile likelihood of every free calibration parameter, all others fitted again.
+
+    Raue et al. (2009), Bioinformatics 25, 1923-1929.  The prior of the parameter itself is left
+    out; those of all others stay, and frozen parameters are held.
+    """
+    found, mass = null.fit, problem.mass_measurement
+    own, every = calibration_positions(found.effects), unknowns(found.effects)
+    tasks = [(int(k), z) for k in own for z in (0.0, *PROFILED)]
+    costs = list(in_parallel(lambda task: _held_cost(null, mass, *task), tasks))
+    for n, k in enumerate(own):
+        p, sd = every[k], float(np.sqrt(found.covariance[k, k]))
+        best, *each = costs[n * (1 + len(PROFILED)) : (n + 1) * (1 + len(PROFILED))]
+        away = sd * np.array(PROFILED)
+        prior = (found.x[k] + away - p.mean) ** 2 - (found.x[k] - p.mean) ** 2
+        at = [list(_values(found.effects, found.x + d * (np.arange(len(found.x)) == k)))[n]
+              for d in away]  # fmt: skip
+        data = max(1 / sd**2 - 1 / p.sd**2, 0.0)
+        yield LikelihoodProfile(
+            at[0].name, at[0].unit, tuple(v.value for v in at),
+            tuple((np.array(each) - best - prior / p.sd**2).tolist()),
+            tuple((data * away**2).tolist()),
+        )  # fmt: skip
+
+
+def _held_cost(null: HypothesisFit, mass: MassMeasurement | None, k: int, z: float) -> float:
+    """-2 ln posterior, parameter k held z deviations from its fit; inf where it is no structure."""
+    found, model = null.fit, null.model
+    rest = np.arange(len(found.x)) != k
+    sd = np.sqrt(found.covariance[k, k])
+    held = found.x[k] + z * sd
+
+    def objective(y: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, None]:
+        x = np.empty(len(rest))
+        x[rest], x[k] = y, held
+        state = evaluate(model, found.effects, x, gradient)
+        r, J = found.data.residual(state, gradient)
+        r0, J0 = prior_residuals(found.effects, mass, x, state)
+        return np.append(r, r0), np.concatenate([J, J0])[:, rest] if gradient else J, None
+
+    start = found.x[rest] + z * found.covariance[rest, k] / sd
+    limit = np.array([p.step for p in unknowns(found.effects)])[rest]
+    try:
+        r = descend(objective, start, limit, PROFILE_STEPS, 0.05)[1]
+    except ModelError:
+        return float("inf")
+    return float(r @ r)
+
+
+def bands(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[ResponseBand]:
+    """90 % bands of the responses over draws of the posterior, of held-out channels first.
+
+    Parameters and nuisances are drawn together from their Gaussian posterior, frozen parameters
+    held: what these could change, the free ones undo in the responses.
+    """
+    data, found = null.data, null.fit
+    if not isinstance(data, Responses):
+        return
+    held = np.asarray(~data.use.any(axis=0))
+    order = np.argsort(~held, kind="stable")[:BANDS]
+    root = np.linalg.cholesky((found.covariance + found.covariance.T) / 2)
+    rng = np.random.default_rng(SEED)
+    draws = []
+    for _ in range(DRAWS):
+        with suppress(ModelError):
+            x = found.x + root @ rng.normal(size=len(found.x))
+            deviation = data.deviation(evaluate(null.model, found.effects, x, False))
+            draws.append(np.abs(data.values * 10**deviation)[:, order, 0])
+    if not draws:
+        return
+    low, high = np.quantile(draws, (0.05, 0.95), axis=0)
+    f, measured = data.s.imag / (2 * np.pi), np.abs(data.values[..., 0])
+    for n, k in enumerate(order):
+        columns = (f, measured[:, k], low[:, n], high[:, n])
+        label = problem.labels[k] if k < len(problem.labels) else f"channel {k + 1}"
+        yield ResponseBand(label, bool(held[k]), *(tuple(c.tolist()) for c in columns))

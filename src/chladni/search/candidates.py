@@ -1,0 +1,306 @@
+"""The most promising of every family of effects, and the services by which families find them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from ..effects.effect import Effect
+from ..effects.effect_context import EffectContext, ElementGrids
+from ..effects.joints import Connection
+from ..effects.search_context import APART, Candidate
+from ..errors import ModelError
+from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
+from ..inference.likelihood import Responses
+from ..inference.pole_data import Poles
+from ..inference.scan import (
+    Baseline,
+    baseline,
+    bending_slopes,
+    direction_scores,
+    field_slopes,
+    oscillator_scores,
+    point_scores,
+)
+from ..parallel import in_parallel
+from ..reduced.reduced_model import evaluate
+from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
+from .pole_starts import global_starts
+
+WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
+
+
+def candidates(
+    problem: UpdatingProblem, null: HypothesisFit, most: int | None = None
+) -> list[Candidate]:
+    """The most promising of every family, scanned about the nominal and the calibrated model.
+
+    Parameters
+    ----------
+    most : so many of them alone, those that score best where they begin
+    """
+    context = UpdatingContext(problem, null).ready()
+    every = [
+        c
+        for proposed in in_parallel(lambda family: family.proposed(context), problem.families)
+        for c in proposed
+        if not already_there(problem, c.effect, c.start)
+    ]
+    return every if most is None else _leading(context, every, most)
+
+
+def already_there(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
+    """True if an effect at x is in every fit already: freed by the user, or found before."""
+    found = [e for e, _ in problem.found]
+    free = {e.text for e in problem.base if e not in found}
+    return effect.text in free or repeats(problem, effect, x)
+
+
+def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
+    """True if an effect at x was found already, or acts at the place of a found effect.
+
+    Two local effects at one place are one effect outside the catalogue. A patch with sharp edges,
+    for example, was named as a thinning, a crack and a mass, and each improved the fit. Several
+    flexible effects of one kind are excluded too: a rotor was named as two masses on springs.
+    """
+    if effect.lone and any(other.name == effect.name for other, _ in problem.found):
+        return True
+    reach = APART * float(np.linalg.norm(np.ptp(problem.where.grids.point, axis=0)))
+    mine = effect.location(x)
+    for other, at in problem.found:
+        its = other.location(at)
+        if mine.point_m is not None and its.point_m is not None:
+            if np.linalg.norm(np.subtract(mine.point_m, its.point_m)) < reach:
+                return True
+        elif other.name == effect.name and mine.channels == its.channels:
+            whole = effect.remakes_structure and set(effect.parts) & set(other.parts)
+            if mine.channels or mine.text == its.text or whole:
+                return True
+    return False
+
+
+def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> list[Candidate]:
+    """Candidates with the best scores at their start, less the price of the places tried."""
+    price = [2 * float(np.log(c.effect.trials_factor)) for c in every]
+    score = [
+        float(context.scores(c.effect, [c.start]).min()) + _prior(c.effect, c.start) + p
+        for c, p in zip(every, price, strict=True)
+    ]
+    return [every[k] for k in np.argsort(score, kind="stable")[:most]]
+
+
+def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
+    """Effects not searched on a structure of beams, and why; empty if it has shells."""
+    if problem.where.groups.sheet.any():
+        return ()
+    names = ", ".join(family.name for family in problem.families if family.on_sheets)
+    said = f"not searched, because they act on shells and the deck has none: {names}"
+    return (
+        *([said] if names else []),
+        "compliance of a joint where beams share a grid is not searched, because no element "
+        "models it; bushes between beams are searched",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class UpdatingContext:
+    """An updating problem as families of effects see it.
+
+    See :class:`..effects.search_context.SearchContext`. With ``about`` (n_base,) the last of the
+    states that are changed is another than that of the null.
+    """
+
+    problem: UpdatingProblem
+    null_fit: HypothesisFit  # the best without any effect
+    about: np.ndarray | None = None
+
+    @property
+    def where(self) -> EffectContext:
+        """The structure and its test."""
+        return self.problem.where
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Outputs of the test."""
+        return self.problem.labels
+
+    @cached_property
+    def bases(self) -> tuple[np.ndarray, ...]:
+        """Base parameters of the nominal and of the calibrated model, scatter idle in both."""
+        nominal = self.problem.mean()
+        if self.about is not None:
+            return nominal, self.about
+        found = [e for e, _ in self.problem.found]
+        kinds = [
+            e.kind == "calibration" or e in found for e in self.problem.base for _ in e.parameters
+        ]
+        return nominal, np.where(kinds, self.null_fit.fit.x, nominal)
+
+    @property
+    def null(self) -> np.ndarray:
+        """Base parameters of the best fit without any effect."""
+        return self.null_fit.fit.x
+
+    @cached_property
+    def baselines(self) -> tuple[Baseline, ...]:
+        """The base effects linearised at each of ``bases``."""
+        s = self.problem
+        return tuple(
+            baseline(s.reduced.model, s.base, s.data, s.mass_measurement, x) for x in self.bases
+        )
+
+    @property
+    def weighs_more(self) -> float:
+        """Weighed mass minus nominal mass [kg]; 0 if nothing was weighed."""
+        weighed = self.problem.mass_measurement
+        if weighed is None or self.scan is None:
+            return 0.0
+        return weighed.mass - self.baselines[0].state.weight
+
+    @cached_property
+    def scan(self) -> "Scan | None":
+        """Fast scores; None where only natural frequencies are known."""
+        data = self.problem.data
+        return Scan(self, data) if isinstance(data, Responses) else None
+
+    @cached_property
+    def loosened(self) -> tuple[Loosened, ...]:
+        """Welds and fasteners with what the sheets give where they are loaded."""
+        return singles(self.loosened_rows)
+
+    @cached_property
+    def loosened_rows(self) -> tuple[LoosenedRow, ...]:
+        """Loosened joints, grouped by their lines."""
+        return loosened_rows(self.problem.reduced)
+
+    def ready(self) -> Self:
+        """A copy with the data of most families computed, before families are tried in parallel."""
+        if self.scan is not None:
+            _ = self.baselines, self.scan.flexibility, self.loosened
+        return self
+
+    @property
+    def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
+        """Welds and fasteners of the structure; of each the share z/(w + z) of its rows (r,)."""
+        return tuple((each.joint, each.share) for each in self.loosened)
+
+    def scores(
+        self, effect: Effect, starts: Sequence[np.ndarray], extended: bool = False, about: int = -1
+    ) -> np.ndarray:
+        """Score of an effect at each start about one of ``bases`` (n_ways, n_starts).
+
+        Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
+        """
+        base, reduced = self.baselines[about], self.problem.reduced
+        wider = extended or effect.release is not None
+        widened = reduced.model_for if wider else reduced.model.split_for
+        model = widened(effect, starts[0])
+        data = self.problem.data.rebased(model)
+        ways = WIDE if isinstance(data, Poles) else (0.0,)
+        out = np.full((len(ways), len(starts)), np.inf)
+        for k, start in enumerate(starts):
+            x = np.concatenate([base.x, start])
+            try:
+                state = evaluate(model, [*base.effects, effect], x, False)
+            except ModelError:
+                continue
+            if isinstance(data, Poles):
+                prior = _prior(effect, start)
+                for scale_index, scale in enumerate(ways):
+                    r, _ = replace(data, scale=scale).residual(state, False)
+                    out[scale_index, k] = r @ r + prior
+            else:
+                r, _ = data.scaled(state, False)
+                out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
+        return out
+
+    def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
+        base, model = self.baselines[-1], self.problem.reduced.model
+        state = evaluate(model, base.effects, base.x, False)
+        terms = effect.matrices(x)
+        return state.lam, np.array(
+            [state.phi.T @ model.operator(t.operator) @ state.phi for t in terms]
+        )
+
+    def optima(self, effect: Effect) -> list[np.ndarray]:
+        """Lowest minima of an effect over its whole prior, where poles alone are known."""
+        return global_starts(self.problem, effect)
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Scores of many changes at once (:class:`..effects.search_context.ResponseScan`)."""
+
+    context: UpdatingContext
+    data: Responses
+
+    @cached_property
+    def flexibility(self) -> np.ndarray:
+        """Static response of the places beyond the basis [m/N]."""
+        return self.context.problem.reduced.flexibility(self.context.where.places)
+
+    @cached_property
+    def deviation(self) -> np.ndarray:
+        """log10(H_model / H_test) of the best fit without any effect, on the lines in use."""
+        return self.data.deviation(self.context.null_fit.fit.state)[self.data.use.any(axis=1)]
+
+    def point_scores(
+        self, about: int, matrix: str, strengths: np.ndarray, places: ElementGrids | None = None
+    ) -> np.ndarray:
+        """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
+        reduced = self.context.problem.reduced
+        rest = self.flexibility if places is None else reduced.flexibility(places)
+        places = self.context.where.places if places is None else places
+        base = self.context.baselines[about]
+        return point_scores(base, reduced.model, self.data, places, matrix, strengths, rest)
+
+    def oscillator_scores(
+        self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz)."""
+        reduced, base = self.context.problem.reduced, self.context.baselines[about]
+        rest = reduced.flexibility(places)
+        return oscillator_scores(base, reduced.model, self.data, places, mass, hertz, rest)
+
+    def field_scores(
+        self, about: int, field: str, change: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
+        base = self.context.baselines[about]
+        slopes = field_slopes(base, self.context.problem.reduced.model, self.data, field)
+        return direction_scores(base, slopes @ change)
+
+    def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
+        """Score of each fastener with some of its stiffness left (n, k)."""
+        context, base = self.context, self.context.baselines[about]
+        reduced = context.problem.reduced
+        return fastener_scores(base, reduced, self.data, context.loosened, left)
+
+    @property
+    def fastener_rows(self) -> tuple[LoosenedRow, ...]:
+        """Adjacent fasteners, any run of which may be loosened as one."""
+        return self.context.loosened_rows
+
+    def run_scores(
+        self, about: int, row: int, first: int, last: int, left: np.ndarray
+    ) -> np.ndarray:
+        """Score of a run of a row with some of its stiffness left (k,)."""
+        base, run = self.context.baselines[about], self.fastener_rows[row].run(first, last)
+        return fastener_scores(base, self.context.problem.reduced, self.data, [run], left[None])[0]
+
+    def bending_scores(
+        self, about: int, sets: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,)."""
+        base = self.context.baselines[about]
+        slopes = bending_slopes(base, self.context.problem.reduced.model, self.data, sets)
+        return direction_scores(base, slopes)
+
+
+def _prior(effect: Effect, x: np.ndarray) -> float:
+    """((x - μ)/σ)² over the effect's parameters."""
+    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
+    return float((((x - mean) / sd) ** 2).sum())

@@ -1,0 +1,112 @@
+"""Signs that calibrated values compensate for something that the model lacks.
+
+There are three: the fit predicts held-out data worse than the deck did; it leaves the weighed mass
+by more than the error of the weighing; it ends on a bound of what a value can be.
+"""
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+
+from ..effects.effect import Effect
+from ..inference.implausible_values import implausible_values
+from ..inference.map_fit import APART, Fit, MassMeasurement
+from ..inference.residual_localisation import ResidualLocalisation
+from ..inference.result import Agreement, MassComparison
+from .result_parts import foretells_worse
+
+LEAST = 0.005  # smaller changes of ln mass and stiffness are not named
+BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0}  # powers in the bending stiffness of a part
+
+
+class Scored(Protocol):
+    """A result with its scores, its mass and the place of what it leaves."""
+
+    @property
+    def agreement(self) -> Agreement | None:
+        """Scores on fitted and held-out data."""
+
+    @property
+    def mass(self) -> MassComparison | None:
+        """Weighed and calibrated mass."""
+
+    @property
+    def residual_localisation(self) -> ResidualLocalisation | None:
+        """Where a local change would still gain."""
+
+
+def compensating(fit: Fit, result: Scored, weighed: MassMeasurement | None) -> tuple[str, ...]:
+    """Reasons why a calibration compensates, and what it stands for; empty where it does not.
+
+    Parameters
+    ----------
+    fit : of the deck that is written
+    """
+    reasons = (
+        *foretells_worse(result.agreement), *_leaves_the_scales(result.mass, weighed),
+        *implausible_values(fit),
+    )  # fmt: skip
+    spot = result.residual_localisation
+    place = "" if spot is None or not spot.parts else f"on {', '.join(spot.parts[:2])}"
+    return (*reasons, _stands_for(fit, place)) if reasons else ()
+
+
+def _leaves_the_scales(
+    mass: MassComparison | None, weighed: MassMeasurement | None
+) -> Iterator[str]:
+    if mass is None or mass.model_kg is None or mass.weighed_kg is None or weighed is None:
+        return
+    off = mass.model_kg - mass.weighed_kg
+    if abs(off) > APART * weighed.sd:
+        yield (
+            f"the calibrated deck weighs {mass.model_kg:.4g} kg, {abs(off):.2g} kg "
+            f"{'more' if off > 0 else 'less'} than the article, which is known to "
+            f"{weighed.sd:.2g} kg: density or thickness stand for something else"
+        )
+
+
+def _stands_for(fit: Fit, place: str) -> str:
+    """The changes of each part in the words of mass and stiffness."""
+    stiff: dict[str, float] = {}
+    heavy: dict[str, float] = {}
+    for effect in filter(_is_factor, fit.effects):
+        name, change = effect.parameters[0].name, _log_change(effect, fit.of(effect))
+        where = ", ".join(effect.parts) or "the joints"
+        stiff[where] = stiff.get(where, 0.0) + BENDING.get(name, 0.0) * change
+        heavy[where] = heavy.get(where, 0.0) + (name in ("rho", "t", "wall")) * change
+    said = [
+        f"{where} {' and '.join(words)}"
+        for where in stiff
+        if (words := [*_more(stiff[where], "stiffer", "softer"),
+                      *_more(heavy[where], "heavier", "lighter")])
+    ]  # fmt: skip
+    if not said:
+        return (
+            "the deck keeps its values, as no others fit better on its mesh: refine the mesh, or "
+            "look for what is missing with `chladni diagnose`"
+        )
+    changes = "; ".join(said)
+    left = f"; what it leaves is largest {place}" if place else ""
+    return (
+        f"the calibration is compensating: it stands for what makes {changes}{left}; `chladni "
+        "diagnose` says which effect does this"
+    )
+
+
+def _is_factor(effect: Effect) -> bool:
+    """True for one factor on a value of the deck."""
+    single = effect.kind == "calibration" and len(effect.parameters) == 1
+    return single and effect.parameters[0].kind == "log"
+
+
+def _log_change(effect: Effect, x: np.ndarray) -> float:
+    """Ln of the fitted value over the deck's."""
+    row, p = effect.reported(x, np.zeros(1) + effect.parameters[0].sd)[0], effect.parameters[0]
+    return float(np.log(row.value / p.value(p.nominal)))
+
+
+def _more(change: float, up: str, down: str) -> Iterator[str]:
+    """A change of more than half a per cent in words."""
+    if abs(change) > LEAST:
+        yield f"{abs(np.expm1(change)):.1%} {up if change > 0 else down}"

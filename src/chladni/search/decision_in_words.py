@@ -1,0 +1,294 @@
+"""Sentences of a decision: the only module that puts its reasons into English."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ..decision.hypothesis_table import Row, SetRow, Votes, after, refined
+from ..decision.reasons import ALONE, Decision, Reason, Step
+from ..effects.registry import family
+from ..ema.odds import evidence_in_words
+from ..inference.adequacy import FitTest
+from .deciding import Measured, numbers
+from .diagnosis import Diagnosis
+from .question import Prepared
+
+UNEXPLAINED = "; nothing in the catalogue explains the recording"
+REFUSED = {
+    Reason.AGAINST: "the held-out data speak against it",
+    Reason.TOO_LITTLE: "all data together give too little evidence",
+    Reason.WORSE: "the deck with it fits the held-out data worse",
+    Reason.LEAVES_MORE: "it leaves more than it explains",
+    Reason.BARELY_FITS: "the fit is only just good enough, and one effect alone does not fit",
+    Reason.REFUTED: "the leader explains far more, although it is refused itself",
+}
+DATA = {Reason.ALL_DATA: "all data", Reason.WHAT_WAS_FITTED: "the fitted data"}
+
+
+def concluded(
+    prepared: Prepared, found: Diagnosis, decision: Decision, known: Measured
+) -> tuple[Diagnosis, tuple[str, ...]]:
+    """The diagnosis that follows from a decision, and reasons not to trust it."""
+    words = DecisionWords(prepared, decision, known)
+    first = decision.order[0] if decision.order else ""
+    whole, notes = decision.whole, (*found.notes, *words.sentences())
+    settled = words.settled() if decision.named else ""
+    said = replace(
+        found, verdict=decision.verdict, notes=notes,
+        hypotheses=tuple(known.fits[k] for k in decision.order),
+        adequacy=words.test(),
+        one_of=(*decision.one_of, settled) if settled else decision.one_of,
+        gains=whole.gains if decision.named and whole else (),
+        refused=words.refusal(words.row(first).name, decision.reason) if decision.refused else "",
+        passed_over=tuple((name, words.refusal(name, why)) for name, why in decision.passed_over),
+    )  # fmt: skip
+    if not decision.named:
+        return replace(said, plain=numbers(prepared, found, known, decision.deck)), ()
+    distrust = (r.distrust for k, r in known.refinements.items() if refined(k) == first)
+    return replace(said, written=known.written[first]), next(distrust, ())
+
+
+@dataclass(frozen=True, eq=False)
+class DecisionWords:
+    """The sentences of a decision and of the fits that were made for it."""
+
+    prepared: Prepared
+    decision: Decision
+    known: Measured
+
+    def sentences(self) -> tuple[str, ...]:
+        """One sentence for every step that has something to report."""
+        every = (_SENTENCES[s.reason](self, s) for s in self.decision.steps)
+        return tuple(text for text in every if text)
+
+    def row(self, key: str) -> Row:
+        """A row of the table."""
+        return self.known.table.rows[key]
+
+    def gain(self, key: str) -> float:
+        """Gain of a row over calibration alone, in -2 ln evidence."""
+        return self.known.table.gain(self.row(key))
+
+    def whole(self, step: Step) -> SetRow:
+        """The set that a step is about."""
+        return next(s for s in self.known.table.sets if s.key == step.key)
+
+    def test(self) -> FitTest | None:
+        """The absolute test: that of the tested row, or the evidence that refutes calibration."""
+        if self.decision.refuting is None:
+            return self.known.tests.get(self.decision.tested or "")
+        step = next(s for s in self.decision.steps if s.reason is self.decision.refuting[0])
+        return FitTest(False, self.decision.refuting[1], self._refuting(step), self._text(step.key))
+
+    def refusal(self, name: str, why: Reason) -> str:
+        """Reason why a hypothesis is not named."""
+        tests = self.known.tests
+        if why is Reason.TOO_FEW:
+            return self.prepared.too_little
+        if why is Reason.NOT_FITTED:
+            return f"it could not be fitted again: {self.known.failed[name]}"
+        if why is Reason.DAMPING:
+            return next(t.what for k, t in tests.items() if k.startswith(after(refined(name), "")))
+        if why is Reason.UNFIT:
+            test = tests.get(refined(name)) or tests[name]
+            return f"its residual is not explained: {test.what}"
+        return REFUSED[why]
+
+    def settled(self) -> str:
+        """Measurements that would separate the explanations that these data cannot separate."""
+        return settled_by(self.decision.one_of)
+
+    def _text(self, key: str) -> str:
+        return self.known.fits[key].effect.text
+
+    def _tested(self, step: Step) -> str:
+        test, name = self.known.tests.get(step.key), self.row(step.key).name or ALONE
+        if test is None:
+            return ""
+        note = (
+            f"{test.p:.0%} of recordings drawn from the model fit no better than {name}: "
+            f"{test.what}"
+        )
+        if test.passes:
+            return note
+        last = step.key == self.decision.tested and not self.decision.named
+        return f"{note}, {test.where}{UNEXPLAINED if last else ''}"
+
+    def _refined(self, step: Step) -> str:
+        refinement = self.known.refinements.get(step.key)
+        return "" if refinement is None else refinement.note
+
+    def _too_few(self, step: Step) -> str:
+        return (
+            f"{self.prepared.too_little}; these explain the data, which cannot distinguish them: "
+            f"{', '.join(step.names)}; more modes, or more sensors of known gain, would separate "
+            "them"
+        )
+
+    def _supported_by_all(self, step: Step) -> str:
+        row, data = self.row(step.key), "poles" if self.known.table.poles else "data"
+        return (
+            f"{row.name} gained {self.gain(step.key):.1f} in -2 ln evidence on the {data} that "
+            f"were fitted, and {row.held_out_votes().news:.1f} on the held-out data: together "
+            f"more than the required {self.decision.due:.0f}"
+        )
+
+    def _held_out(self, step: Step) -> str:
+        row = self.row(step.key)
+        return f"{row.name} on held-out data: {votes_in_words(row.held_out_votes())}"
+
+    def _refused(self, step: Step) -> str:
+        row = self.row(step.key)
+        left = row.leaves()
+        (seen, seen_with), (held, held_with) = left.fitted, left.held_out
+        return (
+            f"{row.name} gained {self.gain(step.key):.0f} in -2 ln evidence, but "
+            f"{REFUSED[step.reason]} ({votes_in_words(row.held_out_votes())}; held-out Q "
+            f"{held:.3g} calibrated, {held_with:.3g} with it; fitted Q {seen:.3g} and "
+            f"{seen_with:.3g}), so it is not named"
+        )
+
+    def _refuting(self, step: Step) -> str:
+        row, gain = self.row(step.key), self.gain(step.key)
+        if step.reason is Reason.ALL_DATA:
+            gain += row.held_out_votes().news
+        assert step.why is not None
+        return (
+            f"{DATA[step.reason]}: {evidence_in_words(gain / 2)} for {row.name} compared with "
+            f"calibration alone; but {REFUSED[step.why]}"
+        )
+
+    def _unexplained(self, step: Step) -> str:
+        open_ = step.names or self.decision.named
+        text = f"{self._refuting(step)}, {self._text(step.key)}"
+        return text if open_ else f"{text}{UNEXPLAINED}"
+
+    def _found_together(self, step: Step) -> str:
+        s = self.whole(step)
+        gains = ", ".join(f"{n} {g:.0f}" for n, g in zip(s.members, s.gains, strict=True))
+        return (
+            f"{' and '.join(s.members)} explain the recording together; with the others in place "
+            f"each gains in -2 ln evidence: {gains} (required: {s.due:.0f})"
+        )
+
+    def _held_out_of_set(self, step: Step) -> str:
+        s = self.whole(step)
+        others = " and ".join(n for k, n in enumerate(s.members) if k != step.member)
+        said = votes_in_words(self.row(s.member(step.member)).held_out_votes())
+        return f"{s.members[step.member]} added to {others}, on held-out data: {said}"
+
+    def _set_refused(self, step: Step) -> str:
+        assert step.why is not None
+        if step.why is Reason.NOT_SUPPORTED:
+            why = f"that is too little for {self._held_out_of_set(step)}"
+        elif step.why is Reason.UNFIT:
+            why = f"the residual is not explained: {self.known.tests[refined(step.key)].what}"
+        else:
+            why = REFUSED[step.why]
+        return f"{self._found_together(step)}; but {why}"
+
+    def _perhaps_of_set(self, step: Step) -> str:
+        s, k = self.whole(step), step.member
+        return (
+            f"with {' and '.join(step.names)} in place {s.members[k]} gains {s.gains[k]:.0f} of "
+            f"the required {s.due:.0f} in -2 ln evidence: it may be present too"
+        )
+
+    def _rival_of_member(self, step: Step) -> str:
+        alternatives = self.whole(step).alternatives[step.member]
+        behind = ", ".join(f"{r.name} by {r.behind:.0f}" for r in alternatives)
+        note = (
+            f"with the others in place these data do not distinguish {step.names[0]} from the "
+            f"next ones, which are behind in -2 ln evidence: {behind}"
+        )
+        odd = [needs_impossible(r.name, r.implausible) for r in alternatives if r.implausible]
+        return _with_check("; ".join([note, *odd]), step.names)
+
+    def _usual_left(self, step: Step) -> str:
+        return (
+            f"{self.row(step.key).name} leaves more than it explains, but no more than form "
+            "errors of models usually leave: a smaller effect may be missing too"
+        )
+
+    def _next(self, step: Step) -> str:
+        (before,), name = step.names, self.row(step.key).name
+        assert step.why is not None
+        return f"{before} is refused: {self.refusal(before, step.why)}; {name} is next"
+
+    def _tied(self, step: Step) -> str:
+        best = self.row(step.key)
+        each = {self.row(k).name: k for k in self.decision.order}
+        first, *others = step.names
+        gap = {n: self.row(each[n]).neg2_log_evidence - best.neg2_log_evidence for n in others}
+        odds = "; ".join(f"{evidence_in_words(gap[n] / 2)} against {n}" for n in others)
+        known = [(n, self.known.fits[k]) for n, k in each.items() if n in step.names]
+        odd = [(n, t.effect.implausible(t.fit.of(t.effect))) for n, t in known]
+        note = f"these data do not distinguish {first} from the others: {odds}"
+        impossible = [needs_impossible(n, why) for n, why in odd if why]
+        return _with_check("; ".join([note, *impossible]), step.names)
+
+    def _doubt(self, step: Step) -> str:
+        name = self.row(step.key).name
+        note = (
+            f"{name} explains the recording better than calibration alone, by "
+            f"{self.gain(step.key):.1f} in -2 ln evidence; {self.decision.due:.0f} are required "
+            "to name it: neither is certain"
+        )
+        return _with_check(note, (name,))
+
+    def _deck_stays(self, step: Step) -> str:
+        note = "the deck keeps its numbers: no plausible calibrated values fit better"
+        test = self.test()
+        if self.decision.one_of or (test is not None and not test.passes):
+            return note
+        return f"{note}; the residual comes from mesh, joints and scatter"
+
+
+_SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
+    Reason.TESTED: DecisionWords._tested,
+    Reason.RENEWED: DecisionWords._refined,
+    Reason.TOO_FEW: DecisionWords._too_few,
+    Reason.SUPPORTED_BY_ALL: DecisionWords._supported_by_all,
+    Reason.HELD_OUT: DecisionWords._held_out,
+    Reason.AGAINST: DecisionWords._refused,
+    Reason.TOO_LITTLE: DecisionWords._refused,
+    Reason.WORSE: DecisionWords._refused,
+    Reason.LEAVES_MORE: DecisionWords._refused,
+    Reason.ALL_DATA: DecisionWords._unexplained,
+    Reason.WHAT_WAS_FITTED: DecisionWords._unexplained,
+    Reason.FOUND_TOGETHER: DecisionWords._found_together,
+    Reason.HELD_OUT_OF_SET: DecisionWords._held_out_of_set,
+    Reason.SET_REFUSED: DecisionWords._set_refused,
+    Reason.PERHAPS_PRESENT: DecisionWords._perhaps_of_set,
+    Reason.RIVAL_OF_MEMBER: DecisionWords._rival_of_member,
+    Reason.USUAL_LEFT: DecisionWords._usual_left,
+    Reason.NEXT: DecisionWords._next,
+    Reason.TIED: DecisionWords._tied,
+    Reason.DOUBT: DecisionWords._doubt,
+    Reason.DECK_STAYS: DecisionWords._deck_stays,
+}
+
+
+def votes_in_words(votes: Votes) -> str:
+    """Sentence on the gains of held-out data."""
+    every = {
+        "the data held out": votes.held_out,
+        "sensors predicted from the others": votes.sensors,
+        "lines predicted from the others": votes.lines,
+    }
+    words = [f"{what} {gain:+.0f}" for what, gain in every.items() if gain is not None]
+    return ", ".join(words) + " in 2 ln predictive density" if words else "nothing was held out"
+
+
+def needs_impossible(name: str, why: str) -> str:
+    """Sentence on an explanation that physics excludes, although the data do not."""
+    return f"{name} would need a value it cannot have: {why}"
+
+
+def settled_by(names: Sequence[str]) -> str:
+    """Measurements that would separate these families."""
+    return "; or ".join(c for c in (family(name).settled_by for name in names) if c)
+
+
+def _with_check(note: str, names: Sequence[str]) -> str:
+    check = settled_by(names)
+    return f"{note}; to settle it: {check}" if check else note

@@ -1,0 +1,123 @@
+"""The smallest mass, softening and thinning a layout would find, before anything is measured.
+
+The recording is taken to be the model's own responses. A change is found when it lowers -2 ln p by
+more than an effect needs to be named. That is the threshold of a diagnosis plus 2 ln of the number
+of places tried, because the place is unknown. The value of -2 ln p is that of a diagnosis
+(``scan``). The covariance holds E, rho and t, scatter within parts, joints and the weighing. It
+also holds the errors of the mesh and of the model's form. A change that calibration could explain
+is therefore not counted. Held-out data count like the other data.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..fem.modelled import modelled
+from ..inference.likelihood import LN10, Responses
+from ..inference.residual_localisation import bumps
+from ..inference.scan import baseline, field_slopes, point_scores
+from ..inference.sensor_errors import sensor_errors
+from ..reduced.reduced_model import evaluate
+from .diagnosis import threshold
+from .nuisances import measured_on, mesh_hidden, nuisances
+from .preparation import (
+    SOLVED,
+    ZETA,
+    equalised_lines,
+    ready_for_responses,
+    updating_problem,
+)
+from .question import Question
+
+NOISE = 0.01  # of |H|, at every line that is compared
+MASSES = np.geomspace(1e-5, 0.3, 40)  # tried, of the structure's mass
+MOST_CHANGE = 0.9  # of stiffness or thickness: a change that would have to be larger is not found
+
+
+@dataclass(frozen=True, eq=False)
+class Detectable:
+    """Smallest detectable changes, place by place; NaN where none of a sensible size exists.
+
+    Attributes
+    ----------
+    grids : (k,) int       places of the mass
+    points : (k, 3) [m]
+    mass : (k,) [kg]
+    softer, thinner : (g,) share of E and of t, over a tenth of the sheet round each group of shells
+    group : (m,) int       group of each shell
+    due : float            drop of -2 ln p at which something is found
+    lines, weight : lines that are compared, mass of the structure [kg]
+    """
+
+    grids: np.ndarray
+    points: np.ndarray
+    mass: np.ndarray
+    softer: np.ndarray
+    thinner: np.ndarray
+    group: np.ndarray
+    due: float
+    lines: int
+    weight: float
+
+
+def detectable(question: Question, noise: float = NOISE) -> Detectable:
+    """Smallest changes of the structure that a test with these sensors and shakers would find.
+
+    Parameters
+    ----------
+    question : without a recording; its band is the planned band
+    noise : of |H|, at every line that is compared
+    """
+    low, f_max = question.band
+    nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
+    built = nominal.structure
+    rows = question.outputs.rows(built), question.inputs.rows(built)
+    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    reduced = ready_for_responses(question, nominal, f_max)
+    f = equalised_lines((low, f_max), question.exclude, ZETA)
+    s = 2 * np.pi * f * (ZETA + 1j)
+    shape = (len(s), len(question.outputs.labels), len(question.inputs.labels))
+    unit = Responses(
+        np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
+        noise=np.full(shape, noise / LN10),
+        direct=question.outputs.moved_with_base(question.inputs),
+        sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
+    ).rebased(reduced.model)  # fmt: skip
+    nuisance = nuisances(reduced, nominal, mesh)
+    problem = updating_problem(question, reduced, unit, nuisance, f_max)
+    x = problem.mean()
+    state = evaluate(reduced.model, problem.base, x)
+    data = replace(unit, values=unit.model(state)).allowing_errors(state)
+    weighed = problem.mass_measurement
+    base = baseline(reduced.model, problem.base, data, weighed, x)
+    places, weight = problem.where.places, problem.setup.weight
+    due = threshold(data) + 2 * float(np.log(len(places)))
+    score = point_scores(
+        base, reduced.model, data, places, "M", weight * MASSES, reduced.flexibility(places)
+    )
+    local = bumps(reduced.groups)
+    shares = []
+    for field in ("E", "t"):
+        columns = field_slopes(base, reduced.model, data, field) @ local
+        share = 1 - np.exp(-np.sqrt(due / np.maximum(base.score(columns), 1e-12)))
+        shares.append(np.where(share < MOST_CHANGE, share, np.nan))
+    gained = score - base.score(base.residual[:, None])[0]
+    return Detectable(
+        places.grids, places.point, weight * _smallest(gained, due), shares[0], shares[1],
+        reduced.groups.group[: len(built.assembly.shells)], due, len(f), weight,
+    )  # fmt: skip
+
+
+def _smallest(gained: np.ndarray, due: float) -> np.ndarray:
+    """Smallest mass whose gain (n_places, n_masses) reaches ``due``, interpolated; NaN: none."""
+    out = np.full(len(gained), np.nan)
+    for k, gain in enumerate(gained):
+        enough = np.flatnonzero(gain >= due)
+        if not len(enough):
+            continue
+        j = int(enough[0])
+        out[k] = MASSES[0]
+        if j:
+            share = (due - gain[j - 1]) / (gain[j] - gain[j - 1])
+            out[k] = MASSES[j - 1] * (MASSES[j] / MASSES[j - 1]) ** share
+    return out

@@ -1,0 +1,315 @@
+"""From a recording to the name of the missing physics.
+
+1. Null: calibration parameters and scatter alone, from several starts.
+2. Scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0.
+3. Fits: the best places of every family, jointly with the calibration parameters and the scatter.
+4. Evidence: Laplace, with 2 ln of the number of places tried. Leaders restart the null.
+5. Verdict.
+6. Sets of several effects (``several``), if an effect is named or nothing fits.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..decision.decide import RULES, called
+from ..decision.decision_rules import gain_due
+from ..decision.hypothesis_table import NULL, HypothesisTable, Row, Wanted
+from ..effects.effect import Effect
+from ..effects.registry import families
+from ..errors import ModelError
+from ..inference.adequacy import FitTest, adequacy
+from ..inference.discrepancy import MEDIAN
+from ..inference.hypothesis_fit import (
+    CLOSE,
+    ROUGH,
+    HypothesisFit,
+    UpdatingProblem,
+    fitted,
+    wide_start,
+)
+from ..inference.implausible_values import implausible_values
+from ..inference.likelihood import Responses
+from ..inference.local_damping_test import damping_test_along_effect
+from ..inference.pole_data import Poles
+from ..inference.rows_of_fits import row_of, row_of_null
+from ..progress import within
+from ..reduced.reduced_model import evaluate
+from ..sparse.freed_memory import give_back_freed_memory
+from .candidates import candidates, unasked
+from .search_round import on_common_basis, search_round, taken
+from .several import PAIRED, Several, several
+
+PASSES = 4  # fits of the null, until the size of the error of form stays
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What was found.
+
+    Attributes
+    ----------
+    nominal, null : fits without, and with calibration parameters free, scatter allowed in both
+    plain : calibration parameters alone, as any calibration would: what a named effect is compared
+        with; where nothing is named, with the learned error of the model
+    hypotheses : best hypothesis of every family, best first
+    verdict : one of the public verdicts
+    notes : what was done and why, one sentence each
+    sets : several effects together, each of which pays, in the order in which the sets grew
+    table : all of them as the decision reads them
+    tests : of the rows that were held against what they predict themselves
+    written : the named effect as a deck can hold it, once data that no fit saw were asked
+    deck : the same with numbers that make the updated deck respond as all that was found does
+    adequacy : whether the explanation fits at all, where that was tested
+    one_of : what the data cannot tell apart, and what would settle it
+    gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
+    refused : why the leader is not named although it gains what is due
+    shared : whether the deck's numbers are those of several states of one object
+    passed_over : names of explanations that were asked before the leader, and what refused each
+    """
+
+    nominal: HypothesisFit
+    null: HypothesisFit
+    plain: HypothesisFit
+    hypotheses: tuple[HypothesisFit, ...]
+    verdict: str = ""
+    notes: tuple[str, ...] = ()
+    sets: tuple[Several, ...] = ()
+    table: HypothesisTable = field(default_factory=lambda: HypothesisTable({}))
+    tests: Mapping[str, FitTest] = field(default_factory=dict)
+    written: HypothesisFit | None = None
+    deck: HypothesisFit | None = None
+    adequacy: FitTest | None = None
+    one_of: tuple[str, ...] = ()
+    gains: tuple[float, ...] = ()
+    refused: str = ""
+    shared: bool = False
+    passed_over: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def found(self) -> HypothesisFit | None:
+        """The named effect, if any."""
+        named = self.verdict in ("missing physics", "measurement fault")
+        return self.hypotheses[0] if named and self.hypotheses else None
+
+    @property
+    def without_effects(self) -> "Diagnosis":
+        """What calibration alone finds."""
+        table = replace(self.table, singles=(), sets=())
+        return replace(self, hypotheses=(), sets=(), table=table)
+
+    @property
+    def as_deck(self) -> HypothesisFit | None:
+        """The named effect as the updated deck holds it, if anything is named."""
+        return self.deck or self.written or self.found
+
+    @property
+    def unexplained(self) -> bool:
+        """True if neither the answer nor calibration alone explains the recording."""
+        return self.adequacy is not None and not self.adequacy.passes
+
+    @property
+    def due(self) -> float:
+        """Gain in -2 ln evidence that is needed to name the best of the families tried."""
+        first = self.hypotheses[0] if self.hypotheses else self.null
+        return self.due_of(first)
+
+    def due_of(self, hypothesis: HypothesisFit) -> float:
+        """Required gain of a hypothesis."""
+        due = threshold(self.null.data, len(self.hypotheses))
+        return min(due, RULES.expected_due) if hypothesis.effect.expected else due
+
+    @property
+    def as_the_null(self) -> bool:
+        """True if the calibration keeps the numbers of the null."""
+        plain, null = self.plain.fit, self.null.fit
+        shared = [e for e in plain.effects if e in null.effects]
+        return all(np.array_equal(plain.of(e), null.of(e)) for e in shared)
+
+    def two_log_bayes_factor(self, hypothesis: HypothesisFit) -> float:
+        """How much better than the null, in -2 ln evidence."""
+        return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence
+
+
+def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: None) -> Diagnosis:
+    """Name the missing physics, or say that none is missing."""
+    progress("calibration without new physics", 0.05)
+    problem, null = without_effects(problem)
+    nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
+    plain = fit_of_the_deck(problem, null)
+    progress("scan of the catalogue", 0.2)
+    tried = candidates(problem.begun_wide(), null)
+    give_back_freed_memory()
+    hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
+    null = _restarted(problem, null, hypotheses)
+    progress("verdict", 0.95)
+    found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=unasked(problem))
+    found = named_by_fits(problem, found)
+    whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
+    found = _names_alone(problem, found, whole)
+    del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
+    give_back_freed_memory()
+    found = _with_sets_of_effects(problem, found, within(progress, 0.8, 1.0))
+    return _names_alone(problem, found, 1)
+
+
+def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
+    """The diagnosis by what was fitted alone: the leader, or calibration, is named and tested."""
+    table = HypothesisTable(
+        {NULL: row_of_null(found.null), **{t.effect.name: row_of(t) for t in found.hypotheses}},
+        tuple(t.effect.name for t in found.hypotheses),
+        nominal=found.nominal.neg2_log_evidence,
+        poles=isinstance(found.null.data, Poles),
+        implausible=bool(implausible_values(found.plain.fit)),
+        families=len(problem.families),
+        known_noise=getattr(found.null.data, "identified", None) is not None,
+    )
+    tests = dict(found.tests)
+    while isinstance(said := called(table), Wanted):
+        tested = found.null if said.key == NULL else found.hypotheses[0]
+        chances = fit_test(problem, tested)
+        table = table.having(chances.of(table.rows[said.key]))
+        tests |= {said.key: chances.test} if chances.test else {}
+    return replace(found, verdict=said.verdict, table=table, tests=tests)
+
+
+def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
+    """The diagnosis with all but the first of its hypotheses on the common basis."""
+    behind = (on_common_basis(problem, t) for t in found.hypotheses[whole:])
+    return replace(found, hypotheses=(*found.hypotheses[:whole], *behind))
+
+
+def _with_sets_of_effects(
+    problem: UpdatingProblem, alone: Diagnosis, progress: Progress
+) -> Diagnosis:
+    """The tested diagnosis with the sets of several effects that explain more than its leader.
+
+    Natural frequencies alone are too few numbers to bear two names.
+    """
+    data, unfit = alone.null.data, alone.verdict == "not in catalogue"
+    many = isinstance(data, Responses) and data.error is not None
+    if not (many and alone.hypotheses) or (alone.found is None and not unfit):
+        return alone
+    due = threshold(data, len(alone.hypotheses))
+    search = several(problem, alone.hypotheses, due, unfit, progress)
+    notes = (*alone.notes, search.note) if search.note else alone.notes
+    return replace(alone, sets=search.sets, notes=notes)
+
+
+@dataclass(frozen=True)
+class FitChances:
+    """The test of fit of a hypothesis, with p of it and of damping that follows what it changes.
+
+    p is NaN where there is no test, and where damping is no less likely than the rest.
+    """
+
+    test: FitTest | None
+    p: float
+    p_damping: float
+
+    def of(self, row: Row) -> Row:
+        """A row with these."""
+        return replace(row, p=self.p, p_damping=self.p_damping)
+
+
+def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
+    """Test the data against the predictions of a hypothesis."""
+    alone = hypothesis.effect not in hypothesis.fit.effects  # errors spread from the null as it is
+    winner = hypothesis if alone else problem.about_itself(hypothesis, ROUGH)
+    lost, damping = winner.fit.state.dissipated, problem.damping
+    damping = None if damping is None else damping.beyond(winner.fit.state)
+    fits = adequacy(
+        winner, problem.mass_measurement, problem.labels, damping=damping,
+        coupling=problem.coupling if lost is None else None,  # its responses have complex modes
+    )  # fmt: skip
+    if fits is None:
+        return FitChances(None, np.nan, np.nan)
+    both = damping_test_along_effect(fits, winner, damping)
+    return FitChances(both, fits.p, both.p if both.p != fits.p else np.nan)
+
+
+def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
+    """The problem with errors of the model's form as they spread from the null, and the null."""
+    model, delta = problem.reduced.model, MEDIAN
+    state = evaluate(model, problem.base, problem.mean(), False)
+    starts = _null_starts(problem)
+    identified = getattr(problem.data, "identified", None)
+    for k in range(2 if identified is None else PASSES):
+        problem = problem.allowing_errors(state, delta)
+        null = best_base_fit(problem, problem.base, starts)
+        if not isinstance(null.data, Responses) or null.data.error is None:
+            break
+        before, delta = delta, null.data.error.delta
+        if k and abs(np.log(delta / before)) < CLOSE:
+            break
+        state, starts = null.fit.state, [null.fit.x]
+    return problem, null
+
+
+def threshold(data: object, tried: int | None = None) -> float:
+    """The gain in -2 ln evidence that is needed to name anything from responses or from poles.
+
+    Parameters
+    ----------
+    tried : families that proposed something; all that are known where it is not said
+    """
+    known = isinstance(data, Responses)
+    chance = RULES.chance_of_responses if known else RULES.chance_of_poles
+    return gain_due(tried or len(families()), chance)
+
+
+def best_base_fit(
+    problem: UpdatingProblem, effects: Sequence[Effect], starts: list[np.ndarray]
+) -> HypothesisFit:
+    """Best fit of these effects alone over several starts; invalid structures do not count."""
+    model, fits = problem.reduced.model, []
+    for k, x in enumerate(starts):
+        try:
+            data, mass = problem.data, problem.mass_measurement
+            start = wide_start(model, effects, data, mass, x)
+            fits.append(fitted(model, effects, data, mass, start))
+        except ModelError:
+            if not fits and k == len(starts) - 1:
+                raise
+    return HypothesisFit(Effect(), min(fits, key=lambda f: f.neg2_log_evidence), model)
+
+
+def fit_of_the_deck(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
+    """Calibration parameters alone, no scatter or modal discrepancy: same starts, and the null."""
+    kept = [e.writable for e in problem.base]
+    chosen = [e for e, k in zip(problem.base, kept, strict=True) if k]
+    inside = np.concatenate(
+        [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]
+    ).astype(bool)
+    problem = problem.exactly()
+    return best_base_fit(problem, chosen, [x[inside] for x in (*_null_starts(problem), null.fit.x)])
+
+
+def nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:
+    """The prior mean of the nuisances."""
+    return [np.array([p.mean for e in problem.nuisance for p in e.parameters])]
+
+
+def _null_starts(problem: UpdatingProblem) -> list[np.ndarray]:
+    """The prior mean; where modes must be paired, also softer and stiffer by up to a third."""
+    mean = problem.mean()
+    if isinstance(problem.data, Responses):
+        return [mean]
+    stiff = np.array([p.name == "E" for e in problem.base for p in e.parameters], dtype=float)
+    return [mean + shift * stiff for shift in (0.0, -0.35, 0.35, -0.7, 0.7)]
+
+
+def _restarted(
+    problem: UpdatingProblem, null: HypothesisFit, hypotheses: list[HypothesisFit]
+) -> HypothesisFit:
+    """The null again, from the base parameters of the leaders: it must not lose by a bad start."""
+    tries = [null]
+    for lead in hypotheses[:2]:
+        with suppress(ModelError):
+            start = taken(problem, lead, ("calibration", "nuisance"))
+            tries.append(best_base_fit(problem, problem.base, [start]))
+    return min(tries, key=lambda t: t.neg2_log_evidence)

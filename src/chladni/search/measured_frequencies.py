@@ -1,0 +1,120 @@
+"""Natural frequencies of a test: identified poles that are modes, and their uncertainty."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..ema.identification import Identified, identify
+from ..errors import FileError
+from ..progress import Progress, silent
+from ..reduced.pole_assignment import FAINTEST
+from .question import Question
+
+
+def frequencies(
+    question: Question, uncertain: bool, progress: Progress = silent
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Identified | None, tuple[str, ...]]:
+    """Natural frequencies of the test, standard deviations [Hz], relative peak heights."""
+    frf = question.frf
+    if frf is None:
+        assert question.frequency is not None
+        sd = question.frequency_sd
+        f = np.asarray(question.frequency, float)
+        sd = np.full(len(f), np.nan) if sd is None else sd
+        inside = (f >= question.band[0]) & (f <= question.band[1]) & _kept(f, question.exclude)
+        if not inside.any():
+            raise FileError(
+                f"none of the {len(f)} poles, {f.min():g} to {f.max():g} Hz, lies in the band "
+                f"{question.band[0]:g}-{question.band[1]:g} Hz"
+            )
+        order = np.argsort(f[inside])
+        sd = np.where(np.isnan(sd), 1e-3 * f, sd)
+        note = "no FRF exists: natural frequencies were compared"
+        return f[inside][order], sd[inside][order], np.ones(len(order)), None, (note,)
+    band = band_of(question, frf)
+    use = counted(frf, question.exclude)
+    found = identify(frf, widened(frf, band), use=use, progress=progress)
+    f = found.frequency
+    keep = _prominent(found, band)
+    why = []
+    if not question.gain_known:
+        why.append("the gain is unknown")
+    if uncertain:
+        why.append("the places of the sensors are uncertain")
+    note = (
+        f"{' and '.join(why).capitalize() or 'as the case requests'}, so natural frequencies were "
+        f"compared, not FRFs: {int(keep.sum())} modes of {found.order} identified between "
+        f"{band[0]:g} and {band[1]:g} Hz; model modes that the sensors can hardly see may stay "
+        "without a partner"
+    )
+    peak = _peaks(found)[keep]
+    sd = np.maximum(found.frequency_sd[keep], 1e-4 * f[keep])
+    return f[keep], sd, peak / peak.max(), found, (note,)
+
+
+LEAST_DELTA_CHI2 = 3.0  # least drop of χ² over the penalty of a pole for it to count as a mode
+TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
+SHADOW = 0.04, 5.0  # ln f and ratio of heights: the same for a much weaker pole
+
+
+def _peaks(found: Identified) -> np.ndarray:
+    """Height of each resonance in the accelerance, |R| ω / ζ up to a constant (r,)."""
+    return (
+        np.abs(found.residues).max(axis=(1, 2)) * found.frequency / np.maximum(found.damping, 1e-4)
+    )
+
+
+def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
+    """Poles of the band with a clear share of χ² and usual damping, the strongest of each peak."""
+    f, peak = found.frequency, _peaks(found)
+    keep = (f >= band[0]) & (f <= band[1]) & (found.damping < 0.05)
+    keep &= found.relative_delta_chi2 > LEAST_DELTA_CHI2
+    if not keep.any():
+        raise FileError(
+            f"no mode is above the noise of the recording between {band[0]:g} and {band[1]:g} Hz"
+        )
+    usual = float(np.median(found.damping[keep & (peak > 0.1 * peak[keep].max())]))
+    keep &= found.damping < max(0.005, 4 * usual)
+    for i in np.flatnonzero(keep):
+        apart = np.abs(np.log(f / f[i]))
+        over = ((apart < TWIN) & (peak > peak[i])) | (
+            (apart < SHADOW[0]) & (peak > SHADOW[1] * peak[i])
+        )
+        keep[i] = not np.any(over & keep) and peak[i] > FAINTEST * peak[keep].max()
+    return keep
+
+
+def band_of(question: Question, frf: FRF) -> tuple[float, float]:
+    """The band to fit, within the recording [Hz]."""
+    low = max(question.band[0], float(frf.frequency[frf.frequency > 0][0]))
+    high = min(question.band[1], float(frf.frequency[-1]))
+    if high <= low:
+        raise FileError(
+            f"the band {question.band[0]:g}-{question.band[1]:g} Hz holds no line of the recording "
+            f"({frf.frequency[0]:g}-{frf.frequency[-1]:g} Hz)"
+        )
+    return low, high
+
+
+def widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
+    """The band [Hz], widened a little so that resonances at its ends are complete.
+
+    The lower end moves by a fifth of itself at most, whatever the width of the band.
+    """
+    width = 0.04 * (band[1] - band[0])
+    low = max(float(frf.frequency[0]), band[0] - min(width, 0.2 * band[0]))
+    return low, min(float(frf.frequency[-1]), band[1] + width)
+
+
+def counted(frf: FRF, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Lines of the recording outside the excluded intervals (n_f,) bool."""
+    return _kept(frf.frequency, exclude)
+
+
+def _kept(f: np.ndarray, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Frequencies outside the excluded intervals (n,) bool."""
+    use = np.ones(len(f), bool)
+    for a, b in exclude:
+        use &= (f < a) | (f > b)
+    return use

@@ -1,0 +1,87 @@
+"""Modes of the test as decks are compared with them, and the damping they lend a model's modes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.modes import ModalModel
+from ..ema.correlation import mac
+from ..ema.mode_pairing import ModePairs, pair
+from ..fem.measured_dofs import MeasuredDofs
+from ..fem.modelled import Modelled
+from ..inference.pole_data import Poles
+from .question import Prepared
+
+BEYOND = 2.0  # times the highest frequency of the test: as far as a partner is looked for
+_LEAST = 0.02  # of its lowest: modes below are rigid motions
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredModes:
+    """Frequency, damping and shape of each mode, identified or given as a table.
+
+    Attributes
+    ----------
+    frequency : (r,)          [Hz]
+    damping : (r,) or None    ratios; None of a table of frequencies
+    shapes : (n_out, r) or None    real, of any scale; None where there are too few sensors
+    """
+
+    frequency: np.ndarray
+    damping: np.ndarray | None = None
+    shapes: np.ndarray | None = None
+
+    def near(self, model: Modelled) -> ModalModel:
+        """The modes of a model among which partners are looked for."""
+        modes = model.up_to(BEYOND * float(self.frequency.max()))
+        return modes.sel(modes.frequency > _LEAST * float(self.frequency.min()))
+
+    def mac(self, outputs: MeasuredDofs, model: Modelled, modes: ModalModel) -> np.ndarray | None:
+        """MAC (m, r) of a model's modes and these; None without shapes."""
+        if self.shapes is None:
+            return None
+        return mac(outputs.rows(model.structure) @ modes.shapes, self.shapes)
+
+    def pairs(self, outputs: MeasuredDofs, model: Modelled, modes: ModalModel) -> ModePairs:
+        """Partners among the modes of a model."""
+        return pair(modes.frequency, self.frequency, self.mac(outputs, model, modes))
+
+    def damping_of(self, outputs: MeasuredDofs, model: Modelled, other: float) -> np.ndarray:
+        """Modal damping (m,) with which the model's modes are damped as their partners are.
+
+        ζ_r less diag Φᵀ(ωV + K_loss)Φ / 2ω², which the model's own dashpots and loss factors add;
+        ``other`` where a mode has no partner.
+        """
+        damping = np.full(len(model.modes), other)
+        if self.damping is None or not len(self.frequency):
+            return damping
+        s, modes = model.structure, self.near(model)
+        if not len(modes):
+            return damping
+        found = self.pairs(outputs, model, modes)
+        phi, omega = modes.shapes[:, found.model], 2 * np.pi * modes.frequency[found.model]
+        loss = sp.csr_array(s.hysteretic().K.imag)
+        own = np.einsum("ir,ir->r", phi, (s.system.V @ phi) * omega + loss @ phi) / (2 * omega**2)
+        first = int(np.searchsorted(model.modes.frequency, modes.frequency[0]))
+        damping[first + found.model] = np.maximum(self.damping[found.test] - own, 0.0)
+        return damping
+
+
+def measured_modes(prepared: Prepared) -> MeasuredModes:
+    """Modes that the test shows beyond doubt; of a table all of them."""
+    if isinstance(prepared.score, Poles):
+        return MeasuredModes(prepared.score.frequency)
+    found = prepared.identified
+    assert found is not None
+    low, high = found.band
+    keep = (found.frequency >= low) & (found.frequency <= high) & (found.damping < 0.05)
+    keep &= found.relative_delta_chi2 > 3.0
+    if found.residues.shape[1] < 4:
+        return MeasuredModes(found.frequency[keep], found.damping[keep])
+    every = found.residues[keep]
+    strongest = np.linalg.norm(every, axis=1).argmax(axis=1)
+    residues = every[np.arange(len(every)), :, strongest]
+    turn = np.exp(-0.5j * np.angle((residues**2).sum(axis=1)))
+    shapes = (residues * turn[:, None]).real.T
+    return MeasuredModes(found.frequency[keep], found.damping[keep], shapes)

@@ -1,0 +1,81 @@
+"""Starting points of a fit of poles, whose assignment makes many local optima.
+
+The effect's prior is sampled at Sobol points, and the best distinct ones start a simplex search
+(Nelder and Mead 1965, Comput. J. 7, 308-313).  It uses no slope, because the assignment jumps.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import norm, qmc
+
+from ..effects.effect import Effect
+from ..errors import ModelError
+from ..inference.hypothesis_fit import SCALES, UpdatingProblem, neg2_log_mixture
+from ..inference.pole_data import Poles
+from ..reduced.reduced_model import evaluate
+
+DRAWS = 4096
+WALKED = 16  # distinct points from which a simplex search starts
+APART = 0.25  # of the prior sd, in one parameter at least: points that count as distinct
+WIDE = 0.03  # standard deviation of ln f in the comparison of the Sobol points
+STEPS = 250  # evaluations of one simplex search
+
+
+def draws(effect: Effect, count: int) -> np.ndarray:
+    """Sobol points of an effect's prior (count, n_p); count is a power of two."""
+    u = qmc.Sobol(len(effect.parameters), seed=1).random(count)
+    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
+    return mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3))
+
+
+def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> list[np.ndarray]:
+    """The lowest distinct minima of -2 ln posterior over the effect's own parameters.
+
+    Calibration parameters stay at their prior mean.  Base effects that this effect makes
+    superfluous are left out.
+    """
+    data = problem.data
+    assert isinstance(data, Poles)
+    kept = problem.without(effect)
+    idle = problem.begun(kept)
+    sd = np.array([p.sd for p in effect.parameters])
+    mean = np.array([p.mean for p in effect.parameters])
+    model = problem.reduced.model.split_for(effect, mean)
+    seen = data.rebased(model)
+
+    def cost(x: np.ndarray, scales: np.ndarray) -> float:
+        try:
+            state = evaluate(model, [*kept, effect], np.concatenate([idle, x]), False)
+        except ModelError:
+            return np.inf
+        prior = float((((x - mean) / sd) ** 2).sum())
+        return prior + min(neg2_log_mixture(replace(seen, scale=s), state) for s in scales)
+
+    points = np.vstack([effect.starts(), draws(effect, DRAWS)])
+    rough = np.array([cost(x, np.array([WIDE])) for x in points])
+    chosen = _distinct(points / sd, rough, WALKED)
+    return _valleys(lambda x: cost(x, SCALES[::6]), points[chosen], sd, most)
+
+
+def _distinct(points: np.ndarray, cost: np.ndarray, most: int) -> list[int]:
+    """Rows of the cheapest points that lie apart."""
+    out: list[int] = []
+    for k in np.argsort(cost):
+        if not np.isfinite(cost[k]) or len(out) == most:
+            break
+        if all(np.abs(points[k] - points[j]).max() > APART for j in out):
+            out.append(int(k))
+    return out
+
+
+def _valleys(
+    cost: Callable[[np.ndarray], float], starts: np.ndarray, sd: np.ndarray, most: int
+) -> list[np.ndarray]:
+    """Distinct ends of the simplex searches, lowest cost first."""
+    options = {"maxfev": STEPS, "xatol": 1e-3, "fatol": 1e-2}
+    ends = [minimize(cost, x, method="Nelder-Mead", options=options) for x in starts]
+    where = np.array([end.x for end in ends]).reshape(len(ends), -1)
+    return [where[k] for k in _distinct(where / sd, np.array([e.fun for e in ends]), most)]

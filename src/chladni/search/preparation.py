@@ -1,0 +1,400 @@
+"""Preparation of an updating problem from a structure and a recording.
+
+With known gain and places the damping-equalised FRFs are compared.  Natural frequencies are
+compared where the gain is unknown *and* places are uncertain, or where no FRF exists.  The held-out
+data are chosen here, before anything is fitted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects.calibration_parameters import defaults
+from ..effects.effect import Effect
+from ..effects.effect_context import EffectContext, Setup
+from ..effects.model_families import joint_nuisances
+from ..effects.registry import catalogue, family
+from ..effects.sensor_fault import channel_gain
+from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
+from ..effects.weld_patch import WeldPatch, weld_patch
+from ..ema.identification import Identified, equalised, identify
+from ..ema.level_modes import AtLevel
+from ..ema.level_study import level_study
+from ..ema.level_words import level_notes
+from ..ema.recording_noise import equalised_error, equalised_noise, sample_noise
+from ..ema.response_variance import noise_source
+from ..errors import FileError
+from ..fem.energy import mass_properties
+from ..fem.modelled import Modelled, modelled
+from ..inference.complex_modes import mode_coupling
+from ..inference.damping_scatter import modal_damping
+from ..inference.hypothesis_fit import UpdatingProblem
+from ..inference.least_data import numbers, too_little
+from ..inference.likelihood import LN10, Responses
+from ..inference.map_fit import fit
+from ..inference.pole_data import Poles
+from ..inference.sensor_errors import sensor_errors
+from ..model.free_parameter import FreeParameter
+from ..progress import Progress, silent, within
+from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
+from ..reduced.reduced_problem import ReducedProblem, reduced_problem
+from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
+from .nuisances import measured_on, mesh_hidden, nuisances
+from .other_recordings import levels, measured_spread, others_identified, spread_note
+from .question import Prepared, Question
+
+ZETA = 0.08  # equalised damping for comparing hypotheses: it widens the basins of convergence
+ZETA_Q = 0.02  # equalised damping for the reported Q
+POSITION_UNCERTAIN = 5e-3  # [m]
+SAME_PLACE = 1e-6  # [m]: a sensor nearer to a shaker counts as at its place
+SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
+FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
+
+
+def prepare(question: Question, progress: Progress = silent) -> Prepared:
+    """Identify, decide how to compare, choose the held-out data, build the reduced problem."""
+    uncertain = _place_sd(question) > POSITION_UNCERTAIN
+    if question.frf is None or uncertain:
+        return _by_poles(question, uncertain, progress)
+    return _by_responses(question, progress)
+
+
+def _place_sd(question: Question) -> float:
+    """Largest standard deviation of the place of a sensor or shaker [m]."""
+    places = (question.outputs, question.inputs)
+    return max(float(p.sd.max(initial=0.0)) for p in places)
+
+
+def _by_responses(question: Question, progress: Progress) -> Prepared:
+    frf = question.frf
+    assert frf is not None
+    low, high = band_of(question, frf)
+    held_band = question.held_band or _upper_part(question, low, high)
+    fit_max = min(high, held_band[0]) if question.held_band is None else high
+    reach = (low, max(high, held_band[1]))
+    use, seen_to = counted(frf, question.exclude), within(progress, 0.0, 0.3)
+    found = identify(frf, widened(frf, reach), use=use, progress=seen_to)
+    f_max = reach[1]
+    if question.held_band is None and not _modes_seen(found, low, fit_max):
+        held_band, fit_max = (high, high), high  # all modes lie in the band that was to be held out
+    seen = _modes_seen(found, low, fit_max)
+    if not seen:
+        raise FileError(
+            f"no mode is above the noise of the recording between {low:g} and {fit_max:g} Hz, so "
+            "a model cannot be fitted"
+        )
+    lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
+    if not ((lines[0] >= low) & (lines[0] <= fit_max)).any():
+        raise FileError(
+            f"[band] exclude leaves no line between {low:g} and {fit_max:g} Hz to compare with the "
+            f"model (its lines lie {0.75 * ZETA:.0%} apart); exclude less, or widen the band"
+        )
+    progress("modes of the deck", 0.3)
+    nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
+    built = nominal.structure
+    rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
+    wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
+    progress("the error of its mesh", 0.5)
+    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    progress("the reduced model", 0.8)
+    reduced = ready_for_responses(question, nominal, f_max)
+    held_sensors = _held_sensors(question)
+    others, said = others_identified(question, reach, within(progress, 0.8, 1.0))
+    data, spreads = [], []
+    for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
+        s = 2 * np.pi * f * (zeta + 1j)
+        use = _training(f, low, fit_max, held_sensors)
+        H = equalised(found, s)
+        noise, spread = sample_noise(found, frf, s), measured_spread(H, others, s)
+        counts = counted(frf, question.exclude)
+        error = equalised_error(found, frf, s, counts) if question.identified_noise else None
+        spreads.append(spread)
+        read = Responses(
+            H, s, rows_o, rows_i, use, found.quantity,
+            noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
+            identified=error,
+            direct=question.outputs.moved_with_base(question.inputs), sensors=wrong,
+        )  # fmt: skip
+        data.append(read.rebased(reduced.model))
+    nuisance = nuisances(reduced, nominal, mesh)
+    if not question.gain_known:
+        nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
+    problem = updating_problem(question, reduced, data[0], nuisance, f_max)
+    named = isinstance(question.held_sensors, tuple)
+    swapped = held_sensors if named else _swapped(problem, held_sensors)
+    if not np.array_equal(swapped, held_sensors):
+        held_sensors = swapped
+        data = [
+            d.only(_training(f, low, fit_max, swapped)) for d, f in zip(data, lines, strict=True)
+        ]
+        problem = replace(problem, data=data[0])
+    unseen, held = (_left_out(d, held_band, reach, held_sensors) for d in (data[0], data[1]))
+    names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
+    what = _held_in_words(names, held_band)
+    notes = [
+        f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
+        f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
+        f"model and test were given {ZETA:.0%} damping for the search and {ZETA_Q:.0%} for Q "
+        "(damping equalisation): modes need no pairing, and damping cannot appear as stiffness",
+        f"the noise of the recording: {noise_source(frf)}",
+    ]
+    if question.base is not None:
+        notes.append(
+            f"the input is the motion of the base ({', '.join(question.inputs.labels)}): "
+            "responses are transmissibilities, of unit 1, and the supports of the deck move "
+            "together; parts held to ground are held to the base"
+        )
+    if not question.gain_known:
+        notes.append("the gain is unknown: one real factor common to all channels is free")
+    notes.append(_sensor_note(question))
+    notes += _mass_note(question)
+    known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
+    setup = replace(problem.setup, damping=known)
+    problem = replace(problem, damping=known, coupling=coupling, setup=setup)
+    own = AtLevel(question.level, frf, found, question.control)
+    studied = level_study([own, *levels(others)])
+    notes += [*said, *spread_note(spreads[1], data[1].use, others), *level_notes(studied)]
+    floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
+    if spreads[1] is not None:
+        floor = np.maximum(floor, spreads[1] ** 2)
+    supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
+    size = supporting, int(data[0].use.any(axis=0).sum())
+    return Prepared(
+        problem, data[1], held, what, tuple(notes), nominal, floor, found, too_little(*size),
+        numbers(*size), unseen=unseen, others=tuple(others), levels=studied,
+    )  # fmt: skip
+
+
+def _modes_seen(found: Identified, low: float, high: float) -> int:
+    """Number of significant poles between two frequencies [Hz]."""
+    inside = (found.frequency >= low) & (found.frequency <= high)
+    return int((inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2)).sum())
+
+
+NEAR_BAND = 1.3  # factor on the band within which a mode of the deck may be a measured one
+
+
+def _own_modes(nominal: Modelled, low: float, high: float) -> int:
+    """Number of flexible modes of the deck that may have been measured between two frequencies."""
+    f = nominal.modes.frequency
+    return int(((f > max(low / NEAR_BAND, 1e-3 * high)) & (f < NEAR_BAND * high)).sum())
+
+
+def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
+    """The held-out data in words: sensors, a band, or nothing."""
+    said = [f"{len(names)} sensors ({', '.join(names[:8])})"] if names else []
+    said += [f"band {band[0]:g}-{band[1]:g} Hz"] if band[1] > band[0] else []
+    return ", ".join(said) or "nothing"
+
+
+def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
+    """The uppermost fifth of the band, held out where the user names none."""
+    return high - 0.2 * (high - low), high
+
+
+def equalised_lines(
+    band: tuple[float, float], exclude: Sequence[tuple[float, float]], zeta: float
+) -> np.ndarray:
+    """Lines three quarters of a half-bandwidth apart, f_{k+1} = f_k (1 + 0.75 ζ), gaps left out."""
+    f = band[0] * np.exp(np.arange(0.0, np.log(band[1] / band[0]), 0.75 * zeta))
+    for a, b in exclude:
+        f = f[(f < a) | (f > b)]
+    return f
+
+
+def _held_sensors(question: Question) -> np.ndarray:
+    """Outputs that are held out: the named ones, or a fixed selection of a fifth of them."""
+    labels = question.outputs.labels
+    wanted = question.held_sensors
+    if isinstance(wanted, tuple):
+        return np.array([label in wanted for label in labels])
+    away = question.outputs.points[:, None] - question.inputs.points[None]
+    driven = (np.linalg.norm(away, axis=2) < SAME_PLACE).any(axis=1)  # a moving base has no place
+    count = min(len(labels) // 5 if wanted is None else wanted, max(len(labels) - 2, 0))
+    order = np.random.default_rng(20250101).permutation(len(labels))
+    chosen = [k for k in order if not driven[k]][:count]
+    return np.isin(np.arange(len(labels)), chosen)
+
+
+def _training(f: np.ndarray, low: float, high: float, held: np.ndarray) -> np.ndarray:
+    """Lines and channels that are fitted (n_f, n_out)."""
+    return np.outer((f >= low) & (f <= high), ~held)
+
+
+def _left_out(
+    data: Responses, band: tuple[float, float], reach: tuple[float, float], sensors: np.ndarray
+) -> np.ndarray:
+    """Lines of the held-out band, and the held-out sensors on every line (n_f, n_out)."""
+    f = data.s.imag / (2 * np.pi)
+    outside = (f >= band[0]) & (f <= band[1])
+    held = outside[:, None] | (sensors[None, :] & ((f >= reach[0]) & (f <= reach[1]))[:, None])
+    return held & ~data.use
+
+
+def _swapped(problem: UpdatingProblem, held: np.ndarray) -> np.ndarray:
+    """Held-out sensors, less those whose level is an outlier: a fault must be fitted to be found.
+
+    Outliers are judged by their median level against a calibrated model without effects.  Nothing
+    else of the held-out data enters the choice.
+    """
+    data = problem.data
+    assert isinstance(data, Responses)
+    model, weighed = problem.reduced.model, problem.mass_measurement
+    rough = fit(model, problem.base, data, weighed, problem.mean(), max_steps=8)
+    lines = data.use.any(axis=1)
+    delta = data.deviation(rough.state)[lines].reshape(lines.sum(), len(held), -1)
+    level = np.median(delta.real, axis=(0, 2))
+    turned = np.median(np.abs(delta.imag), axis=(0, 2)) > np.pi / 2 / LN10
+    spread = max(0.02, 1.5 * float(np.median(np.abs(level - np.median(level)))))
+    odd = (np.abs(level - np.median(level)) > 4 * spread) | turned
+    if not np.any(odd & held):
+        return held
+    calm = np.flatnonzero(~odd & ~held)[: int((odd & held).sum())]
+    out = held & ~odd
+    out[calm] = True
+    return out
+
+
+def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepared:
+    frequency, sd, strength, found, notes = frequencies(question, uncertain, progress)
+    f_max = float(frequency[-1]) * 1.15
+    highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
+    nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))
+    built, mesh = nominal.structure, mesh_hidden(nominal, f_max)
+    reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
+    reduced = carrying(reduced, freed_by(question, reduced, f_max))
+    held = np.zeros(len(frequency), bool)
+    if question.held_band is not None:
+        held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
+    elif len(frequency) > 5:
+        held[-max(1, len(frequency) // 5) :] = True
+    rows_o = question.outputs.around(built) if len(question.outputs.labels) else None
+    rows_i = question.driven_around(built) if len(question.inputs.labels) else None
+    band = question.band if question.frf is None else band_of(question, question.frf)
+    data = Poles(
+        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
+        spurious=SPURIOUS_LISTED if question.frf is None else share_spurious(strength),
+    ).rebased(reduced.model)  # fmt: skip
+    nuisance = nuisances(reduced, nominal, mesh, f_max)
+    problem = updating_problem(question, reduced, data, nuisance, f_max)
+    what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
+    notes = (*notes, *_unscored(question), *_mass_note(question))
+    few = too_little(len(frequency), 0), numbers(len(frequency), 0)
+    return Prepared(problem, data, held, what, notes, nominal, None, found, *few, ~held, held)
+
+
+def _unscored(question: Question) -> list[str]:
+    """Sentence on other recordings that are not used, as natural frequencies alone are compared."""
+    if not question.others:
+        return []
+    names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
+    return [f"not used, because natural frequencies are compared: {names}"]
+
+
+def updating_problem(
+    question: Question,
+    reduced: ReducedProblem,
+    data: Responses | Poles,
+    nuisance: list[Effect],
+    f_max: float,
+) -> UpdatingProblem:
+    """The updating problem: calibration parameters, and the nuisances that they do not replace."""
+    own = freed_by(question, reduced, f_max)
+    gone = {name for e in own for name in e.replaces}
+    base = [*own, *(e for e in nuisance if e.text not in gone)]
+    return UpdatingProblem(
+        reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
+        setup_of(question, f_max), question.outputs.labels, families=catalogue(question.effects),
+    )  # fmt: skip
+
+
+def setup_of(question: Question, f_max: float) -> Setup:
+    """The description of the test that effects may use."""
+    weight = mass_properties(question.assembly)[0]
+    sensors = question.outputs.shares(question.assembly)
+    forces = question.inputs.shares(question.assembly)
+    ways = question.inputs.directions[~question.inputs.base].tolist()
+    drives = tuple((share, (x, y, z)) for share, (x, y, z) in zip(forces, ways, strict=True))
+    return Setup(sensors, question.hangers, weight, f_max, drives)
+
+
+def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
+    """Parameters that the user frees; else E and t (wall) of every part, rho of every material.
+
+    This default holds for shells and beams.  Without either, it is E and rho of every material of
+    solids.
+    """
+    if question.parameters:
+        return [_freed(question, reduced, f_max, p) for p in question.parameters]
+    if len(reduced.groups):
+        return list(defaults(reduced.groups))
+    return [user_parameter(reduced.groups, p) for p in defaults_of_solids(question.assembly)]
+
+
+def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreeParameter) -> Effect:
+    """One number, or an effect of known place, for the parts that the user names.
+
+    Raises
+    ------
+    FileError
+        If deck and test do not determine the place of the effect.
+    """
+    if p.field in UNITS:
+        return user_parameter(reduced.groups, p)
+    if p.field == WeldPatch.name:
+        return weld_patch(reduced.groups, p)
+    placed = family(p.field).placed
+    assert placed is not None
+    setup = setup_of(question, f_max)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
+    names = {question.assembly.parts[k].name for k in p.positions}
+    found = [e for e in placed(where) if not names or set(e.parts) <= names]
+    if not found:
+        raise FileError(
+            f"{p.field} cannot be freed: deck and test do not define its place; "
+            "orthotropic-material needs all parts of a material, suspension [test] hangers, "
+            "sensor-mass sensors on the structure, shaker-restraint one to three drive points"
+        )
+    return freed_effect(found[0], p.name)
+
+
+def ready_for_responses(question: Question, nominal: Modelled, f_max: float) -> ReducedProblem:
+    """The reduced problem over a basis for measured dofs, free parameters and all joints."""
+    built = nominal.structure
+    reduced = reduced_problem(nominal, f_max, measured_on(question)(built), base=question.base)
+    return carrying(reduced, [*freed_by(question, reduced, f_max), *joint_nuisances(built)])
+
+
+def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProblem:
+    """The reduced problem over a basis that also represents these effects."""
+    for effect in effects:
+        x = np.array([p.mean for p in effect.parameters])
+        model = reduced.model_for(effect, x)
+        reduced = reduced if model is reduced.model else replace(reduced, model=model)
+    return reduced
+
+
+def _sensor_note(question: Question) -> str:
+    """Sentence on the errors of sensors and gauges that the model need not explain."""
+    known, sd = question.accuracy, _place_sd(question)
+    stated = f", at most {1e3 * sd:.2g} mm where the table of sensors states it" if sd else ""
+    place = f"{1e3 * known.position:.2g} mm in place{stated}"
+    return (
+        f"sensors and force gauges may be off by {known.gain:.2g} of their gain, "
+        f"{np.degrees(known.direction):.2g}° in direction, {place} (standard deviations); above "
+        f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies are compared instead"
+    )
+
+
+NOT_WEIGHED = (
+    "no weighed mass was given: E and rho cannot be distinguished, so both stay near the deck's "
+    "values"
+)
+
+
+def _mass_note(question: Question) -> list[str]:
+    if question.mass_measurement is None:
+        return [NOT_WEIGHED]
+    w = question.mass_measurement
+    return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is fitted with the other data"]

@@ -1,0 +1,132 @@
+"""Input of a diagnosis: a structure, its measurements and their places (SI, Hz)."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.frf import FRF
+from ..effects.rigid_ties import on_firm_springs
+from ..ema.identification import Identified
+from ..ema.level_study import LevelStudy
+from ..ema.setup import Control, SensorAccuracy
+from ..fem.assemble import Structure
+from ..fem.measured_dofs import MeasuredDofs
+from ..fem.modelled import Modelled
+from ..inference.hypothesis_fit import UpdatingProblem
+from ..inference.least_data import NUMBERS
+from ..inference.likelihood import Responses
+from ..inference.map_fit import MassMeasurement
+from ..inference.pole_data import Poles
+from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from ..model.point_masses import with_mass_pairs
+
+
+@dataclass(frozen=True, eq=False)
+class OtherRecording:
+    """A further recording with the same labels, which is not fitted: repeat, article or level."""
+
+    name: str
+    relation: str
+    frf: FRF
+    level: float | None = None
+    control: Control = "force"
+
+
+@dataclass(frozen=True, eq=False)
+class OtherTest:
+    """A further recording with its identified modes."""
+
+    recording: OtherRecording
+    identified: Identified
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """All input of a diagnosis (SI, Hz).
+
+    ``assembly`` is the article as the deck has it; ``tested`` gives it with the sensors' masses.
+    ``held_sensors`` and ``held_band`` are never fitted; where None, ``prepare`` chooses them.
+    """
+
+    assembly: Assembly
+    outputs: MeasuredDofs
+    inputs: MeasuredDofs
+    frf: FRF | None = None
+    frequency: np.ndarray | None = None  # poles where no FRF exists [Hz]
+    frequency_sd: np.ndarray | None = None  # [Hz]
+    mass_measurement: MassMeasurement | None = None
+    hangers: tuple[int, ...] = ()
+    band: tuple[float, float] = (0.0, np.inf)
+    exclude: tuple[tuple[float, float], ...] = ()
+    held_sensors: tuple[str, ...] | int | None = None
+    held_band: tuple[float, float] | None = None
+    gain_known: bool = True
+    parameters: tuple[FreeParameter, ...] = ()  # freed by the user; none: a default set
+    sensor_masses: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
+    others: tuple[OtherRecording, ...] = ()
+    level: float | None = None  # of the recording that is fitted [N], [m/s²]
+    control: Control = "force"  # quantity that was kept at the level
+    accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
+    effects: tuple[str, ...] = ()  # names of the effects that are tried; empty: all
+    identified_noise: bool = False  # whiten with the covariance of the identification
+
+    def tested(self, assembly: Assembly) -> Assembly:
+        """The article with the sensors of known mass on it, as it was measured."""
+        return with_mass_pairs(assembly, self.sensor_masses)
+
+    def searched(self, assembly: Assembly) -> Assembly:
+        """The tested article with springs in its rigid ties, stiff enough to act as rigid."""
+        return on_firm_springs(self.tested(assembly))
+
+    @property
+    def base(self) -> np.ndarray | None:
+        """Directions (k, 3) in which the supports were moved; None where forces were applied."""
+        return self.inputs.directions if self.inputs.base.any() else None
+
+    def driven_around(self, built: Structure) -> sp.csr_array:
+        """Rows of the excitation: at the likely places of the shakers, or the base's load."""
+        return self.inputs.around(built) if self.base is None else self.inputs.loads(built)
+
+    @property
+    def weighed_with_sensors(self) -> MassMeasurement | None:
+        """The weighed mass of the article plus the sensors' masses, as the model has them."""
+        if self.mass_measurement is None:
+            return None
+        mass = self.mass_measurement.mass + sum(m for _, m in self.sensor_masses)
+        return replace(self.mass_measurement, mass=mass)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """An updating problem and the data that score it.
+
+    Attributes
+    ----------
+    problem : the updating problem of the diagnosis
+    score : data on which Q is reported (over the same basis), with ``use`` = fitted samples
+    held : samples held out, in the shape of ``score.use``
+    what : the held-out data in words
+    notes : sentences on how the recording is compared, and why
+    nominal : the structure of the deck, with all modes that a diagnosis needs
+    unseen : the held-out samples in the shape of ``problem.data.use``
+    noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
+    others : recordings that are not fitted, with their modes
+    levels : the modes over levels of excitation, where there are two and more
+    """
+
+    problem: UpdatingProblem
+    score: Responses | Poles
+    held: np.ndarray
+    what: str
+    notes: tuple[str, ...]
+    nominal: Modelled
+    noise: np.ndarray | None = None
+    identified: Identified | None = None
+    too_little: str = ""  # reason why data so few rarely separate explanations
+    numbers: int = NUMBERS  # of the fitted modes and channels
+    kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
+    unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    others: tuple[OtherTest, ...] = ()
+    levels: LevelStudy = field(default_factory=LevelStudy)

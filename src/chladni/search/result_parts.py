@@ -1,0 +1,297 @@
+"""Parts of a diagnosis report: effects, alternatives, calibrated values, the remainder."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from ..decision.decision_rules import TIED
+from ..decision.tied import same
+from ..effects.effect import Effect
+from ..effects.estimate import Estimate, Location
+from ..ema.odds import evidence_in_words
+from ..inference.hypothesis_fit import HypothesisFit, LocalOptimum
+from ..inference.joint_fit import JointFit
+from ..inference.likelihood import LN10
+from ..inference.pole_data import Poles
+from ..inference.result import (
+    Agreement,
+    Alternative,
+    CalibratedParameter,
+    NamedEffect,
+    Remainder,
+    Scores,
+)
+from ..inference.rows_of_fits import row_of
+from .diagnosis import Diagnosis
+from .question import Prepared
+from .verdict_models import real_poles
+
+STRUCTURED = 5.0  # times the standard deviation of the recording: more than that is not noise
+HEAVIER = 0.02  # of the deck's mass: paint and sealant, which no deck of sheets contains
+
+
+def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
+    """The named effects with place and size, largest gain first."""
+    found = diagnosis.found
+    if found is None:
+        return ()
+    gains = diagnosis.gains or (diagnosis.two_log_bayes_factor(found),)
+    return tuple(_named(found, e, g) for e, g in zip(found.effects, gains, strict=True))
+
+
+def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffect:
+    return NamedEffect(
+        effect.name,
+        effect.claim,
+        -hypothesis.neg2_log_evidence / 2,
+        _located(hypothesis, effect),
+        _reported(hypothesis, effect),
+        gain,
+    )
+
+
+def _located(hypothesis: HypothesisFit, effect: Effect) -> Location:
+    """The place of an effect; its radius includes all optima that are nearly as probable."""
+    place = effect.location(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
+    if effect is not hypothesis.effect or place.point_m is None or not hypothesis.nearly:
+        return place
+    others = [v.effect.location(v.x, v.sd) for v in hypothesis.nearly]
+    reach = [place.radius_m or 0.0] + [
+        float(np.linalg.norm(np.subtract(o.point_m, place.point_m))) + (o.radius_m or 0.0)
+        for o in others
+        if o.point_m is not None
+    ]
+    return replace(place, radius_m=max(reach) or None)
+
+
+def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]:
+    """The values of an effect; intervals span all local optima that are nearly as probable."""
+    rows = effect.reported(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
+    if effect is not hypothesis.effect:
+        return rows
+    others = [r for v in hypothesis.nearly for r in v.effect.reported(v.x, v.sd)]
+    return tuple(
+        replace(row, low=_reach(min, (r.low for r in (row, *others) if r.name == row.name)),
+                high=_reach(max, (r.high for r in (row, *others) if r.name == row.name)))
+        for row in rows
+    )  # fmt: skip
+
+
+def _reach(pick: Callable[[list[float]], float], values: Iterable[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return pick(known) if known else None
+
+
+def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Sentences on other optima of the named effect that explain the data nearly as well."""
+    found = diagnosis.found
+    if found is None or not found.nearly:
+        return ()
+    rows = found.effect.reported(found.own.x, found.own.sd)
+    values = list(dict.fromkeys(w for v in found.nearly if (w := _values_apart(rows, v))))
+    own = found.effect.location(found.own.x, found.own.sd).text
+    places = [
+        f"{place} ({np.exp((found.own.neg2_log_evidence - v.neg2_log_evidence) / 2):.0%} as likely)"
+        for v in found.nearly
+        if (place := v.effect.location(v.x, v.sd).text) != own
+    ]
+    if isinstance(found.data, Poles) and values:
+        return (
+            f"if other poles are spurious, other values of {found.effect.name} explain the poles "
+            f"nearly as well: {'; or '.join(values)}; the intervals include all of them",
+        )
+    if not places:
+        return ()
+    return (
+        f"{found.effect.name} explains the data nearly as well at {'; or at '.join(places)}; the "
+        "intervals include all of these places",
+    )
+
+
+def _values_apart(rows: tuple[Estimate, ...], optimum: LocalOptimum) -> str:
+    """Values of an optimum that lie outside the intervals of the rows, in words."""
+    known = {row.name: row for row in rows if row.low is not None and row.high is not None}
+    return ", ".join(
+        f"{new.name} {new.value:.3g} {new.unit}".strip()
+        for new in optimum.effect.reported(optimum.x, optimum.sd)
+        if (row := known.get(new.name)) and not row.low <= new.value <= row.high  # type: ignore[operator]
+    )
+
+
+def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> tuple[str, ...]:
+    """Sentence on a difference between weighed mass and deck, where no effect is named.
+
+    Parameters
+    ----------
+    weighed, deck : mass of the article and of the deck as it was given [kg]
+    """
+    if weighed is None or diagnosis.found is not None or abs(weighed / deck - 1) < HEAVIER:
+        return ()
+    off = weighed / deck - 1
+    return (
+        f"the article weighs {abs(off):.1%} {'more' if off > 0 else 'less'} than the deck, so "
+        "calibration changes density and thickness; trim or mastic on a whole sheet has the same "
+        "effect: the drawing, or one part weighed alone, distinguishes them",
+    )
+
+
+def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
+    """All tested hypotheses that are not the answer, with the reason; most probable first."""
+    found = diagnosis.found
+    best = found if found is not None else diagnosis.null
+    named = () if found is None else tuple(e.name for e in found.effects)
+    out = [
+        Alternative(
+            hypothesis.effect.name,
+            -hypothesis.neg2_log_evidence / 2,
+            why_not(diagnosis, hypothesis, best),
+            _located(hypothesis, hypothesis.effect),
+        )
+        for hypothesis in diagnosis.hypotheses
+        if hypothesis is not found and hypothesis.effect.name not in named
+    ]
+    if found is not None:
+        gap = (diagnosis.null.neg2_log_evidence - best.neg2_log_evidence) / 2
+        reason = f"{evidence_in_words(gap)} compared with E, rho and t alone"
+        out.append(Alternative("calibration only", -diagnosis.null.neg2_log_evidence / 2, reason))
+    return tuple(sorted(out, key=lambda a: -(a.log_evidence or 0.0)))
+
+
+def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit) -> str:
+    """Reason why a hypothesis was not named, with a number."""
+    gain, due = diagnosis.two_log_bayes_factor(hypothesis), diagnosis.due_of(hypothesis)
+    if refused := dict(diagnosis.passed_over).get(hypothesis.effect.name):
+        return f"gains {gain:.1f} in -2 ln evidence, but {refused}"
+    if diagnosis.found is None and gain > due:
+        lead = diagnosis.hypotheses[0]
+        but = diagnosis.refused if hypothesis is lead else f"{lead.name}, ahead of it, is not named"
+        return f"gains {gain:.1f} in -2 ln evidence, but {but or 'is not named'}"
+    if diagnosis.found is None:
+        return (
+            f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are required "
+            "to name an effect"
+        )
+    if same(row_of(hypothesis), best.name):
+        return f"these data cannot distinguish its fitted form from {best.name}"
+    gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
+    return (
+        f"{evidence_in_words(gap)} for {best.name} compared with it; its weighted sum of squares "
+        f"is {hypothesis.fit.misfit:.0f}, that of {best.name} {best.fit.misfit:.0f}"
+    )
+
+
+def agreement(
+    prepared: Prepared, diagnosis: Diagnosis, fitted: Scores, held_out: Scores
+) -> Agreement:
+    """The scores, the held-out data in words, and the gain of the leading effect."""
+    found = diagnosis.found
+    last, what = found or diagnosis.null, prepared.what
+    if last.channels:
+        what = f"channel {', '.join(last.channels)} on the held-out lines of {what}"
+    factors = [diagnosis.two_log_bayes_factor(hypothesis) for hypothesis in diagnosis.hypotheses]
+    return Agreement(
+        fitted,
+        held_out,
+        what,
+        None if found is None else diagnosis.two_log_bayes_factor(found),
+        max(factors, default=None),
+        diagnosis.due,
+    )
+
+
+def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
+    """Reason not to trust a calibration that predicts the held-out data worse than the deck.
+
+    An increase of Q within the noise of the recording may be chance and is accepted.
+    """
+    held = None if agreement is None else agreement.held_out
+    if held is None or held.nominal is None or held.calibrated is None:
+        return ()
+    if held.calibrated <= held.nominal + (held.floor or 0.0):
+        return ()
+    return (
+        "the calibrated deck predicts the held-out data worse than the given deck "
+        f"(Q {held.calibrated:.3g}, {held.nominal:.3g} before); try chladni diagnose, "
+        '[test] gain = "unknown" if the level is uncertain, or position_sd for uncertain places',
+    )
+
+
+def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
+    """Calibrated parameters as estimated with scatter, joints and folds, and as written.
+
+    The written deck has no such nuisances, so it may need other values for the same response.  Its
+    values are therefore no estimates.  Parameters shared by several states serve as both.
+    """
+    deck = (diagnosis.as_deck or diagnosis.plain).fit
+    whole = (diagnosis.found or diagnosis.null).fit
+    changed = diagnosis.verdict != "nothing missing"
+    out = []
+    for effect in (e for e in deck.effects if e.kind == "calibration"):
+        fit = whole if effect in whole.effects else deck
+        found = deck if diagnosis.shared else fit
+        rows = effect.reported(found.of(effect), fit.sd(effect))
+        written = effect.reported(deck.of(effect), fit.sd(effect))
+        for parameter, row, other in zip(effect.parameters, rows, written, strict=True):
+            given = parameter.value(parameter.nominal)
+            called = getattr(effect, "called", "")  # the user's name of the parameter
+            where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
+            out.append(CalibratedParameter(where, row, given, other.value if changed else given))
+    return tuple(out)
+
+
+def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
+    """Calibrated parameters that several states share, fitted to all of them at once."""
+    seen: dict[tuple[str, str], CalibratedParameter] = {}
+    for one in joint.fits:
+        for effect in (e for e in one.fit.effects if e.kind == "calibration"):
+            rows = effect.reported(one.fit.of(effect), one.fit.sd(effect))
+            for parameter, row in zip(effect.parameters, rows, strict=True):
+                given = parameter.value(parameter.nominal)
+                seen.setdefault(
+                    (effect.text, row.name), CalibratedParameter(effect.text, row, given)
+                )
+    return tuple(seen.values())
+
+
+def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:
+    """The residual of calibration compared with the recording's noise, in rms."""
+    plain = diagnosis.plain
+    if isinstance(prepared.score, Poles):
+        real = real_poles(prepared, diagnosis.found or diagnosis.null)
+        assert real is not None
+        if not real.any():
+            return Remainder(False, np.nan, np.nan, "no pole has a partner in the model")
+        left = 100 * float(np.sqrt(prepared.score.Q(plain.fit.state, real, real))) * LN10
+        known = 100 * float(np.median(prepared.score.sd[real]))
+        text = f"{left:.2g} % rms of the frequencies, whose standard deviation is {known:.1g} %"
+    else:
+        data = prepared.score.rebased(plain.model)
+        left = float(np.sqrt(data.Q(plain.fit.state, prepared.score.use)))
+        chi = 1.0 if prepared.identified is None else prepared.identified.chi
+        known = 0.01 * chi / LN10
+        text = (
+            f"{left:.2g} decades rms, and the standard deviation of the recording is about "
+            f"{known:.1g}"
+        )
+    far = left > STRUCTURED * known
+    structured = bool(far and diagnosis.found is not None)
+    sentence = (
+        f"after calibration alone the residual is {text}: {_meaning(diagnosis, far, structured)}"
+    )
+    return Remainder(structured, left, known, sentence)
+
+
+def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
+    if structured:
+        return "it is structured, not noise"
+    if not far:
+        return "it contains no further information"
+    if not diagnosis.hypotheses:
+        return "it exceeds the noise; a diagnosis shows whether physics is missing"
+    if diagnosis.unexplained:
+        return "no effect tried accounts for it, nor do mesh error and scatter in the parts"
+    lead = diagnosis.hypotheses[0]
+    if diagnosis.two_log_bayes_factor(lead) > TIED:
+        return f"{lead.effect.name} accounts for more of it than mesh error and scatter"
+    return "mesh error and scatter within the parts account for it as well as any effect tried"

@@ -1,0 +1,109 @@
+"""Q of decks as written, without mesh error, scatter or gain errors.
+
+The response of a structure at its sensors comes from Rayleigh-Ritz on its own modes and static
+responses.  The static loads are unit loads at sensors and shakers, as in the reduced model of a
+diagnosis.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from ..dynamics.reduction import attachments, orthonormal, shifted
+from ..fem.modelled import Modelled, node_points
+from ..inference.hypothesis_fit import HypothesisFit
+from ..inference.likelihood import LN10, Responses
+from ..inference.pole_data import Poles
+from ..reduced.reduced_model import State
+from ..reduced.reduced_problem import REACH
+from .question import Prepared, Question
+
+
+def written_Q(
+    question: Question,
+    prepared: Prepared,
+    model: Modelled,
+    sets: tuple[np.ndarray, ...],
+    real: np.ndarray | None = None,
+    fault: HypothesisFit | None = None,
+) -> tuple[float, ...]:
+    """Q of a structure on each of these sets of samples.
+
+    Parameters
+    ----------
+    sets : of samples, in the shape of ``prepared.score.use``
+    real : (n,) bool       poles of the test that are modes
+    fault : the named effects; faults of channels among them are removed from the recording before
+        it is compared
+
+    Where the gain is unknown, the mean level over the fitted samples is removed as well.
+    """
+    data, state = seen(question, prepared.score, model, prepared.problem.setup.f_max)
+    if isinstance(data, Poles):
+        return tuple(data.Q(state, use, real) for use in sets)
+    n = len(data.a)
+    offset = np.zeros(n, complex)
+    if fault is not None:
+        changes = (effect.outputs(fault.fit.of(effect)) for effect in fault.effects)
+        offset = offset + sum(change.value for change in changes if change is not None)
+    offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
+    state = replace(state, offset=offset)
+    return tuple(data.Q(state, use) for use in sets)
+
+
+def gain_offset(
+    question: Question, prepared: Prepared, data: Responses, state: State
+) -> np.ndarray:
+    """log10 of the unknown common gain of all channels (n_out,); zero where the gain is known."""
+    none = np.zeros(len(data.a), complex)
+    if question.gain_known:
+        return none
+    return none - data.deviation(state)[prepared.score.use].real.mean()
+
+
+def seen(
+    question: Question, score: Responses | Poles, model: Modelled, f_max: float
+) -> tuple[Responses | Poles, State]:
+    """The data with this structure's rows in its own modes, and the state of those modes."""
+    built, modes = model.structure, model.up_to(REACH * f_max)
+    basis = modes.shapes
+    if isinstance(score, Poles):
+        lam = (2 * np.pi * modes.frequency) ** 2
+        if score.outputs is not None and score.inputs is not None:
+            a = question.outputs.around(built) @ basis
+            b = question.driven_around(built) @ basis
+            score = replace(score, a=a, b=b)
+        return score, _state(lam, np.eye(len(lam)))
+    rows_o, rows_i = question.outputs.rows(built), question.inputs.loads(built)
+    flexible = modes.frequency[modes.frequency > 0.02 * f_max]
+    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * f_max
+    still = attachments(
+        shifted(built.system, hertz, node_points(built)), sp.csr_array(sp.vstack([rows_o, rows_i]))
+    )
+    basis = orthonormal(built.system.M, [basis, still], kept=basis.shape[1])
+    K, M = (basis.T @ (A @ basis) for A in (built.system.elastic, built.system.M))
+    lam, phi = sl.eigh((K + K.T) / 2, (M + M.T) / 2)
+    return replace(score, a=rows_o @ basis, b=rows_i @ basis), _state(lam, phi)
+
+
+def _state(lam: np.ndarray, phi: np.ndarray) -> State:
+    none = np.zeros(0)
+    return State(lam, phi, np.zeros((0, len(lam))), none, none, 0.0, none, None, None)
+
+
+def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None) -> float | None:
+    """Expected Q from the noise of the recording alone; None where it is unknown.
+
+    For responses it holds to first order.  It fails where noise is as large as the response, above
+    1/ln² 10, and is None there.
+    """
+    if isinstance(prepared.score, Poles):
+        chosen = use if real is None else use & real
+        variance = (prepared.score.sd[chosen] / LN10) ** 2
+    else:
+        assert prepared.noise is not None
+        variance = prepared.noise[use]
+    Q = float(variance.mean()) if variance.size else np.inf
+    return Q if Q < LN10**-2 else None

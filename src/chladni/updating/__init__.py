@@ -1,1 +1,0 @@
-"""Finite element model updating: calibration, evidence, diagnosis."""

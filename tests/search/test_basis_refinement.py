@@ -1,0 +1,114 @@
+"""A basis that lacks what an effect needs is widened before the answer is given."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.effect import Effect
+from chladni.errors import ModelError
+from chladni.inference.hypothesis_fit import HypothesisFit
+from chladni.inference.map_fit import fit
+from chladni.reduced.accuracy import Accuracy
+from chladni.search import basis_refinement
+
+
+class Remade(Effect):
+    """So strong that the structure is another one."""
+
+    remakes_structure = True
+
+
+@pytest.mark.parametrize(("effect", "structure"), [(Effect(), "deck"), (Remade(), "remade")])
+def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effect, structure):
+    """Not by name or class: the effect says so itself."""
+    found = Accuracy(np.array([10.0]), np.array([0.0]), np.zeros((3, 1)))
+    remade = SimpleNamespace(structure="remade")
+    monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: found)
+    monkeypatch.setattr(basis_refinement, "_on_new_structure", lambda *given: (None, remade))
+    prepared = SimpleNamespace(problem=SimpleNamespace())
+    begun = SimpleNamespace(effects=(Effect(), effect), structure="deck")
+    assert basis_refinement.refined(None, prepared, begun).hypothesis.structure == structure
+
+
+PREPARED = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
+FIT = SimpleNamespace(effects=(), x=np.zeros(0), data=SimpleNamespace(rebased=lambda model: model))
+NARROW = HypothesisFit(Effect(), FIT, "narrow")
+
+
+@pytest.fixture
+def errors(monkeypatch):
+    """Set the errors that are measured one after the other; the fits made in between."""
+    fits = []
+    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: "wide")
+    monkeypatch.setattr(basis_refinement, "fitted", lambda *given: fits.append(given) or FIT)
+
+    def measured(*values):
+        left = iter(values)
+        monkeypatch.setattr(
+            basis_refinement, "_accuracy",
+            lambda *given: Accuracy(np.ones(1), np.array([next(left)]), np.zeros((3, 1))),
+        )  # fmt: skip
+        return fits
+
+    return measured
+
+
+@pytest.mark.parametrize(("error", "model"), [(4e-4, "narrow"), (2e-3, "wide")])
+def test_is_fitted_again_only_beyond_the_limit(errors, error, model):
+    """0.05 % is the limit: under it the hypothesis stays, above it a wider basis carries it."""
+    errors(error, error, error, error)
+    done = basis_refinement.refined(None, PREPARED, NARROW)
+    assert done.hypothesis.model == model
+    assert f"{error:.2%}" in done.note
+    assert bool(done.distrust) == (model == "wide")
+
+
+def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(errors, monkeypatch, reduced):
+    """They are not fitted again; their state is that of the wider model."""
+    fits = errors(2e-3, 2e-4)
+    E = calibration_parameter(reduced.groups, "E", [0])
+    own = fit(reduced.model, [E], Still(), None, np.array([0.1]), max_steps=0)
+    wide = reduced.model.with_components()
+    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: wide)
+    begun = HypothesisFit(Effect(), own, reduced.model)
+    done = basis_refinement.refined(None, PREPARED, begun, held=True).hypothesis
+    assert fits == []
+    assert done.model is wide
+    assert done.fit.x == pytest.approx([0.1])
+    assert done.fit.state is not own.state
+    assert done.fit.state.lam[6:] == pytest.approx(own.state.lam[6:])
+
+
+class Still:
+    """Data that say nothing."""
+
+    def rebased(self, model):
+        return self
+
+    def residual(self, state, gradient):
+        return np.zeros(1), np.zeros((1, 1))
+
+
+def test_is_widened_until_it_serves(errors):
+    """Two times too narrow, then wide enough: fitted twice, and trusted."""
+    fits = errors(2e-2, 2e-3, 2e-4)
+    done = basis_refinement.refined(None, PREPARED, NARROW)
+    assert len(fits) == 2
+    assert done.worst == 2e-4
+    assert done.distrust == ()
+
+
+def test_a_basis_that_bears_the_fit_no_longer_is_said_and_not_trusted(errors, monkeypatch):
+    """What the narrow basis could not feel may be negative stiffness: no crash, no trust."""
+    errors(2e-2)
+
+    def refuse(*given):
+        raise ModelError("an effect left negative stiffness")
+
+    monkeypatch.setattr(basis_refinement, "fitted", refuse)
+    done = basis_refinement.refined(None, PREPARED, NARROW)
+    assert done.hypothesis.model == "narrow"
+    assert "negative stiffness" in done.note
+    assert done.distrust

@@ -1,0 +1,205 @@
+"""Where everything is linear and Gaussian, all that a calibration says is known in closed form."""
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.effect import ChannelChange, Effect, Parameter
+from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem
+from chladni.inference.map_fit import Fit, MassMeasurement, Status, fit
+from chladni.inference.result import Agreement, MassComparison, Scores
+from chladni.reduced.reduced_model import evaluate
+from chladni.search.calibration import (
+    PROFILED,
+    _basins,
+    _with_frozen,
+    _without,
+    bands,
+    latin_hypercube,
+    profiles,
+)
+from chladni.search.compensation import compensating
+from chladni.search.deciding import _leaves_the_scales
+
+NOISE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Column(Effect):
+    """One parameter that moves the channels along a column."""
+
+    kind = "calibration"
+
+    column: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def outputs(self, x):
+        return ChannelChange(self.column * x[0] + 0j, self.column[:, None] + 0j)
+
+
+@dataclass(frozen=True, eq=False)
+class Offsets:
+    """y = channels + noise."""
+
+    y: np.ndarray
+
+    def residual(self, state, gradient):
+        r = (state.offset.real - self.y) / NOISE
+        return r, state.doffset.real / NOISE if gradient else np.zeros((len(r), 0))
+
+    def rebased(self, model):
+        return self
+
+
+@pytest.fixture(scope="module")
+def columns():
+    rng = np.random.default_rng(3)
+    sd = (0.3, 0.5, 0.2)
+    return [
+        Column((Parameter("x", "-", 0.0, s, kind="linear", step=50.0),), f"x of {k}",
+               column=rng.normal(size=8))
+        for k, s in enumerate(sd)
+    ]  # fmt: skip
+
+
+def problem(reduced, base, y):
+    return UpdatingProblem(reduced, Offsets(y), None, tuple(base), (), None)
+
+
+def null_of(given):
+    found = fit(given.reduced.model, given.base, given.data, None, given.mean(), tol=1e-14)
+    return HypothesisFit(Effect(), found, given.reduced.model)
+
+
+def test_intervals_count_the_prior_of_what_is_frozen(reduced, columns):
+    """Over truths and noise as assumed, the errors of the free ones have the said covariance."""
+    rng = np.random.default_rng(5)
+    A, sd = np.stack([c.column for c in columns], 1), [c.parameters[0].sd for c in columns]
+    whole = problem(reduced, columns, np.zeros(8))
+    part = _without(whole, ["x of 2"])
+    assert part.base == tuple(columns[:2])
+    said = _with_frozen(whole, part, null_of(part)).covariance
+    gain = null_of(part).fit.covariance @ A[:, :2].T / NOISE**2
+    truth = rng.normal(size=(40000, 3)) * sd
+    y = truth @ A.T + NOISE * rng.normal(size=(len(truth), 8))
+    seen = np.cov((y @ gain.T - truth[:, :2]).T)
+    assert_allclose(seen, said, rtol=0.05, atol=0.02 * said.max())
+    assert (np.diag(said) > np.diag(null_of(part).fit.covariance)).all()
+
+
+def test_a_profile_of_a_linear_problem_is_the_parabola_of_its_covariance(reduced, columns):
+    given = problem(reduced, columns, np.linspace(-1, 1, 8))
+    null = null_of(given)
+    for k, profile in enumerate(profiles(given, null)):
+        sd = np.sqrt(null.fit.covariance[k, k])
+        assert_allclose(profile.values, null.fit.x[k] + sd * np.array(PROFILED))
+        p = columns[k].parameters[0]
+        x = null.fit.x[k] + sd * np.array(PROFILED)
+        away = x - null.fit.x[k]
+        prior = (x**2 - null.fit.x[k] ** 2) / p.sd**2
+        assert_allclose(profile.neg2_log_likelihood, away**2 / sd**2 - prior, atol=1e-6)
+        assert_allclose(profile.quadratic, away**2 * (1 / sd**2 - 1 / p.sd**2), atol=1e-9)
+
+
+def test_a_latin_hypercube_has_one_start_in_every_stratum(reduced, columns):
+    starts = np.array(latin_hypercube(problem(reduced, columns, np.zeros(8)), 20))
+    assert starts.shape == (20, 3)
+    for x, c in zip(starts.T, columns, strict=True):
+        assert (np.abs(x) <= 2.06 * c.parameters[0].sd).all()
+        assert len(set(np.digitize(x, np.quantile(x, np.linspace(0, 1, 21)[1:-1])))) == 20
+    assert_allclose(starts, latin_hypercube(problem(reduced, columns, np.zeros(8)), 20))
+
+
+def test_starts_that_end_together_are_one_basin(reduced, columns):
+    """Alike in evidence but far in a parameter, or near but far worse, are basins of their own."""
+    null = null_of(problem(reduced, columns, np.zeros(8)))
+    sd = np.sqrt(np.diag(null.fit.covariance))
+
+    def end(evidence, shift):
+        return SimpleNamespace(neg2_log_evidence=evidence, x=null.fit.x + shift * sd)
+
+    found = _basins(null, [end(5.0, 9.0), end(2.0, 0.1), end(2.3, -0.1), end(2.1, 5.0)])
+    assert [b.starts for b in found] == [2, 1, 1]
+    assert_allclose([b.above for b in found], [0.0, 0.1, 3.0])
+
+
+def calibrated_plate(reduced, x, quantity="E"):
+    """The calibration of one value of a plate, ended at x."""
+    effect = calibration_parameter(reduced.groups, quantity, [0])
+    return Fit((effect,), np.array([x]), np.eye(1), 0.0, 0.0, None, None, Status.CONVERGED)
+
+
+AGREES = Agreement(Scores(1.0, 0.1), Scores(1.0, 0.2))
+SCALES = MassMeasurement(1.4, 0.004)
+
+
+def test_a_calibration_that_foretells_keeps_the_mass_and_its_priors_is_no_compensation(reduced):
+    mass = MassComparison(1.4, 1.405)
+    result = SimpleNamespace(agreement=AGREES, mass=mass, residual_localisation=None)
+    assert compensating(calibrated_plate(reduced, 0.05), result, SCALES) == ()
+
+
+@pytest.mark.parametrize(
+    ("x", "held", "model", "said"),
+    [
+        (0.05, 1.5, 1.4, "predicts the held-out data worse"),
+        (0.05, 0.2, 1.41, "weighs 1.41 kg, 0.01 kg more than the article"),
+        (0.20, 0.2, 1.4, "standard deviations of its prior from the deck's value"),
+    ],
+)
+def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
+    agreement = replace(AGREES, held_out=Scores(1.0, held))
+    mass, spot = MassComparison(1.4, model), SimpleNamespace(parts=("top",))
+    result = SimpleNamespace(agreement=agreement, mass=mass, residual_localisation=spot)
+    *reasons, stands = compensating(calibrated_plate(reduced, x), result, SCALES)
+    assert len(reasons) == 1
+    assert said in reasons[0]
+    assert f"plate {np.expm1(x):.1%} stiffer" in stands
+    assert "largest on top" in stands
+
+
+def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
+    """Where the mesh errs by more than any value, nothing changes, and the weighing says so."""
+    result = SimpleNamespace(
+        agreement=AGREES, mass=MassComparison(1.4, 1.5), residual_localisation=None
+    )
+    first, last = compensating(calibrated_plate(reduced, 0.0), result, SCALES)
+    assert "weighs 1.5 kg" in first
+    assert "the deck keeps its values" in last
+
+
+@pytest.mark.parametrize("sd", [1e-9, 0.02])
+def test_bands_are_as_wide_as_the_posterior_and_show_held_out_channels_first(
+    reduced, responses, sd
+):
+    effect = calibration_parameter(reduced.groups, "E", [0])
+    use = responses.use.copy()
+    use[:, 2] = False
+    data = replace(responses, use=use)
+    given = UpdatingProblem(reduced, data, None, (effect,), (), None, ("a", "b", "c", "d"))
+    found = fit(reduced.model, [effect], data, None, np.array([0.04]))
+    null = HypothesisFit(Effect(), replace(found, covariance=np.array([[sd**2]])), reduced.model)
+    every = list(bands(given, null))
+    assert [b.label for b in every] == ["c", "a", "b", "d"]
+    assert [b.held_out for b in every] == [True, False, False, False]
+    width = np.log(np.array(every[0].high) / every[0].low)
+    if sd < 1e-6:
+        assert_allclose(every[0].low, every[0].measured, rtol=1e-2)
+        assert width.max() < 1e-6
+    else:
+        assert 0.5 * sd < width.max() < 50 * sd
+        assert (np.array(every[0].low) <= np.array(every[0].measured) * 1.001).mean() > 0.9
+
+
+@pytest.mark.parametrize(("off", "leaves"), [(0.0, False), (0.005, False), (0.02, True)])
+def test_a_calibration_does_not_keep_a_deck_that_leaves_the_scales(reduced, off, leaves):
+    effect = calibration_parameter(reduced.groups, "rho", [0])
+    weight = evaluate(reduced.model, [effect], np.zeros(1)).weight
+    mass = MassMeasurement(weight + off, 0.004)
+    given = UpdatingProblem(reduced, Offsets(np.zeros(0)), mass, (effect,), (), None)
+    null = SimpleNamespace(model=reduced.model)
+    assert _leaves_the_scales(given, null, np.zeros(1)) is leaves
+    assert not _leaves_the_scales(replace(given, mass_measurement=None), null, np.zeros(1))

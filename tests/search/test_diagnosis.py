@@ -1,0 +1,96 @@
+"""A hypothesis that holds the null within it never loses to it for want of a start."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.effects.search_context import Candidate
+from chladni.errors import ModelError
+from chladni.inference.hypothesis_fit import HypothesisFit
+from chladni.inference.likelihood import Responses
+from chladni.inference.map_fit import Status
+from chladni.search import search_round
+from chladni.search.search_round import BEHIND, _closer, _finished, _tried
+
+NULL = SimpleNamespace(neg2_log_evidence=100.0, fit=SimpleNamespace(x=np.ones(2)))
+
+
+class UpdatingProblem:
+    """A fit from zeros stops at ``first``, one from the null's parameters at ``again``."""
+
+    def __init__(self, first, again):
+        self.ends, self.starts = {0.0: first, 1.0: again}, []
+
+    def fitted_with(self, effect, start, base, steps):
+        self.starts.append(float(base[0]))
+        if self.ends[float(base[0])] is None:
+            raise ModelError("an effect left negative stiffness")
+        return SimpleNamespace(neg2_log_evidence=self.ends[float(base[0])])
+
+
+@pytest.mark.parametrize(
+    ("first", "again", "starts", "end"),
+    [
+        (90.0, 0.0, [0.0], 90.0),  # better than the null: no second start
+        (100.0 + BEHIND - 1, 0.0, [0.0], 100.0 + BEHIND - 1),  # behind by its price only
+        (5000.0, 80.0, [0.0, 1.0], 80.0),  # stopped on the way
+        (5000.0, 9000.0, [0.0, 1.0], 5000.0),  # the better of both
+        (None, 80.0, [0.0, 1.0], 80.0),  # the first start is no structure
+        (5000.0, None, [0.0, 1.0], 5000.0),
+    ],
+)
+def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
+    problem = UpdatingProblem(first, again)
+    found = _tried(problem, NULL, None, np.zeros(1), np.zeros(2))
+    assert min(t.neg2_log_evidence for t in found) == end
+    assert problem.starts == starts
+
+
+@pytest.mark.parametrize("status", list(Status))
+@pytest.mark.parametrize("running", [True, False])
+def test_what_ran_out_of_steps_is_fitted_to_the_end(monkeypatch, status, running):
+    """In the running or not: a hypothesis is judged where it comes to rest."""
+    end = SimpleNamespace(neg2_log_evidence=1.0)
+    monkeypatch.setattr(search_round, "fitted", lambda *given: end)
+    left = SimpleNamespace(
+        neg2_log_evidence=9.0, effects=(), x=np.zeros(1), status=status, data=None
+    )
+    problem = SimpleNamespace(data=object.__new__(Responses), mass_measurement=None)
+    got = _finished(problem, HypothesisFit(None, left, None), running)
+    assert got.neg2_log_evidence == (1.0 if running or status is Status.OUT_OF_STEPS else 9.0)
+
+
+@pytest.mark.parametrize(("gains", "followed"), [([5.0, 3.0], 3), ([0.5, 9.0], 1), ([5.0], 2)])
+def test_a_leader_goes_on_to_where_its_family_finds_it_closer(gains, followed):
+    """Until it gains no more, or nothing next to it does; from the base of its own fit."""
+    bases, lead = [], hypothesis_at("weld", 50.0)
+
+    def closer(context, effect, x):
+        bases.append(context.bases[-1])
+        return Candidate(effect, x, context.bases[-1]) if len(bases) <= len(gains) + 1 else None
+
+    left = iter(50.0 - np.cumsum([*gains, 0.0]))
+    families = (SimpleNamespace(name="weld", closer=closer),)
+    problem = SimpleNamespace(
+        base=(), where=None, mean=lambda: np.zeros(0), families=families,
+        fitted_with=lambda effect, start, base: hypothesis_at("weld", next(left)),
+    )  # fmt: skip
+    assert len(_closer(problem, NULL, lead)) == followed
+    assert len(bases) == followed
+    assert _closer(problem, NULL, hypothesis_at("of another family", 50.0)) == []
+
+
+def hypothesis_at(name, evidence):
+    effect = SimpleNamespace(name=name, recentred=lambda x, where: None)
+    fit = SimpleNamespace(effects=(), of=lambda effect: np.zeros(1), neg2_log_evidence=evidence)
+    return SimpleNamespace(
+        effect=effect, effects=(effect,), fit=fit, neg2_log_evidence=evidence, data=None
+    )
+
+
+def test_what_is_one_answer_with_the_best_is_in_the_running():
+    """A lump that gained 7 beside a weld's 11 was fifth, and was never closed in on."""
+    fits = [SimpleNamespace(neg2_log_evidence=v) for v in (88.6, 91.0, 92.8, 93.2, 93.0, 98.7)]
+    assert search_round._in_the_running(fits) == 5
+    assert search_round._in_the_running([]) == 0

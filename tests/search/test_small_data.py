@@ -1,0 +1,228 @@
+"""Small and odd data end in an answer or in a sentence, and never in a name they cannot bear."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.case import load_case
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.frf import FRF
+from chladni.errors import AccuracyError, ChladniError, FileError
+from chladni.fem.assemble import structure
+from chladni.inference.least_data import too_little
+from chladni.io.nastran import assembly, read_deck
+from chladni.io.tables.write_tables import write_npz
+from chladni.reduced.real_modes import real_modes
+from chladni.search.measured_frequencies import widened
+from chladni.search.preparation import _own_modes, equalised_lines
+from chladni.units import UNITS
+from chladni.workflows.calibrate import calibrate
+from chladni.workflows.correlate import correlate
+from chladni.workflows.diagnose import diagnose
+from chladni.workflows.identify import identify
+
+NX, NY = 6, 4
+
+
+def plate_deck(held: bool = False) -> str:
+    """A flat steel plate of 24 quads, 0.6 x 0.3 m, in SI."""
+    cards = ["SOL 103", "CEND", *["SPC = 1"] * held, "BEGIN BULK", "MAT1,1,210.+9,,.3,7850."]
+    cards += ["PSHELL,1,1,.001,1,,1"]
+    for i in range(NX + 1):
+        for j in range(NY + 1):
+            cards.append(f"GRID,{1 + i * (NY + 1) + j},,{0.6 * i / NX},{0.3 * j / NY},0.")
+    corner = [(i * (NY + 1) + j + 1) for i in range(NX) for j in range(NY)]
+    for n, a in enumerate(corner, start=1):
+        cards.append(f"CQUAD4,{n},1,{a},{a + NY + 1},{a + NY + 2},{a + 1}")
+    return "\n".join([*cards, *["SPC1,1,123456,1,2,3,4,5"] * held, "ENDDATA"]) + "\n"
+
+
+def bar_deck(held: bool = True) -> str:
+    """A steel cantilever of ten bars, 0.3 m, or the free bar, which spins without inertia."""
+    cards = ["SOL 103", "CEND", *["SPC = 1"] * held, "BEGIN BULK", "PARAM,COUPMASS,1"]
+    cards += ["MAT1,1,210.+9,,.3,7850."]
+    cards += ["PBARL,1,1,,BAR", "+,.02,.003"]
+    cards += [f"GRID,{k + 1},,{0.03 * k},0.,0." for k in range(11)]
+    cards += [f"CBAR,{k + 1},1,{k + 1},{k + 2},0.,1.,0." for k in range(10)]
+    return "\n".join([*cards, *["SPC1,1,123456,1"] * held, "ENDDATA"]) + "\n"
+
+
+def case_of(folder: Path, text: str, deck: str, test: str = "") -> Path:
+    (folder / "deck.bdf").write_text(deck)
+    (folder / "case.toml").write_text(
+        f'[model]\ndeck = "deck.bdf"\nunits = "SI"\n[test]\n{test}recordings = ["{text}"]\n'
+    )
+    return folder
+
+
+def with_poles(folder: Path, deck: str, *frequency: float) -> Path:
+    rows = [f"{k + 1},{f}" for k, f in enumerate(frequency)]
+    (folder / "p.csv").write_text("\n".join(["mode,frequency_hz", *rows]) + "\n")
+    return case_of(folder, "p.csv", deck)
+
+
+def with_responses(folder: Path, outputs: int, modes: int) -> Path:
+    """The plate's first flexible modes at so many outputs, 2 % higher, in a band around them."""
+    (folder / "deck.bdf").write_text(plate_deck())
+    built = structure(assembly(read_deck(folder / "deck.bdf"), UNITS["SI"]))
+    modal = normal_modes(built.system, 30)
+    f_max = 0.5 * (modal.frequency[5 + modes] + modal.frequency[6 + modes])
+    f = np.arange(0.5 * modal.frequency[6], 1.02 * f_max, 0.02)
+    grids = [3, 12, 16, 22, 30][:outputs]
+    a = built.rows(np.array([(g, 3) for g in grids])) @ modal.shapes
+    b = built.rows(np.array([(8, 3)])) @ modal.shapes
+    s, w = 2j * np.pi * f[:, None], 2 * np.pi * 1.02 * modal.frequency
+    H = np.einsum("or,fr,ir->foi", a, s**2 / (s**2 + 0.01 * w * s + w**2), b)
+    noise = np.random.default_rng(0).normal(size=(2, *H.shape))
+    labels = tuple(f"{g}:+Z" for g in grids)
+    frf = FRF(H * (1 + 0.01 * (noise[0] + 1j * noise[1])), f, labels, ("8:+Z",), "accelerance")
+    write_npz(folder / "a.npz", frf)
+    return case_of(folder, "a.npz", plate_deck())
+
+
+@pytest.mark.parametrize("count", [1, pytest.param(5, marks=pytest.mark.slow)])
+def test_few_poles_calibrate_and_name_nothing(tmp_path: Path, count: int) -> None:
+    case = load_case(with_poles(tmp_path, plate_deck(), *[11.0, 14.0, 29.0, 33.0, 41.0][:count]))
+    assert calibrate(case).verdict
+    found = diagnose(case)
+    assert (found.verdict, found.effects) == ("not in catalogue", ())
+    assert len(found.one_of[0]) > 1
+    with pytest.raises(
+        AccuracyError, match=r"modes? do(es)? not separate the explanations: at least 8"
+    ):
+        found.trusted()
+    assert len(correlate(case).f_test) == count
+
+
+@pytest.mark.parametrize(("outputs", "modes"), [(1, 1), (2, 2)])
+def test_few_modes_at_few_outputs_name_nothing(tmp_path: Path, outputs: int, modes: int) -> None:
+    case = load_case(with_responses(tmp_path, outputs, modes))
+    assert identify(case).recordings[0].modes.order >= 1
+    assert len(correlate(case).pairs) >= 1
+    found = diagnose(case)
+    assert not found.effects
+    assert found.distrust
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_deck_of_bars_is_calibrated(tmp_path: Path, held: bool) -> None:
+    """Frequencies tell E / ρ of a bar whose mass is not weighed: one of them is frozen."""
+    flexible = first_of(tmp_path, held)
+    folder = with_poles(tmp_path, bar_deck(held), *(1.02 * f for f in flexible))
+    case = load_case(folder)
+    found = calibrate(case)
+    assert {c.estimate.name for c in found.calibrated} == {"E"}
+    assert found.study is not None
+    assert len(found.study.identifiability.frozen) == 1
+    assert found.calibrated[0].estimate.value / 210e9 == pytest.approx(1.02**2, rel=5e-3)
+    assert not diagnose(case).effects
+
+
+def first_of(folder: Path, held: bool = True) -> np.ndarray:
+    (folder / "deck.bdf").write_text(bar_deck(held))
+    made = assembly(read_deck(folder / "deck.bdf"), UNITS["SI"])
+    every = normal_modes(structure(made).system, 10).frequency
+    return every[every > 1.0][:4]
+
+
+def test_recordings_without_a_mode_are_said_to_have_none(tmp_path: Path) -> None:
+    f = np.linspace(5, 60, 300)
+    values = np.array([0.7, 0.9])[:, None] * np.ones((300, 1, 1)) + 0j
+    flat = FRF(values, f, ("3:+Z", "12:+Z"), ("8:+Z",), "accelerance")
+    write_npz(tmp_path / "a.npz", flat)
+    case = load_case(case_of(tmp_path, "a.npz", plate_deck()))
+    assert len(correlate(case).f_test) == 0
+    assert identify(case).distrust
+    for workflow in (calibrate, diagnose):
+        with pytest.raises(ChladniError, match="no mode is above the noise"):
+            workflow(case)
+
+
+def test_a_model_far_stiffer_than_what_was_measured_is_never_said_to_agree(tmp_path: Path) -> None:
+    """One mode at 4 Hz, the first flexible one of the model at 14 Hz (a beam with a bolted lap)."""
+    f = np.arange(3.0, 5.0, 0.02)
+    s, w = 2j * np.pi * f, 2 * np.pi * 4.0
+    H = (s**2 / (s**2 + 0.02 * w * s + w**2))[:, None, None]
+    noise = np.random.default_rng(0).normal(size=(2, *H.shape))
+    values = H * (1 + 0.01 * (noise[0] + 1j * noise[1]))
+    write_npz(tmp_path / "a.npz", FRF(values, f, ("8:+Z",), ("8:+Z",), "accelerance"))
+    case = load_case(case_of(tmp_path, "a.npz", plate_deck()))
+    assert len(correlate(case).pairs) == 0
+    assert calibrate(case).verdict != "nothing missing"
+    found = diagnose(case)
+    assert (found.verdict, found.effects) == ("not in catalogue", ())
+    assert found.distrust
+
+
+def test_poles_outside_of_the_band_are_refused(tmp_path: Path) -> None:
+    folder = with_poles(tmp_path, plate_deck(), 11.0, 14.0)
+    with (folder / "case.toml").open("a") as file:
+        file.write("[band]\nfit = [100.0, 200.0]\n")
+    with pytest.raises(ChladniError, match="none of the 2 poles, 11 to 14 Hz, lies in the band"):
+        calibrate(load_case(folder))
+
+
+def test_time_records_are_no_responses(tmp_path: Path) -> None:
+    np.savez(tmp_path / "t.npz", force=np.zeros(4), fs=np.array(48e3))
+    with pytest.raises(ChladniError, match=r"t\.npz: time data need one array force and one of"):
+        load_case(case_of(tmp_path, "t.npz", plate_deck(), 'quantity = "accelerance"\n'))
+
+
+@pytest.mark.parametrize(
+    ("modes", "channels", "enough"),
+    [(7, 0, False), (8, 0, True), (2, 30, False), (3, 2, True), (3, 1, False), (4, 1, True)],
+)
+def test_least_data(modes: int, channels: int, enough: bool) -> None:
+    assert (too_little(modes, channels) == "") is enough
+
+
+def test_a_wide_band_says_nothing_of_what_lies_far_below_it() -> None:
+    f = np.arange(1.0, 600.0)
+    wide = FRF(np.ones((len(f), 1, 1), complex), f, ("1:+Z",), ("1:+Z",))
+    assert widened(wide, (20.0, 480.0)) == (16.0, pytest.approx(498.4))
+    assert widened(wide, (20.0, 25.0)) == (pytest.approx(19.8), pytest.approx(25.2))
+
+
+def test_a_rigid_mode_in_the_middle_is_no_negative_stiffness() -> None:
+    """Six rigid modes of seven: rounding about zero is not compared with a rigid mode."""
+    lam = np.array([-2e-5, -1e-5, 0, 1e-5, 1e-5, 2e-5, 2.5e6])
+    assert real_modes(np.diag(lam), np.eye(7))[0][-1] == pytest.approx(2.5e6)
+    with pytest.raises(ChladniError, match="negative stiffness"):
+        real_modes(np.diag([-100.0, *lam[1:]]), np.eye(7))
+
+
+def test_what_a_rig_rings_with_bears_no_name():
+    """Modes are counted as far as the deck has any there, a little beyond the band included."""
+    deck = SimpleNamespace(modes=SimpleNamespace(frequency=np.array([0.0, 100.0, 250.0, 900.0])))
+    assert _own_modes(deck, 40.0, 200.0) == 2
+    assert _own_modes(deck, 0.0, 100.0) == 1
+
+
+@pytest.mark.parametrize("low", [79.0, 79.1, 80.0, 33.3, 1e-3, 1234.5])
+@pytest.mark.parametrize("width", [1.02, 3.0])
+def test_the_lowest_line_compared_is_the_end_of_the_band(low, width):
+    """A band narrower than the step between lines keeps one, whatever its end rounds to."""
+    f = equalised_lines((low, width * low), (), 0.08)
+    assert f[0] == low
+    assert f[-1] < width * low
+
+
+def test_a_band_of_which_no_line_is_left_is_refused(tmp_path):
+    """Lines 6 % apart: a band of 4 % holds one of them, and a gap may take that one away."""
+    case = case_of(tmp_path, "frf.npz", plate_deck())
+    built = structure(assembly(read_deck(tmp_path / "deck.bdf"), UNITS["SI"]))
+    modal = normal_modes(built.system, 12)
+    f_1 = float(modal.frequency[6])
+    f = np.linspace(0.97 * f_1, 1.03 * f_1, 200)
+    phi = built.rows(np.array([[35, 3], [1, 3]])) @ modal.shapes
+    s = 2j * np.pi * f[:, None]
+    d = s**2 / ((2 * np.pi * modal.frequency) ** 2 + 0.01 * 2 * np.pi * modal.frequency * s + s**2)
+    H = np.einsum("om,fm->fo", phi * phi[0], d)[:, :, None]
+    write_npz(tmp_path / "frf.npz", FRF(H, f, ("35:+Z", "1:+Z"), ("35:+Z",), "accelerance"))
+    with (tmp_path / "case.toml").open("a") as text:
+        text.write(f"[band]\nfit = [{0.98 * f_1}, {1.02 * f_1}]\n")
+        text.write(f"exclude = [[{0.979 * f_1}, {0.981 * f_1}]]\n")
+    with pytest.raises(FileError, match="exclude leaves no line between"):
+        calibrate(load_case(case))
