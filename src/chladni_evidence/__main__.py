@@ -18,6 +18,7 @@ from .fuzz import DUE, fuzz, until
 from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
+from .interval_evidence import interval_evidence
 from .record import record
 from .recorded_case import read_case
 from .recovery import recovery
@@ -106,10 +107,16 @@ def _recovered(asked: argparse.Namespace) -> int:
     return 0
 
 
+def _covered(options: argparse.Namespace) -> int:
+    """Calibrate articles drawn from the priors; print coverage and uniformity."""
+    interval_evidence(_seeds(options), options.out, _say)
+    return 0
+
+
 COMMANDS = {
     "run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
     "record": _recorded, "replay": _replayed,
-    "recovery": _recovered,
+    "recovery": _recovered, "intervals": _covered,
 }  # fmt: skip
 
 
@@ -151,6 +158,11 @@ def _parser() -> argparse.ArgumentParser:
     known = commands.add_parser("recovery", help="calibrate to known values: coverage of intervals")
     known.add_argument("--seeds", required=True, help="first and last, as 600-619")
     known.add_argument("--out", type=Path, required=True)
+    covered = commands.add_parser(
+        "intervals", help="coverage of intervals and of the test of fit, truths from the priors"
+    )
+    covered.add_argument("--seeds", required=True, help="first and last, as 600-607")
+    covered.add_argument("--out", type=Path, required=True)
     kept = commands.add_parser(
         "record", help="diagnose cases once, and keep the data of their decisions"
     )

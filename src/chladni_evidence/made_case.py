@@ -40,7 +40,7 @@ from .mesh_transfer import Spots, still_there
 from .outside_kinds import OUTSIDE
 from .package_kinds import package_kinds
 from .pair_kinds import members, together
-from .part_scatter import scattered
+from .part_scatter import Draw, scattered
 from .response_of_article import accelerance, decades_apart, seen
 
 KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE, **JOINTS, **HELD}
@@ -106,7 +106,7 @@ class _Rig:
 
 def made_case(
     bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None = None,
-    recorder: Recorder = PLAIN, times: float | None = None,
+    recorder: Recorder = PLAIN, times: float | None = None, draw: Draw = scattered,
 ) -> MadeCase:  # fmt: skip
     """Measure an article of one of the bench's meshes, with part scatter and an effect.
 
@@ -120,11 +120,12 @@ def made_case(
     recorder : "independent noise" on every line, or a test on the virtual bench; effects with a law
         of frequency of their own (rotors, foam, friction, lumps) always have the first
     times : change by the effect over that by scatter and mesh together, which the size is set to
+    draw : another article of the same drawing, and the factors on its values
     """
     common = [seed, *bench.name.encode(), *mesh.encode()]
     rng, noise = np.random.default_rng(common), np.random.default_rng([*common, *kind.encode()])
     plain = bench.meshes[mesh]()
-    article, scales = scattered(plain, rng)  # one article a seed, for all hidden effects
+    article, scales = draw(plain, rng)  # one article a seed, for all hidden effects
     zeta = ZETA * np.exp(DAMPING_SPREAD * rng.normal(size=2000))
     bending = bool(rng.integers(2))
     kind_of_sensor = AccelerometerType()

@@ -1,5 +1,6 @@
 """Scatter between articles: E and t of every part, adhesive, every single weld."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ PART, ADHESIVE, WELD = 0.01, 0.1, 0.3  # standard deviations of ln E (and of ln 
 WELDS = "spot welds"  # part in which every solid is a weld of its own
 
 Scales = dict[str, dict[str, float]]  # {part: {"E": factor, "t": factor}}
+Draw = Callable[[Assembly, np.random.Generator], tuple[Assembly, Scales]]
 
 
 def scattered(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:

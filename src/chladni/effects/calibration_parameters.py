@@ -95,7 +95,7 @@ def defaults(groups: ElementGroups) -> list[PartScale]:
     used = sorted(set(groups.part.tolist()))
     by_material: dict[int, list[int]] = {}
     for k in used:
-        material = _material(parts[k])
+        material = material_of(parts[k])
         by_material.setdefault(id(material) if material is None else material.id, []).append(k)
     out = [calibration_parameter(groups, "E", [k]) for k in used]
     out += [calibration_parameter(groups, "rho", ks) for ks in by_material.values()]
@@ -112,7 +112,8 @@ def thickness_of(part: Part) -> str:
     return "t" if isinstance(section, ShellSection) else ""
 
 
-def _material(part: Part) -> Material | None:
+def material_of(part: Part) -> Material | None:
+    """Material of a part; of a sheet that of its membrane, or of its bending."""
     section = part.section
     if isinstance(section, ShellSection):
         return section.membrane or section.bending
@@ -124,7 +125,7 @@ def value(part: Part, quantity: str) -> float:
 
     E of an orthotropic sheet is sqrt(E1 E2).
     """
-    section, material = part.section, _material(part)
+    section, material = part.section, material_of(part)
     if isinstance(section, SolidSection) or quantity not in (*SHEET, *TUBE):
         return float(getattr(material, quantity))
     if quantity not in (TUBE if isinstance(section, BeamSection) else SHEET):
