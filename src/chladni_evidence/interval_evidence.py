@@ -18,7 +18,13 @@ import numpy as np
 from scipy.stats import kstest, norm
 
 from chladni.case import load_case
-from chladni.effects.calibration_parameters import SPREAD, PartScale, material_of, with_scaled
+from chladni.effects.calibration_parameters import (
+    SPREAD,
+    PartScale,
+    material_of,
+    thickness_of,
+    with_scaled,
+)
 from chladni.inference.adequacy import adequacy
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.model.assembly import Assembly
@@ -39,7 +45,7 @@ KNOWN = 0.5  # share of the prior sd below which the data know a combination
 
 
 @dataclass(frozen=True)
-class Interval:
+class PosteriorOffset:
     """Posterior of ln of a value, or of a combination of values, against the truth."""
 
     name: str
@@ -48,7 +54,7 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CalibratedArticle:
     """Calibration of one article: p of its test of fit, and its intervals."""
 
     structure: str
@@ -56,14 +62,16 @@ class Answer:
     seed: int
     noise: str  # of the likelihood, as the case word
     p: float
-    intervals: tuple[Interval, ...]
+    intervals: tuple[PosteriorOffset, ...]
 
 
 def of_prior(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
-    """An article with E and t of every part and rho of every material from the priors; factors."""
+    """An article with E and t of every sheet and rho of its material from the priors; factors."""
     scales: Scales = {}
     rho: dict[int, float] = {}
     for k, part in enumerate(assembly.parts):
+        if thickness_of(part) != "t":
+            continue
         drawn = {q: float(np.exp(SPREAD[q] * rng.normal())) for q in ("E", "rho", "t")}
         drawn["rho"] = rho.setdefault(getattr(material_of(part), "id", 0), drawn["rho"])
         scales[part.name] = drawn
@@ -72,7 +80,7 @@ def of_prior(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Sc
     return assembly, scales
 
 
-def intervals(null: HypothesisFit, scales: Scales) -> tuple[Interval, ...]:
+def intervals(null: HypothesisFit, scales: Scales) -> tuple[PosteriorOffset, ...]:
     """Every calibration parameter, and the combinations that the data know better than the prior.
 
     The combinations are the eigenvectors of the posterior covariance over prior sd.
@@ -81,7 +89,7 @@ def intervals(null: HypothesisFit, scales: Scales) -> tuple[Interval, ...]:
     for effect in fit.effects:
         if isinstance(effect, PartScale):
             chosen.append(fit.slice(effect).start)
-            of_parts = [np.log(scales[part][effect.written]) for part in effect.parts]
+            of_parts = [np.log(scales.get(p, {}).get(effect.written, 1.0)) for p in effect.parts]
             truth.append(np.mean(of_parts))
             names.append(effect.written)
             prior.append(effect.parameters[0].sd)
@@ -90,18 +98,18 @@ def intervals(null: HypothesisFit, scales: Scales) -> tuple[Interval, ...]:
     C = fit.covariance[np.ix_(chosen, chosen)] / np.outer(sd, sd)
     share, vectors = np.linalg.eigh(C)
     own = np.sqrt(np.diag(C))
-    single = [Interval(*row) for row in zip(names, off / own, own, strict=True)]
+    single = [PosteriorOffset(*row) for row in zip(names, off / own, own, strict=True)]
     return (
         *single,
         *(
-            Interval("combination", float(v @ off / np.sqrt(s)), float(np.sqrt(s)))
+            PosteriorOffset("combination", float(v @ off / np.sqrt(s)), float(np.sqrt(s)))
             for s, v in zip(share, vectors.T, strict=True)
             if np.sqrt(s) < KNOWN
         ),
     )
 
 
-def answered(structure: str, maker: str, seed: int, cache: Path) -> list[Answer]:
+def answered(structure: str, maker: str, seed: int, cache: Path) -> list[CalibratedArticle]:
     """Make an article, calibrate the deck with its recording and test the fit, by each noise."""
     bench = (panel_bench if structure in SPECIMENS else form_bench)(structure, seed)
     made = made_case(bench, "nothing", seed, maker, cache, draw=of_prior)
@@ -114,25 +122,28 @@ def answered(structure: str, maker: str, seed: int, cache: Path) -> list[Answer]
         ]
 
 
-def _answer(question: Question, truth: dict[str, Any], noise: str) -> Answer:
+def _answer(question: Question, truth: dict[str, Any], noise: str) -> CalibratedArticle:
     problem, null = without_effects(prepare(question).problem)
     fits = adequacy(null, problem.mass_measurement, problem.labels)
     p = float("nan") if fits is None else fits.p
     names = truth["structure"], truth["mesh"], truth["seed"], noise
-    return Answer(*names, p, intervals(null, truth["scales"]))
+    return CalibratedArticle(*names, p, intervals(null, truth["scales"]))
 
 
 def interval_evidence(
     seeds: Iterable[int], out: Path, say: Callable[[str], object]
-) -> list[Answer]:
-    """Answer an article of every structure and maker for each seed, and say the table.
+) -> list[CalibratedArticle]:
+    """CalibratedArticle an article of every structure and maker for each seed, and say the table.
 
     ``intervals.jsonl`` in ``out`` gets a line as each ends. The same call continues it.
     """
     make_folder(out)
     kept = out / "intervals.jsonl"
     rows = [json.loads(t) for t in kept.read_text("utf-8").splitlines()] if kept.exists() else []
-    answers = [Answer(**r | {"intervals": [Interval(*i) for i in r["intervals"]]}) for r in rows]
+    answers = [
+        CalibratedArticle(**r | {"intervals": [PosteriorOffset(*i) for i in r["intervals"]]})
+        for r in rows
+    ]
     done = {(a.structure, a.maker, a.seed) for a in answers}
     for seed, structure, maker in product(seeds, STRUCTURES, MAKERS):
         if (structure, maker, seed) in done:
@@ -149,12 +160,12 @@ def interval_evidence(
     return answers
 
 
-def table(answers: Sequence[Answer]) -> list[str]:
+def table(answers: Sequence[CalibratedArticle]) -> list[str]:
     """Coverage of 90 % intervals, and Kolmogorov-Smirnov p of uniformity, by noise and value."""
     lines = [f"{'noise':11} {'value':12} number  inside 90 %  rms off  sd/prior  uniform p"]
     for noise in NOISES:
         mine = [a for a in answers if a.noise == noise]
-        by_name: dict[str, list[Interval]] = {}
+        by_name: dict[str, list[PosteriorOffset]] = {}
         for i in (i for a in mine for i in a.intervals):
             by_name.setdefault(i.name, []).append(i)
         for name, found in by_name.items():

@@ -8,7 +8,13 @@ import pytest
 from chladni.effects.calibration_parameters import SPREAD, calibration_parameter
 from chladni.effects.element_groups import element_groups
 from chladni.fem.assemble import structure
-from chladni_evidence.interval_evidence import Answer, Interval, intervals, of_prior, table
+from chladni_evidence.interval_evidence import (
+    CalibratedArticle,
+    PosteriorOffset,
+    intervals,
+    of_prior,
+    table,
+)
 from chladni_specimens import folded_panel
 
 
@@ -60,7 +66,9 @@ def answers(width):
     """Answers whose intervals are ``width`` times as wide as the errors call for."""
     rng = np.random.default_rng(3)
     return [
-        Answer("plate", "fine", k, "identified", float(p), (Interval("E", off / width, 0.5),))
+        CalibratedArticle(
+            "plate", "fine", k, "identified", float(p), (PosteriorOffset("E", off / width, 0.5),)
+        )
         for k, (off, p) in enumerate(zip(rng.normal(size=400), rng.uniform(size=400), strict=True))
     ]
 

@@ -7,25 +7,22 @@ decision returns a request for it by name. The caller computes it, adds it and c
 2. Few data bear a name only if they could contradict it and nothing else is tied with it.
 3. All data together may support a name that the fitted data alone do not.
 4. A set of effects that all reach the required gain precedes one effect.
-5. The leader is fitted again and tested on held-out data. If too much is left, sets that reach
-   only a part of the required gain follow, then the test for usual errors of the model's form.
+5. The leader is fitted again and tested on held-out data.
 6. If the leader is refused, its rivals are tested.
 7. Tied effects are listed together; a leader that is not named puts calibration in doubt.
 8. If nothing is named, the numbers of the calibration are chosen.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from .answer import with_numbers, with_ties
 from .decision_rules import DecisionRules
-from .hypothesis_table import NULL, HypothesisTable, Missing, Row, SetRow, Wanted
+from .hypothesis_table import NULL, HypothesisTable, Missing, Row, Wanted
 from .judgement import JudgedTable, apply_held_out, tested, untested
 from .named_sets import largest_named
 from .reasons import ALONE, Decision, Reason, Step, steps
 
 RULES = DecisionRules()
-WITH_KNOWN_NOISE = RULES.without("most_left")  # the test of fit knows what may be left
 
 
 def decide(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | Wanted:
@@ -64,7 +61,7 @@ def _decided(case: JudgedTable) -> Decision:
         return found
     decision = replace(alone, steps=steps(alone, *refusals))
     if decision.named:
-        decision = _with_lead_refined(case, alone, decision, [s for s in sets if not s.pays])
+        decision = _with_lead_refined(case, decision)
     if decision.refused and decision.whole is None and case.rules.alternatives:
         decision = _alternatives_tested(case, decision)
     return decision
@@ -115,39 +112,14 @@ def _supported_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
     return tested(case, supported, lead)
 
 
-def _with_lead_refined(
-    case: JudgedTable, alone: Decision, decision: Decision, in_part: Sequence[SetRow]
-) -> Decision:
-    """Decide on the leader, fitted again on a refined basis, with all data.
-
-    If several effects are missing, each leaves a residual that the others would explain. Fitted
-    data may then support one more effect by a good part of the required gain. All held-out data
-    must be in favour, and all data together must reach the full gain, as for a single effect.
-
-    With a small effect, scatter of the test article and errors of the model's form leave much of Q.
-    This is accepted if p of the test of fit exceeds ``usual`` and all votes are in favour. A fifth
-    of Q must disappear from the fitted or from the held-out data.
-    """
+def _with_lead_refined(case: JudgedTable, decision: Decision) -> Decision:
+    """Decide on the leader, fitted again on a refined basis, with all data."""
     key, *behind = decision.order
-    lead, rules = case.table.refinement(key), case.rules
-    step = Step(Reason.RENEWED, key)
+    lead, step = case.table.refinement(key), Step(Reason.RENEWED, key)
     named = replace(
         decision, order=(lead.key, *behind), due=case.due(lead), steps=steps(decision, step)
     )
-    refused = apply_held_out(case, named, rules.most_left)
-    if refused.reason is not Reason.LEAVES_MORE:
-        return refused
-    found, refusals = largest_named(case, alone, in_part if rules.sets_in_part else ())
-    if found is not None:
-        return found
-    refused = replace(refused, steps=steps(refused, *refusals))
-    p = case.table.rows[key].fit(rules)
-    if not (p > rules.usual and lead.held_out_votes().all_for):
-        return refused
-    usual = apply_held_out(case, named, rules.most_usual_left)
-    if not usual.named:
-        return refused
-    return replace(usual, steps=steps(usual, Step(Reason.USUAL_LEFT, lead.key), *refusals))
+    return apply_held_out(case, named)
 
 
 def _alternatives_tested(case: JudgedTable, refused: Decision) -> Decision:
@@ -156,14 +128,14 @@ def _alternatives_tested(case: JudgedTable, refused: Decision) -> Decision:
     The evidence of the fitted data orders the explanations. Held-out data, the residual and the
     modal damping can refuse one. The next explanations undergo the same tests: one of them may be
     the true cause, while the leader imitates it and fits slightly better for a wrong reason. A
-    leader that is far ahead refutes its rivals, as it refutes calibration alone.
+    leader that is ahead by the required gain refutes the others, as it refutes calibration alone.
     """
     table, (lead, *alternatives) = case.table, case.rows(refused.order)
     ahead = table.gain(lead)
     over: tuple[tuple[str, Reason], ...] = ((lead.name, refused.reason),)
     for alternative in alternatives:
         gain = table.gain(alternative)
-        if gain <= refused.due or ahead - gain > case.rules.running * refused.due:
+        if gain <= refused.due or ahead - gain > refused.due:
             break
         following = _decided_next(case, refused, alternative, over)
         why = _against(case, refused, following) if following.named else following.reason
@@ -190,18 +162,14 @@ def _decided_next(
     if not row.fitted:
         return replace(led, reason=Reason.NOT_FITTED, named=False)
     led = tested(case, led, row)
-    return apply_held_out(case, led, case.rules.most_left) if led.named else led
+    return apply_held_out(case, led) if led.named else led
 
 
 def _against(case: JudgedTable, refused: Decision, following: Decision) -> Reason | None:
     """Return the reason that refutes a rival which passed its own tests, or None.
 
-    The leader refutes it by the required gain on fitted and held-out data, as it refutes
-    calibration alone. Modal damping that follows the leader's change refutes a lossless rival.
+    Modal damping that follows the leader's change refutes a lossless rival.
     """
-    table, rules = case.table, case.rules
     (lead, *_), (alternative, *_) = case.rows(refused.order), case.rows(following.order)
-    news = [0.0 if d.votes is None else d.votes.news for d in (refused, following)]
-    if table.gain(lead) + news[0] - table.gain(alternative) - news[1] > rules.refuted * refused.due:
-        return Reason.REFUTED
-    return Reason.DAMPING if table.after(alternative, lead) < rules.fits_damping else None
+    follows = case.table.after(alternative, lead) < case.rules.fits_damping
+    return Reason.DAMPING if follows else None

@@ -52,43 +52,14 @@ class DecisionRules:
         1.0, math.inf, "times the required gain: from there on held-out data refuse a name"
     )
     sets: bool = _rule(True, False, "several effects may be named together")
-    sets_in_part: bool = _rule(
-        True, False, "sets that reach a part of the required gain on fitted data are tested too"
-    )
-    plainly: float = _rule(0.05, 0.0, "p required of a set if one effect alone does not fit")
     harm: float = _rule(
-        1.5, math.inf, "times the held-out Q of calibration: above it a deck counts as worse"
-    )
-    faint: float = _rule(
-        2.0, 0.0, "times the required gain: below it a deck must improve held-out data"
-    )
-    most_left: float = _rule(
-        0.5, math.inf, "share of the Q of calibration: above it a name leaves more than it explains"
+        1.0, math.inf, "times the Q of calibration: a deck with an effect must not fit worse"
     )
     conflict: float = _rule(
         2.0, math.inf, "times the required gain: fitted data alone refute calibration"
     )
-    all_data: float = _rule(
-        1.0, math.inf, "times the required gain: all data together refute calibration"
-    )
-    usual: float = _rule(
-        0.9, 1.0, "p above which the residual is no more than the model's form error"
-    )
-    most_usual_left: float = _rule(
-        0.8, 0.5, "share of Q that may remain if the residual is a usual form error"
-    )
     alternatives: bool = _rule(
         True, False, "if the leader is refused, the next explanation is tested"
-    )
-    running: float = _rule(
-        2.0,
-        math.inf,
-        "times the required gain: an alternative further behind the leader is not tested",
-    )
-    refuted: float = _rule(
-        1.0,
-        math.inf,
-        "times the required gain: a refused leader this far ahead refutes an alternative",
     )
     tied: float = _rule(TIED, 0.0, "gap up to which two explanations are one answer")
     doubt: bool = _rule(

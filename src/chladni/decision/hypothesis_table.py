@@ -219,7 +219,6 @@ class HypothesisTable:
     off_the_scales : whether the given deck has another mass than was weighed, where calibration is
         all that was asked
     families : number of known families, used where none was tried
-    known_noise : whether evidence counts the covariance of the identification
     """
 
     rows: Mapping[str, Row]
@@ -233,7 +232,6 @@ class HypothesisTable:
     decks: Mapping[CalibratedDeck, tuple[float, ...]] = field(default_factory=dict)
     off_the_scales: bool = False
     families: int = 1
-    known_noise: bool = False
 
     @property
     def null(self) -> Row:

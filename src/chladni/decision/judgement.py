@@ -62,16 +62,14 @@ def untested(case: JudgedTable, decision: Decision) -> Decision:
     )  # fmt: skip
 
 
-def apply_held_out(case: JudgedTable, decision: Decision, most_left: float) -> Decision:
+def apply_held_out(case: JudgedTable, decision: Decision) -> Decision:
     """Decide on the first row with the held-out data.
 
     The fitted data must still support the name after the second fit. Held-out data refuse it
 
     - if they are against it by the required gain;
     - if all data together bring less than the required gain;
-    - if the deck with the effect predicts them much worse than calibration does, or worse at all
-      where the fitted data bring less than twice the required gain;
-    - if more than ``most_left`` of the Q of plain calibration is left, fitted and held out.
+    - if the deck with the effect fits worse than the calibrated deck.
 
     Data that are insensitive to the effect are predicted equally well without it and have no vote.
     All data together, or the fitted data by far, may refute calibration even so. The cause is then
@@ -79,25 +77,22 @@ def apply_held_out(case: JudgedTable, decision: Decision, most_left: float) -> D
     """
     table, rules = case.table, case.rules
     row = table.rows[decision.order[0]]
-    due, gain, votes, left = decision.due, table.gain(row), row.held_out_votes(), row.leaves()
+    due, gain, votes = decision.due, table.gain(row), row.held_out_votes()
     decision = replace(decision, votes=votes)
     voted = case.evidence_suffices(gain, votes, due, table.poles)
-    calibrated, held_out = left.held_out
-    supported = voted and not held_out > rules.harm * calibrated
-    faint = gain < rules.faint * due and held_out > calibrated
-    if supported and not (faint or _leaves_more(row, most_left)):
+    if voted and not _fits_worse(row, rules.harm):
         return replace(
             decision, verdict=row.verdict, reason=Reason.NAMED, named=True,
             steps=steps(decision, Step(Reason.HELD_OUT, row.key)),
         )  # fmt: skip
+    row.leaves()  # its sentence says Q with the effect
     why = Reason.AGAINST if any(g < 0 for g in votes.given) else Reason.TOO_LITTLE
-    if voted:
-        why = Reason.WORSE if faint or not supported else Reason.LEAVES_MORE
+    why = Reason.WORSE if voted else why
     refused = replace(
         decision, reason=why, named=False, steps=steps(decision, Step(why, row.key)), one_of=()
     )
     together = gain + votes.news
-    if together > rules.all_data * due and not supported:
+    if together > due:
         by, gain = Reason.ALL_DATA, together
     elif gain > rules.conflict * due:
         by = Reason.WHAT_WAS_FITTED
@@ -111,13 +106,12 @@ def apply_held_out(case: JudgedTable, decision: Decision, most_left: float) -> D
     )  # fmt: skip
 
 
-def _leaves_more(row: Row, most: float) -> bool:
-    """True if more of Q is left than the rules allow, fitted and held out.
+def _fits_worse(row: Row, harm: float) -> bool:
+    """True if the deck with an effect has a larger Q than the calibrated deck.
 
-    A fault of a few channels is tested on the held-out data of these channels only.
+    Physics must not worsen the fitted data either. A fault of a few channels is compared on the
+    held-out data of these channels.
     """
-    if not (row.physics or row.channels):
-        return False
     left = row.leaves()
-    compared = (left.held_out,) if row.channels else (left.fitted, left.held_out)
-    return all(with_it > most * calibrated for calibrated, with_it in compared)
+    compared = (left.fitted, left.held_out) if row.physics else (left.held_out,)
+    return any(with_it > harm * calibrated for calibrated, with_it in compared)

@@ -8,7 +8,7 @@ and held-out data must support it against calibration alone.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from .hypothesis_table import NULL, SetRow
+from .hypothesis_table import SetRow
 from .judgement import JudgedTable, apply_held_out, tested
 from .reasons import Decision, Reason, Step, steps
 
@@ -32,7 +32,7 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
     Every member must be supported with all others in place. The set must pass the test of fit and
     the rules for held-out data, as a single effect must.
     """
-    table, rules = case.table, case.rules
+    table = case.table
     row = table.refinement(whole.key)
     lost = max(0.0, row.neg2_log_evidence - table.rows[whole.key].neg2_log_evidence)
     done = [Step(Reason.FOUND_TOGETHER, whole.key)]
@@ -48,10 +48,7 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
     found = tested(case, begun, row)
     if not found.named:
         return Step(Reason.SET_REFUSED, whole.key, Reason.UNFIT)
-    before = table.rows[alone.tested or NULL]
-    if not before.fits(rules) and row.fit(rules) < rules.plainly:
-        return Step(Reason.SET_REFUSED, whole.key, Reason.BARELY_FITS)
-    found = apply_held_out(case, found, rules.most_left)
+    found = apply_held_out(case, found)
     if not found.named:
         return Step(Reason.SET_REFUSED, whole.key, found.reason)
     found = replace(found, reason=Reason.TOGETHER)

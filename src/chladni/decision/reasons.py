@@ -21,13 +21,10 @@ class Reason(Enum):
     UNFIT = auto()  # the test of fit
     AGAINST = auto()  # held-out data are against it
     TOO_LITTLE = auto()  # gain of all data together
-    WORSE = auto()  # fit of the deck to held-out data
-    LEAVES_MORE = auto()  # than it explains
+    WORSE = auto()  # fit of its deck than of the calibrated deck
     NOT_FITTED = auto()  # the second fit, on a refined basis, failed
-    REFUTED = auto()  # by a leader that is refused itself
     DAMPING = auto()  # follows the change by the leader
     NOT_SUPPORTED = auto()  # a member of a set is not supported by held-out data
-    BARELY_FITS = auto()  # a set, where one effect alone does not fit
     # intermediate steps
     TESTED = auto()  # against its own predictions
     RENEWED = auto()  # the fit was repeated on a refined basis
@@ -40,7 +37,6 @@ class Reason(Enum):
     RIVAL_OF_MEMBER = auto()
     ALL_DATA = auto()  # refute calibration alone
     WHAT_WAS_FITTED = auto()  # refutes calibration alone
-    USUAL_LEFT = auto()  # no more is left than errors of the model's form leave
     NEXT = auto()  # explanation after a refused leader
     TIED = auto()  # explains the data equally well
     DOUBT = auto()  # calibration or the leader

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..decision.decide import RULES, WITH_KNOWN_NOISE, decide
+from ..decision.decide import RULES, decide
 from ..decision.decision_rules import DecisionRules
 from ..decision.hypothesis_table import (
     Ask,
@@ -84,9 +84,7 @@ def decided(prepared: Prepared, found: Diagnosis, refine: Refine) -> tuple[Decis
     ----------
     refine : fits a hypothesis again on a reduced model that is accurate enough for it
     """
-    known = begun(prepared, found)
-    rules = WITH_KNOWN_NOISE if known.table.known_noise else RULES
-    return decided_by(rules, prepared, found, refine, known)
+    return decided_by(RULES, prepared, found, refine, begun(prepared, found))
 
 
 def decided_by(

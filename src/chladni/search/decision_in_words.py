@@ -16,10 +16,7 @@ UNEXPLAINED = "; nothing in the catalogue explains the recording"
 REFUSED = {
     Reason.AGAINST: "the held-out data speak against it",
     Reason.TOO_LITTLE: "all data together give too little evidence",
-    Reason.WORSE: "the deck with it fits the held-out data worse",
-    Reason.LEAVES_MORE: "it leaves more than it explains",
-    Reason.BARELY_FITS: "the fit is only just good enough, and one effect alone does not fit",
-    Reason.REFUTED: "the leader explains far more, although it is refused itself",
+    Reason.WORSE: "the deck with it fits worse than the calibrated deck",
 }
 DATA = {Reason.ALL_DATA: "all data", Reason.WHAT_WAS_FITTED: "the fitted data"}
 
@@ -203,12 +200,6 @@ class DecisionWords:
         odd = [needs_impossible(r.name, r.implausible) for r in alternatives if r.implausible]
         return _with_check("; ".join([note, *odd]), step.names)
 
-    def _usual_left(self, step: Step) -> str:
-        return (
-            f"{self.row(step.key).name} leaves more than it explains, but no more than form "
-            "errors of models usually leave: a smaller effect may be missing too"
-        )
-
     def _next(self, step: Step) -> str:
         (before,), name = step.names, self.row(step.key).name
         assert step.why is not None
@@ -252,7 +243,6 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.AGAINST: DecisionWords._refused,
     Reason.TOO_LITTLE: DecisionWords._refused,
     Reason.WORSE: DecisionWords._refused,
-    Reason.LEAVES_MORE: DecisionWords._refused,
     Reason.ALL_DATA: DecisionWords._unexplained,
     Reason.WHAT_WAS_FITTED: DecisionWords._unexplained,
     Reason.FOUND_TOGETHER: DecisionWords._found_together,
@@ -260,7 +250,6 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.SET_REFUSED: DecisionWords._set_refused,
     Reason.PERHAPS_PRESENT: DecisionWords._perhaps_of_set,
     Reason.RIVAL_OF_MEMBER: DecisionWords._rival_of_member,
-    Reason.USUAL_LEFT: DecisionWords._usual_left,
     Reason.NEXT: DecisionWords._next,
     Reason.TIED: DecisionWords._tied,
     Reason.DOUBT: DecisionWords._doubt,

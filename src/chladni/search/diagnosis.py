@@ -166,7 +166,6 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         poles=isinstance(found.null.data, Poles),
         implausible=bool(implausible_values(found.plain.fit)),
         families=len(problem.families),
-        known_noise=getattr(found.null.data, "identified", None) is not None,
     )
     tests = dict(found.tests)
     while isinstance(said := called(table), Wanted):
