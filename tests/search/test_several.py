@@ -313,3 +313,14 @@ def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monk
     problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
     found = diagnosing._with_sets_of_effects(problem, quiet, lambda text, share: None)
     assert (found.verdict, found.sets) == ("nothing missing", ())
+
+
+@pytest.mark.parametrize("shift", [-0.6, 0.6])
+def test_a_deck_far_off_in_frequency_is_calibrated(reduced, shift):
+    """From the deck's own E a fit stops between two resonances."""
+    problem = problem_of(reduced, [])
+    data = replace(problem.data, s=problem.data.s.imag * (0.02 + 1j))
+    state = evaluate(reduced.model, problem.base, np.append(shift, problem.mean()[1:]), False)
+    problem = replace(problem, data=replace(data, values=data.model(state)))
+    _, null = diagnosing.without_effects(problem)
+    assert null.fit.x[0] == pytest.approx(shift, abs=0.03)

@@ -42,6 +42,7 @@ from .candidates import candidates, unasked
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
 
+SHIFTS = np.arange(-14, 15) / 20  # of ln E: 2.5 % of frequency apart
 PASSES = 4  # fits of the null, until the size of the error of form stays
 
 Progress = Callable[[str, float], None]
@@ -294,12 +295,23 @@ def nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:
 
 
 def _null_starts(problem: UpdatingProblem) -> list[np.ndarray]:
-    """The prior mean; where modes must be paired, also softer and stiffer by up to a third."""
+    """The prior mean, and structures softer and stiffer by up to a half.
+
+    Responses choose the one of them with the least Q: between two resonances a fit would stop.
+    """
     mean = problem.mean()
-    if isinstance(problem.data, Responses):
-        return [mean]
     stiff = np.array([p.name == "E" for e in problem.base for p in e.parameters], dtype=float)
-    return [mean + shift * stiff for shift in (0.0, -0.35, 0.35, -0.7, 0.7)]
+    if not isinstance(data := problem.data, Responses):
+        return [mean + shift * stiff for shift in (0.0, -0.35, 0.35, -0.7, 0.7)]
+
+    def Q(start: np.ndarray) -> float:
+        try:
+            return data.Q(evaluate(problem.reduced.model, problem.base, start, False), data.use)
+        except ModelError:
+            return np.inf
+
+    best = min((mean + shift * stiff for shift in SHIFTS), key=Q)
+    return [mean] if np.array_equal(best, mean) else [mean, best]
 
 
 def _restarted(
