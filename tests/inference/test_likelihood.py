@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import channel_gain, sensor_fault
 from chladni.fem.modelled import solved
-from chladni.inference.hypothesis_fit import over_scales
+from chladni.inference.hypothesis_fit import SCALES, fitted, over_scales
 from chladni.inference.pole_data import Poles
 from chladni.reduced.reduced_model import evaluate
+from chladni.reduced.reduced_problem import reduced_problem
+from chladni_specimens.plates import plate
 
 
 @pytest.fixture(scope="module")
@@ -154,3 +156,21 @@ def test_one_more_pole_is_foretold_by_a_density(reduced, poles):
     modes = (ahead < f[3] * np.exp(ln[-1])).sum()
     assert_allclose(mass, modes, rtol=0.02)
     assert density[420] > 1e-3 * max(density)  # a per cent off is no refutation of few poles
+
+
+@pytest.mark.parametrize(("seed", "off"), [(6, 0.05), (8, 0.1), (1, 0.05)])
+def test_poles_keep_the_spread_of_their_own_fit(seed, off):
+    """The wide spread at which pairs are found is not the one that the fit leaves."""
+    reduced = reduced_problem(plate(0.4, 0.3, 8, 6, 1.5e-3), 400.0)
+    base = [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho", "t")]
+    base.append(random_field(reduced.groups, "t", 0.01))
+    x = np.zeros(sum(len(e.parameters) for e in base))
+    x[:3] = np.random.default_rng(seed).normal(scale=off, size=3)
+    lam = evaluate(reduced.model, base, x, False).lam
+    f = np.sqrt(lam[lam > 1e3][:12]) / (2 * np.pi)
+    every = np.ones(len(f))
+    data = Poles(f, 5e-4 * every, every > 0, every, (5.0, 1.01 * f[-1]))
+    found = fitted(reduced.model, base, data, None, 0 * x)
+    delta, test, _ = found.data.deviation(found.state)
+    assert len(test) == len(f)
+    assert found.data.scale < 2 * max(np.abs(delta).max(), SCALES[0])

@@ -307,6 +307,7 @@ def _fit_poles(
     return min(options, key=lambda f: f.neg2_log_evidence)
 
 
+ALIKE = 1.0  # in -2 ln evidence: fits of one state on different scales
 ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settles
 
 
@@ -317,17 +318,18 @@ def _settled(
     mass_measurement: MassMeasurement | None,
     x: np.ndarray,
 ) -> Fit:
-    """Fit scale and parameters in turn until the evidence stays constant."""
+    """Fit scale and parameters in turn until the scale is that of its own fit."""
     best = None
-    for _ in range(4):
+    for _ in range(6):
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
+        if best is not None and scale == best.data.scale:  # type: ignore[union-attr]
+            break
         now = fit(model, effects, replace(data, scale=scale), mass_measurement, x)
         S = over_scales(
             data, now.state, *prior_residuals(effects, mass_measurement, now.x, now.state)
         )
-        S += constants(effects)
-        now = replace(now, neg2_log_evidence=S)
-        if best is not None and now.neg2_log_evidence > best.neg2_log_evidence - 0.05:
+        now = replace(now, neg2_log_evidence=S + constants(effects))
+        if best is not None and now.neg2_log_evidence > best.neg2_log_evidence + ALIKE:
             break
         best, x = now, now.x
     return best if best is not None else now
