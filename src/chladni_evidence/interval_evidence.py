@@ -1,8 +1,8 @@
 """Coverage of intervals and uniformity of the test of fit: truths drawn from the priors.
 
 If the likelihood is right, the posterior probability below the truth is uniform, for every value
-and for every combination of values, and so is p of the test of fit (Talts et al. 2018, Validating
-Bayesian inference algorithms with simulation-based calibration, arXiv:1804.06788).  Articles whose
+and for every combination of values (Talts et al. 2018, Validating Bayesian inference algorithms
+with simulation-based calibration, arXiv:1804.06788). p of the test of fit is uniform as well.  Articles whose
 values scatter less than the priors cannot show that: their intervals hold the truth too often.
 """
 
@@ -135,7 +135,7 @@ def interval_evidence(
 ) -> list[CalibratedArticle]:
     """CalibratedArticle an article of every structure and maker for each seed, and say the table.
 
-    ``intervals.jsonl`` in ``out`` gets a line as each ends. The same call continues it.
+    ``intervals.jsonl`` in ``out`` gets a line as each ends. A further call continues it.
     """
     make_folder(out)
     kept = out / "intervals.jsonl"

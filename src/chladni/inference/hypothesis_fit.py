@@ -319,10 +319,11 @@ def _settled(
     x: np.ndarray,
 ) -> Fit:
     """Fit scale and parameters in turn until the scale is that of its own fit."""
-    best = None
+    best, scale = None, 0.0
     for _ in range(6):
-        scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
-        if best is not None and scale == best.data.scale:  # type: ignore[union-attr]
+        before, state = scale, evaluate(model, effects, x, False)
+        scale = _likely_scale(replace(data, scale=SCALES[0]), state)
+        if scale == before:
             break
         now = fit(model, effects, replace(data, scale=scale), mass_measurement, x)
         S = over_scales(
