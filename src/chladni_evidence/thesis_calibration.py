@@ -23,7 +23,8 @@ from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
 from chladni.parallel import one_blas_thread
 from chladni.progress import Progress, within
-from chladni.reduced.reduced_model import evaluate, slices
+from chladni.reduced.effect_dofs import slices
+from chladni.reduced.reduced_model import evaluate
 from chladni.report.blocks import Block, Items, Picture, Section, Table, Text
 from chladni.report.words import number
 from chladni.search.calibration import about_nominal

@@ -69,7 +69,7 @@ def of_effect(
 def _at(request: VaryText, kind: Family, grid: int, assembly: Assembly) -> Effect:
     """The effect at a grid; one with a direction acts across the sheet or beam."""
     where = _surroundings(assembly, None)
-    if not issubclass(kind.effect, MovableAttachment) or kind.effect.own_dofs:
+    if not issubclass(kind.effect, MovableAttachment) or kind.effect.traits.own_dofs:
         raise _refused(request, kind)
     if grid not in where.grids.grids:
         raise request.refused(f"grid {grid} is on no shell and no beam of the deck")
@@ -79,7 +79,7 @@ def _at(request: VaryText, kind: Family, grid: int, assembly: Assembly) -> Effec
 def _placed(request: VaryText, kind: Family, assembly: Assembly, case: Case | None) -> Effect:
     """The effect at the place given by the test of a case."""
     if kind.placed is None or kind.on_sheets:
-        if issubclass(kind.effect, MovableAttachment) and not kind.effect.own_dofs:
+        if issubclass(kind.effect, MovableAttachment) and not kind.effect.traits.own_dofs:
             raise request.refused(
                 f"no place; write {kind.name} at GRID=..., with a grid of the deck"
             )

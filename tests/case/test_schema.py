@@ -11,7 +11,7 @@ from chladni.case import load_case
 from chladni.case.schema import COLUMNS, COMMANDS, PLANNED, SCHEMA, known, sections, unread
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
-from chladni.effects.effect import Effect
+from chladni.effects.effect import Effect, FieldChange, MatrixTerm, of
 from chladni.effects.registry import families
 from chladni.errors import ChladniError
 from chladni.fem.assemble import structure
@@ -207,8 +207,9 @@ def effect_bytes(effect: Effect) -> bytes:
     said = [effect.name, effect.text, getattr(effect, "called", ""), *map(str, effect.parameters)]
     for shift in (-0.3, 0.3):
         x = np.array([shift] * len(effect.parameters))
-        said += [f"{c.field}{c.value.tolist()}" for c in effect.fields(x)]
-        said += [f"{t.matrix}{t.coefficient}{t.operator.sum()}" for t in effect.matrices(x)]
+        terms = effect.terms(x)
+        said += [f"{c.field}{c.value.tolist()}" for c in of(FieldChange, terms)]
+        said += [f"{t.matrix}{t.coefficient}{t.operator.sum()}" for t in of(MatrixTerm, terms)]
     return repr(said).encode()
 
 

@@ -156,7 +156,7 @@ def test_first_frequency_of_a_strip_falls_as_beam_theory_says():
     effect, x = crack(reduced.groups, across[0], 1), np.array([-8.0])
     state = evaluate(reduced.model_for(effect, x), [effect], x)
     seventh = state.vectors[:, 6]
-    got = seventh @ state.dK[0] @ seventh / state.lam[6] / effect.matrices(x)[0].gradient[0]
+    got = seventh @ state.dK[0] @ seventh / state.lam[6] / effect.terms(x)[0].gradient[0]
     k, s = 4.730040744862704, np.linspace(0, 1, 5001)  # cos k cosh k = 1
     r = (np.cosh(k) - np.cos(k)) / (np.sinh(k) - np.sin(k))
     bent = np.cosh(k * s) - np.cos(k * s) - r * (np.sinh(k * s) - np.sin(k * s))
@@ -207,7 +207,7 @@ def test_slopes_of_a_line_are_those_of_its_effect(scanned):
         effect, x = crack(reduced.groups, lines[k], 1), np.array([0.0, -40.0])
         state = evaluate(reduced.model, [*base.effects, effect], x)
         J = data.scaled(state, True)[1][:, 1]
-        a = effect.matrices(np.array([0.0]))[0]
+        a = effect.terms(np.array([0.0]))[0]
         at = np.array([0.0, 0.0])
         bent = data.scaled(evaluate(reduced.model, [*base.effects, effect], at), True)[1][:, 1]
         assert np.abs(J).max() < 1e-12  # idle: the logit is flat there

@@ -121,7 +121,7 @@ def test_the_deck_has_the_stiffness_of_the_terms(deck, reduced, found, families)
     """K + (f - 1) K_j + (g - 1) Σ K_i, with the joint in the deck times f, not times f g."""
     effect = of_one(WeldCompliance, found[0].joint, found[0].share, families, 4)
     x = np.array([8.0, np.log(1.5)])
-    terms = effect.matrices(x)
+    terms = effect.terms(x)
     due = reduced.structure.system.K + sum(t.coefficient * t.operator for t in terms)
     made = structure(effect.apply(deck, x)).system.K
     assert len(terms) == 2
@@ -131,8 +131,8 @@ def test_the_deck_has_the_stiffness_of_the_terms(deck, reduced, found, families)
 def test_names_follow_what_is_carried(found, families):
     one = found[0]
     effect = of_one(WeldCompliance, one.joint, one.share, families, 4)
-    assert effect.becomes(np.array([NONE_LEFT - 0.1, 0.0])) == "weld-missing"
-    assert effect.becomes(np.array([NONE_LEFT + 0.1, 0.0])) == ""
+    assert effect.remarks(np.array([NONE_LEFT - 0.1, 0.0])).becomes == "weld-missing"
+    assert effect.remarks(np.array([NONE_LEFT + 0.1, 0.0])).becomes == ""
     left = [effect.left(x)[0] for x in (-2.0, 0.0, 30.0, SOUND)]
     assert_allclose(left, one.share.min() * np.exp([-2.0, 0.0, MOST_LN_LEFT, 0.0]) ** [1, 1, 1, 0]
                     * np.array([1, 1, 1, 1 / one.share.min()]), rtol=1e-6)  # fmt: skip
@@ -214,8 +214,8 @@ def test_a_bead_of_any_stiffness_is_that_of_the_deck(deck, reduced):
     for x in (-4.0, -1.0, 2.0, 4.0):
         model = reduced.model_for(effect, np.array([x]))
         assert_allclose(hertz(model, effect, [x]), full(effect.apply(deck, [x])), rtol=2e-3)
-    assert effect.implausible(np.array([np.log(SEALANT / 6e6) + 0.1]))
-    assert not effect.implausible(np.array([np.log(SEALANT / 6e6) - 0.1]))
+    assert effect.remarks(np.array([np.log(SEALANT / 6e6) + 0.1])).implausible
+    assert not effect.remarks(np.array([np.log(SEALANT / 6e6) - 0.1])).implausible
 
 
 def test_no_contact_is_looked_for_beside_a_fold():

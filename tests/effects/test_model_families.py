@@ -88,7 +88,7 @@ def test_a_family_in_the_deck_is_what_the_fit_had(deck, jointed, name):
     family = next(f for f in joint_nuisances(built) if f.text == name)
     assert family.apply(assembly, x) is assembly  # a nuisance is no number of a deck
     made = structure(calibrated_family(family).apply(assembly, x)).system
-    (term,) = family.matrices(x)
+    (term,) = family.terms(x)
     assert abs(term.operator).max() > 0
     error = made.K - built.system.K - term.coefficient * term.operator
     assert abs(error).max() < 1e-6 * abs(built.system.K).max()

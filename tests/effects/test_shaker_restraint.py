@@ -140,8 +140,8 @@ def test_a_gauge_is_not_on_the_scales(problem, restraint):
     """All that it adds to the deck is off when the structure is weighed."""
     x, deck = np.array([0.5, -0.4, 0.8]), problem.structure.assembly
     added = mass_properties(restraint.apply(deck, x))[0] - mass_properties(deck)[0]
-    assert_allclose(restraint.off_the_scales(x), added)
-    assert restraint.weight(x)[0] == 0.0
+    assert_allclose(restraint.weight(x).removed, added)
+    assert restraint.weight(x).mass == 0.0
 
 
 def test_it_begins_at_its_prior_mean_as_well(restraint):

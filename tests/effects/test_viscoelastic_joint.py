@@ -279,7 +279,7 @@ def test_a_bush_that_dissipates_has_its_own_loss_in_the_deck(on_mounts):
 def test_the_deck_is_told_what_no_card_holds(mastic):
     """|E| over frequency as a comment: one at f_0, and to the power a of the frequency."""
     effect, _ = mastic
-    said = effect.deck_comment(X).splitlines()
+    said = effect.remarks(X).comment.splitlines()
     _, a, _ = effect.exponent(X)
     rows = [line.split(" Hz: E times ") for line in said[1:-1]]
     f, factor = np.array(rows, float).T

@@ -36,8 +36,8 @@ def test_shells_that_touch_a_weld_are_its_innermost_ring(reduced, patch):
 
 
 def test_it_does_nothing_at_the_deck_s_values(patch):
-    assert all(term.coefficient == 0 for term in patch.matrices(np.zeros(2)))
-    assert all(term.coefficient == 0 for term in patch.matrices(np.array([0.0, 0.5])))
+    assert all(term.coefficient == 0 for term in patch.terms(np.zeros(2)))
+    assert all(term.coefficient == 0 for term in patch.terms(np.array([0.0, 0.5])))
 
 
 @pytest.mark.parametrize("x", [(0.4, 0.0), (-0.5, 0.6), (0.3, -0.8)])
@@ -55,9 +55,9 @@ def test_slopes_are_exact(patch):
     x, along = np.array([0.3, -0.2]), np.array([0.7, -1.1])
 
     def coefficients(x):
-        return np.array([t.coefficient for t in patch.matrices(x)])
+        return np.array([t.coefficient for t in patch.terms(x)])
 
-    slope = np.array([t.gradient for t in patch.matrices(x)]) @ along
+    slope = np.array([t.gradient for t in patch.terms(x)]) @ along
     left = [
         np.abs(coefficients(x + h * along) - coefficients(x) - h * slope).max()
         for h in (1e-2, 5e-3, 2.5e-3)

@@ -101,8 +101,8 @@ class InOtherUnits(Effect):
     of: Effect = field(default_factory=Effect)
     c: float = 1.0
 
-    def fields(self, x):
-        return tuple(replace(f, gradient=self.c * f.gradient) for f in self.of.fields(self.c * x))
+    def terms(self, x):
+        return tuple(replace(t, gradient=self.c * t.gradient) for t in self.of.terms(self.c * x))
 
 
 def in_other_units(effect, c):

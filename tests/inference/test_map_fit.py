@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.effect import ChannelChange, Effect, Parameter
+from chladni.effects.effect import ChannelChange, Effect, Parameter, Weight
 from chladni.errors import ModelError
 from chladni.inference.map_fit import MassMeasurement, Status, fit
 from chladni.reduced.reduced_problem import reduced_problem
@@ -24,11 +24,11 @@ class Linear(Effect):
     A: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     w: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def outputs(self, x):
-        return ChannelChange((self.A @ x).astype(complex), self.A.astype(complex))
+    def terms(self, x):
+        return (ChannelChange((self.A @ x).astype(complex), self.A.astype(complex)),)
 
     def weight(self, x):
-        return float(self.w @ x), self.w
+        return Weight(float(self.w @ x), self.w)
 
 
 @dataclass(frozen=True, eq=False)

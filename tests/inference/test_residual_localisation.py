@@ -25,7 +25,7 @@ class Local(Effect):
     quantity = "E"
     centre: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
-    def fields(self, x):
+    def terms(self, x):
         slope = (np.linalg.norm(self.centre - PLACE, axis=1) < 0.06).astype(float)[:, None]
         return (FieldChange(self.quantity, slope[:, 0] * x[0], slope),)
 

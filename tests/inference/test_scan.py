@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.effect import Parameter, PointTerm
+from chladni.effects.effect import Parameter, PointTerm, Traits, Weight
 from chladni.effects.points import AtPoints
 from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.scan import (
@@ -24,21 +24,21 @@ WEIGHED = MassMeasurement(1.45, 0.01)
 STRENGTHS = {"M": np.array([0.003, 0.04, 0.3]), "K": np.array([30.0, 2e3, 1e5])}
 
 
-class Weight(AtPoints):
+class Heavy(AtPoints):
     """A mass along one direction, seen by the scales."""
 
     matrix = "M"
 
     def weight(self, x):
         m = self.parameters[0].value(x[0])
-        return m, np.array([m])
+        return Weight(m, np.array([m]))
 
 
 @dataclass(frozen=True, eq=False)
-class Lump(Weight):
+class Lump(Heavy):
     """A mass on a spring along one direction, seen by the scales."""
 
-    own_dofs = 1
+    traits = Traits(own_dofs=1)
     hertz: float = 0.0
 
     def terms(self, x):
@@ -56,7 +56,7 @@ def base(reduced, responses):
 
 def directly(base, model, data, places, k, matrix, strength):
     """Score of the same thing as an effect in the reduced model."""
-    kind = Weight if matrix == "M" else AtPoints
+    kind = Heavy if matrix == "M" else AtPoints
     one = kind((Parameter("c", "-", 0.0, 1.0, strength),), rows=places.rows[[k]])
     return base.score(residuals(base, model, data, one))[0]
 

@@ -7,6 +7,7 @@ import pytest
 
 from chladni.decision.decision_rules import TIED
 from chladni.effects.effect import Parameter
+from chladni.effects.estimate import Remarks
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.model_families import ModelFamily
 from chladni.effects.registry import families
@@ -18,10 +19,8 @@ ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
 
 
 def tried(name, S, becomes="", implausible="", ln_k=0.0, nearly=""):
-    effect = SimpleNamespace(
-        name=name, becomes=lambda x: becomes, implausible=lambda x: implausible,
-        nearly=lambda x, sd: nearly, expected=False,
-    )  # fmt: skip
+    said = Remarks(becomes, nearly, implausible)
+    effect = SimpleNamespace(name=name, remarks=lambda x, sd=None: said, expected=False)
     at = np.array([ln_k])
     fit = SimpleNamespace(effects=(ADHESIVE,), of=lambda e: at, sd=lambda e: 0.1 + 0 * at)
     return SimpleNamespace(
@@ -46,8 +45,8 @@ def test_a_lump_whose_spring_may_be_stiff_may_be_a_point_mass(sd, name):
     other = tuple(Parameter(q, "-", 0.0, 1.0) for q in "mab")
     resonator = LocalResonator((*other, f))
     x = np.array([0.0, 0.0, 0.0, np.log(1.5)])
-    assert resonator.becomes(x) == ""
-    assert resonator.nearly(x, np.array([0.1, 0.1, 0.1, sd])) == name
+    known = resonator.remarks(x, np.array([0.1, 0.1, 0.1, sd]))
+    assert (known.becomes, known.nearly) == ("", name)
 
 
 def test_what_has_become_the_named_effect_is_told_as_that():
@@ -61,8 +60,8 @@ def test_what_has_become_the_named_effect_is_told_as_that():
 def test_a_lump_tuned_above_the_highest_line_is_a_point_mass():
     high = SimpleNamespace(value=lambda x: x, scale=100.0)
     effect = SimpleNamespace(parameters=(None, None, None, high))
-    assert LocalResonator.becomes(effect, [0, 0, 0, 301.0]) == "point-mass"
-    assert LocalResonator.becomes(effect, [0, 0, 0, 299.0]) == ""
+    assert LocalResonator.remarks(effect, [0, 0, 0, 301.0]).becomes == "point-mass"
+    assert LocalResonator.remarks(effect, [0, 0, 0, 299.0]).becomes == ""
 
 
 RUBS = "1 of 5 modes have a damping of 2.0%"

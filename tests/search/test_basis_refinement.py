@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.effect import Effect
+from chladni.effects.effect import Effect, Traits
 from chladni.errors import ModelError
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.inference.map_fit import fit
@@ -17,7 +17,7 @@ from chladni.search import basis_refinement
 class Remade(Effect):
     """So strong that the structure is another one."""
 
-    remakes_structure = True
+    traits = Traits(remakes_structure=True)
 
 
 @pytest.mark.parametrize(("effect", "structure"), [(Effect(), "deck"), (Remade(), "remade")])

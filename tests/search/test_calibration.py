@@ -36,8 +36,8 @@ class Column(Effect):
 
     column: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def outputs(self, x):
-        return ChannelChange(self.column * x[0] + 0j, self.column[:, None] + 0j)
+    def terms(self, x):
+        return (ChannelChange(self.column * x[0] + 0j, self.column[:, None] + 0j),)
 
 
 @dataclass(frozen=True, eq=False)

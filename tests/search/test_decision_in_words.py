@@ -9,6 +9,7 @@ from tests.decision.tables import FOR, decision, row, table, together
 
 from chladni.decision.decision_rules import gain_due
 from chladni.decision.hypothesis_table import NULL, AlternativeRow, CalibratedDeck, Left, Votes
+from chladni.effects.estimate import Remarks
 from chladni.inference.adequacy import FitTest
 from chladni.search.deciding import Measured
 from chladni.search.decision_in_words import UNEXPLAINED, DecisionWords
@@ -29,7 +30,8 @@ WORN = {"decks": dict.fromkeys(CalibratedDeck, (1.1, 1.1)) | {CalibratedDeck.GIV
 
 def fit_of(name, key):
     odd = "E of 300 MPa is too high for a sealant" if name == "adhesive-stiffness" else ""
-    effect = SimpleNamespace(name=name, text=f"{name} at grid 7", implausible=lambda x: odd)
+    said = Remarks(implausible=odd)
+    effect = SimpleNamespace(name=name, text=f"{name} at grid 7", remarks=lambda x: said)
     return SimpleNamespace(effect=effect, fit=SimpleNamespace(of=lambda e: np.zeros(1)), key=key)
 
 

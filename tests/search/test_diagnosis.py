@@ -82,7 +82,7 @@ def test_a_leader_goes_on_to_where_its_family_finds_it_closer(gains, followed):
 
 
 def hypothesis_at(name, evidence):
-    effect = SimpleNamespace(name=name, recentred=lambda x, where: None)
+    effect = SimpleNamespace(name=name)
     fit = SimpleNamespace(effects=(), of=lambda effect: np.zeros(1), neg2_log_evidence=evidence)
     return SimpleNamespace(
         effect=effect, effects=(effect,), fit=fit, neg2_log_evidence=evidence, data=None

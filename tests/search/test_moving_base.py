@@ -64,7 +64,7 @@ class MatrixScale(Effect):
 
     operator: sp.csr_array | None = None
 
-    def matrices(self, x):
+    def terms(self, x):
         return (MatrixTerm("M", self.operator, np.expm1(x[0]), np.exp(x)),)
 
 

@@ -150,10 +150,10 @@ def test_a_mass_that_no_candidate_was_is_found_where_another_lump_is(reduced, on
     tried, null = [Candidate(*begun, problem.mean())], null_of(problem)
     best = search_round(problem, null, tried, lambda text, share: None)
     assert {t.name for t in best} == {only, "point-mass", "mass-patch"}
-    (place, m) = best[0].effect.lump(best[0].fit.of(best[0].effect))
+    mass, x = best[0].effect, best[0].fit.of(best[0].effect)
     assert best[0].name == "point-mass"
-    assert np.linalg.norm(place[:2] - HERE) < 0.01
-    assert m == pytest.approx(weight, rel=0.05)
+    assert np.linalg.norm(np.array(mass.location(x).point_m[:2]) - HERE) < 0.01
+    assert mass.weight(x).mass == pytest.approx(weight, rel=0.05)
 
 
 @pytest.mark.parametrize(("place", "begun"), [(HERE, 0), (THERE, 2)])

@@ -77,7 +77,7 @@ def learned(hypothesis, unseen):
     Its numbers are as uncertain as before the test.
     """
     own, x = hypothesis.fit, hypothesis.fit.x.copy()
-    (scatter,) = [e for e in own.effects if not e.writable]
+    (scatter,) = [e for e in own.effects if not e.traits.writable]
     x[own.slice(scatter)] = 3 * np.eye(len(scatter.parameters))[2]
     data = hypothesis.data.using(hypothesis.data.use & ~unseen)
     prior = np.diag([p.sd**2 for e in own.effects for p in e.parameters])
@@ -94,7 +94,7 @@ def off(deck, whole, use):
 
 def test_a_deck_that_can_hold_all_that_was_found_keeps_its_numbers(learned, unseen):
     """Without scatter the hypothesis is the deck: no number moves, wherever the prior would."""
-    kept = [e for e in learned.fit.effects if e.writable]
+    kept = [e for e in learned.fit.effects if e.traits.writable]
     bare = fit(learned.model, kept, learned.data, None, np.concatenate(
         [learned.fit.of(e) for e in kept]))  # fmt: skip
     deck = as_foretold(replace(learned, fit=bare), None, unseen)
@@ -113,7 +113,7 @@ def test_a_deck_responds_as_what_was_found_does_on_lines_that_were_held_out_too(
 @pytest.mark.parametrize("share", [0.5, 0.0])
 def test_numbers_of_a_deck_stay_within_the_intervals_of_what_was_found(learned, unseen, share):
     """As far as the narrowest lets them, all along the same line."""
-    kept = [e for e in learned.fit.effects if e.writable]
+    kept = [e for e in learned.fit.effects if e.traits.writable]
     found = np.concatenate([learned.fit.of(e) for e in kept])
     free = as_foretold(learned, None, unseen).fit.x - found
     at = learned.fit.slice(kept[0])

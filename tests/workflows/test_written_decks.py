@@ -10,6 +10,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 import chladni
+from chladni.effects.effect import Traits, Weight
 from chladni.fem.energy import mass_properties
 from chladni.model.point_masses import with_masses
 from chladni.reduced.accuracy import LIMIT
@@ -103,8 +104,8 @@ def test_an_updated_deck_is_weighed_without_the_sensors_that_were_found():
     deck = plate(0.3, 0.2, 6, 4, 1e-3)
     heavier = with_masses(deck, (1, 7), 0.05)
     effects = (
-        SimpleNamespace(writable=True, off_the_scales=lambda x: 0.1 * float(x[0])),
-        SimpleNamespace(writable=False, off_the_scales=lambda x: 1 / 0),
+        SimpleNamespace(traits=Traits(), weight=lambda x: Weight(0.0, x, 0.1 * float(x[0]))),
+        SimpleNamespace(traits=Traits(writable=False), weight=lambda x: 1 / 0),
     )
     given, made = (SimpleNamespace(assembly=a) for a in (deck, heavier))
     found = SimpleNamespace(fit=SimpleNamespace(effects=effects, of=lambda e: np.ones(1)))

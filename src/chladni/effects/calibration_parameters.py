@@ -18,7 +18,7 @@ from ..model.properties import (
     ShellSection,
     SolidSection,
 )
-from .effect import Effect, FieldChange, Parameter
+from .effect import Effect, FieldChange, Parameter, Traits
 from .element_groups import ElementGroups
 
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05, "wall": 0.05}  # prior sd of ln(value / deck's value)
@@ -47,7 +47,7 @@ class LogField(Effect):
     quantity: str = "E"
     functions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+    def terms(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """The field."""
         return (FieldChange(self.quantity, self.functions @ x, self.functions),)
 
@@ -187,7 +187,7 @@ class RandomField(LogField):
     name = "scatter"
     claim = "thickness and modulus vary smoothly within a part"
     kind = "nuisance"
-    writable = False
+    traits = Traits(writable=False)
 
 
 def random_field(

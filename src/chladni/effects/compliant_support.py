@@ -7,7 +7,6 @@ Beams and Shafts, ch. 1). With base excitation the springs are between the base 
 """
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,7 +19,7 @@ from ..fem.released import Clamp, Release, clamps, released
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.clamp_springs import AN_AXIS, with_clamp_on_springs
-from .effect import Effect, Parameter, PointTerm
+from .effect import Effect, Parameter, PointTerm, Traits
 from .estimate import in_mm
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_starts
@@ -75,7 +74,7 @@ class CompliantSupport(Effect):
 
     name = "compliant-support"
     claim = "a clamp is compliant where the deck is rigid"
-    rounds: ClassVar[int] = 1
+    traits = Traits(rounds=1)
 
     direction: SupportDirection | None = None
     rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure

@@ -17,7 +17,7 @@ from ..geometry.facets import cell_areas, cell_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter, Traits
 from .element_groups import ElementGroups
 from .estimate import Estimate, in_mm
 from .family import Article, Family
@@ -159,7 +159,7 @@ class Crack(Effect):
     """
 
     name = "crack"
-    elastic = True
+    traits = Traits(elastic=True)
     claim = (
         "bending stiffness is reduced along a line, for example by a crack, a ground bead or an "
         "annealed bend"
@@ -169,7 +169,7 @@ class Crack(Effect):
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     line: Line | None = None
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """(f - 1) B."""
         f = left(x[0])
         slope = -(f - LEAST_LEFT) * (1 - (f - LEAST_LEFT) / (1 - LEAST_LEFT))

@@ -14,7 +14,7 @@ from ..fem.modelled import Modelled, modelled
 from ..geometry.footprints import on_smaller_shells, regions_of_joints
 from ..geometry.refine import refined
 from ..model.assembly import Assembly
-from .effect import Effect, Parameter, PointTerm, ShapeChange
+from .effect import Effect, Parameter, PointTerm, ShapeChange, Term, Traits
 
 MOST_DOFS = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
 LARGE = 20_000  # dofs from which refined modes are solved only up to the comparison limit
@@ -42,15 +42,12 @@ class MeshError(Effect):
     change: np.ndarray = field(default_factory=lambda: np.zeros(0))
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def seen(self, x: np.ndarray) -> ShapeChange | None:
-        """x times the change of the mode shapes at sensors and shaker on the finer mesh."""
+    def terms(self, x: np.ndarray) -> tuple[Term, ...]:
+        """x ΔK over the modes, and x times the change of their shapes at sensors and shaker."""
+        own = PointTerm("K", self.rows, x[0] * self.change, self.change[:, None], strained=True)
         if not len(self.shapes):
-            return None
-        return ShapeChange(self.rows, self.shapes, float(x[0]), np.ones(1))
-
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """x ΔK over the modes."""
-        return (PointTerm("K", self.rows, x[0] * self.change, self.change[:, None], strained=True),)
+            return (own,)
+        return own, ShapeChange(self.rows, self.shapes, float(x[0]), np.ones(1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,7 @@ class ModalDiscrepancy(Effect):
     name = "jitter"
     claim = "another element formulation gives slightly different frequencies"
     kind = "nuisance"
-    writable = False
+    traits = Traits(writable=False)
 
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     lam: np.ndarray = field(default_factory=lambda: np.zeros(0))

@@ -1,6 +1,6 @@
 """Effects: possible differences between model and test article, and their terms in the model.
 
-An effect acts on the reduced model in five ways only:
+An effect acts on the reduced model in five ways only (:data:`Term`):
 
 - It multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
   stiffness) on groups of shells. It multiplies calibrated operators and never subtracts nominal
@@ -18,17 +18,15 @@ physical value.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, NamedTuple, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..fem.released import Release
 from ..model.assembly import Assembly
-from .estimate import Estimate, Location
-
-if TYPE_CHECKING:
-    from .effect_context import EffectContext
+from .estimate import Estimate, Location, Remarks
+from .identified_damping import IdentifiedDamping
 
 FIELDS = ("t", "E", "rho", "bending", "Q11", "Q22", "Q12", "Q66")
 
@@ -151,20 +149,6 @@ class MatrixTerm:
 
 
 @dataclass(frozen=True, eq=False)
-class AuxiliaryResidual:
-    """Whitened residuals r (k,) of an effect in addition to the data that are compared.
-
-    ``gradient`` (k, n_parameters) are the slopes by its own parameters. ``by_lam`` and
-    ``by_dissipated`` (k, modes) are those by λ and by the damping ratio that effects add to a mode.
-    """
-
-    r: np.ndarray
-    gradient: np.ndarray
-    by_lam: np.ndarray
-    by_dissipated: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class ChannelChange:
     """log10 of the factor on every output, complex: level and phase (n_out,), (n_out, n_p)."""
 
@@ -187,9 +171,58 @@ class ShapeChange:
     gradient: np.ndarray
 
 
+Term = FieldChange | PointTerm | MatrixTerm | ChannelChange | ShapeChange
+Kind = TypeVar("Kind", FieldChange, PointTerm, MatrixTerm, ChannelChange, ShapeChange)
+
+
+class Weight(NamedTuple):
+    """Mass of an effect as weighed.
+
+    ``mass`` [kg] is added to the weighed mass, that of the sheets excluded; ``gradient`` (n_p,) is
+    its slope. ``removed`` [kg] is on the structure during the test and off it on the scales.
+    """
+
+    mass: float
+    gradient: np.ndarray
+    removed: float = 0.0
+
+
+@dataclass(frozen=True)
+class Traits:
+    """Fixed properties of a kind of effect.
+
+    Attributes
+    ----------
+    writable : a deck can represent it
+    remakes_structure : it is strong, so that mesh error and basis are computed again
+    elastic : it adds or removes stiffness only, without friction
+    lone : a second one of its kind is not a finding
+    lump : it is a mass at its ``location``; the first parameter is that mass [kg]
+    own_dofs : degrees of freedom that it adds; its terms must give them mass
+    rounds : times that the responses of :meth:`Effect.basis_rows` load the basis again, because
+        the effect changes modes beyond first order
+    own_loads : the loads of these rounds are A u with its first operator A; else they are M u
+    level : position of the parameter that is ln of the damping common to all modes (``damping``)
+    """
+
+    writable: bool = True
+    remakes_structure: bool = False
+    elastic: bool = False
+    lone: bool = False
+    lump: bool = False
+    own_dofs: int = 0
+    rounds: int = 0
+    own_loads: bool = False
+    level: int = 0
+
+
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One kind of physics; the base class does nothing, subclasses define the terms.
+    """One kind of physics; the base class does nothing.
+
+    A subclass defines :meth:`terms` and :meth:`apply`. The other methods have defaults:
+    :meth:`weight` for masses, :meth:`basis_rows` where the modes of the deck are too few, and
+    :meth:`reported`, :meth:`location` and :meth:`remarks` after a fit.
 
     Attributes
     ----------
@@ -201,17 +234,14 @@ class Effect:
     replaces : names of calibration parameters that it makes superfluous
     expected : whether the materials of the deck usually have it
     release : clamps that it releases, so that its rows reach beyond the dofs of the deck
+    in_structure : x that the structure already contains (``remakes_structure``), or None
+    damping : identified damping with which it is compared as well, because it dissipates
     """
 
     name: ClassVar[str] = "nothing"
     claim: ClassVar[str] = "the model is right"
     kind: ClassVar[str] = "physics"  # physics, test, calibration, nuisance
-    writable: ClassVar[bool] = True  # whether a deck can represent it
-    remakes_structure: ClassVar[bool] = False  # strong: mesh error and basis are computed again
-    elastic: ClassVar[bool] = False  # adds or removes stiffness only, without friction
-    lone: ClassVar[bool] = False  # a second one of its kind is not a finding
-    rounds: ClassVar[int] = 0  # of loads that its responses cause, see ``reloads``
-    own_dofs: ClassVar[int] = 0  # degrees of freedom it adds: its terms must give them mass
+    traits: ClassVar[Traits] = Traits()
 
     parameters: tuple[Parameter, ...] = ()
     text: str = ""
@@ -224,91 +254,36 @@ class Effect:
     channels: tuple[str, ...] = field(default=())
     expected: bool = False
     release: Release | None = None
+    in_structure: np.ndarray | None = None
+    damping: IdentifiedDamping | None = None
 
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Factors on fields of shells and beams."""
+    def terms(self, x: np.ndarray) -> tuple[Term, ...]:
+        """Everything that the effect adds to the model at x, with exact gradients."""
         return ()
 
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """Added point springs and masses."""
-        return ()
-
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """Added operators of the structure."""
-        return ()
-
-    def outputs(self, x: np.ndarray) -> ChannelChange | None:
-        """Change of the channels of the test."""
-        return None
-
-    def seen(self, x: np.ndarray) -> ShapeChange | None:
-        """Change of the motion at the measured places only."""
-        return None
-
-    def auxiliary_residual(
-        self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray
-    ) -> AuxiliaryResidual | None:
-        """Additional residuals, at λ (m,) and the damping that effects add (m,).
-
-        ``neg2_log_without`` is their -2 ln p without the effect.
-        """
-        return None
-
-    @property
-    def neg2_log_without(self) -> float:
-        """-2 ln p, without the effect, of the data that :meth:`auxiliary_residual` compares."""
-        return 0.0
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Change of the weighed mass [kg], that of the sheets excluded, and its gradient (n_p,)."""
-        return 0.0, np.zeros(len(self.parameters))
-
-    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float] | None:
-        """Place (3,) [m] and mass [kg] of an effect that is a mass at a place, else None."""
-        return None
-
-    def off_the_scales(self, x: np.ndarray) -> float:
-        """Mass [kg] on the structure during the test that is removed before weighing."""
-        return 0.0
+    def weight(self, x: np.ndarray) -> Weight:
+        """Its mass on the scales; the base class weighs nothing."""
+        return Weight(0.0, np.zeros(len(self.parameters)))
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array | None:
         """Rows b (k, n) whose static response the reduced basis must contain, or None.
 
-        These are its points, and A φ of its operators: the first-order loads of a change.
+        By default these are its points, and A φ of its operators: the first-order loads of a
+        change.
 
         Parameters
         ----------
         shapes : (n, r)   modes φ up to the highest frequency of interest
         """
-        points = [term.rows for term in self.terms(x)]
-        operators = [sp.csr_array((m.operator @ shapes).T) for m in self.matrices(x)]
-        return sp.csr_array(sp.vstack([*points, *operators])) if points or operators else None
-
-    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """Loads (n, k) caused by the static responses (n, k) of the previous round.
-
-        A strong effect changes modes beyond first order. The basis then contains the responses to
-        these loads as well, ``rounds`` times.
-        """
-        return M @ static[: M.shape[0]]  # beyond are motions of released clamps
-
-    def recentred(
-        self, x: np.ndarray, where: "EffectContext"
-    ) -> tuple["Effect", np.ndarray] | None:
-        """The effect centred on its fitted place, and its start; None if it is near enough."""
-        return None
-
-    def with_reference_state(self, x: np.ndarray) -> Self:
-        """The effect on a structure that already contains it at x (``remakes_structure``)."""
-        return self
+        every = self.terms(x)
+        points = [term.rows for term in of(PointTerm, every)]
+        operators = [sp.csr_array((m.operator @ shapes).T) for m in of(MatrixTerm, every)]
+        rows = points + operators
+        return sp.csr_array(sp.vstack(rows)) if rows else None
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write the effect into the structure."""
         return assembly
-
-    def deck_comment(self, x: np.ndarray) -> str:
-        """Note on what the cards of the deck do not represent; "" if nothing is missing."""
-        return ""
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Physical values of the parameters with their 95 % intervals.
@@ -321,6 +296,14 @@ class Effect:
             for k, p in enumerate(self.parameters)
         )
 
+    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
+        """The place after a fit, with its uncertainty where ``sd`` (n_p,) is given."""
+        return self.where()
+
+    def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
+        """Names of simpler effects, physical impossibility and a note for the deck, at x."""
+        return Remarks()
+
     def widened(self, sd: np.ndarray) -> np.ndarray:
         """Standard deviations (n,) of a fit, with the part of the data ``WIDER`` times as wide.
 
@@ -331,22 +314,6 @@ class Effect:
         with np.errstate(divide="ignore"):
             information = np.maximum(1 / np.square(sd) - 1 / prior**2, 0.0)
         return np.asarray(1 / np.sqrt(1 / prior**2 + information / WIDER**2))
-
-    def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
-        """The place after a fit, with its uncertainty where ``sd`` (n_p,) is given."""
-        return self.where()
-
-    def becomes(self, x: np.ndarray) -> str:
-        """Name of the simpler effect that the data cannot distinguish from it at x, or ""."""
-        return ""
-
-    def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
-        """Name of the simpler effect to which it reduces within its intervals about x, or ""."""
-        return ""
-
-    def implausible(self, x: np.ndarray) -> str:
-        """Why its value at x is physically impossible; "" if it is possible."""
-        return ""
 
     def starts(self) -> list[np.ndarray]:
         """Start points of a fit: every combination of the starts of its parameters."""
@@ -369,3 +336,13 @@ class Effect:
 def count(effects: Sequence[Effect]) -> int:
     """Total number of parameters of some effects."""
     return sum(len(effect.parameters) for effect in effects)
+
+
+def of(kind: type[Kind], terms: Sequence[Term]) -> list[Kind]:
+    """The terms of one kind, in their order."""
+    return [term for term in terms if isinstance(term, kind)]
+
+
+def changes_channels(effect: Effect) -> bool:
+    """True for an effect of the test on its channels."""
+    return bool(of(ChannelChange, effect.terms(np.zeros(len(effect.parameters)))))

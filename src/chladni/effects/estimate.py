@@ -50,3 +50,21 @@ class Location:
     radius_m: float | None = None
     band_hz: tuple[float, float] | None = None
     channels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Remarks:
+    """Text on a fitted effect; "" where there is nothing to say.
+
+    Attributes
+    ----------
+    becomes : name of the simpler effect that the data cannot distinguish from it
+    nearly : name of the simpler effect to which it reduces within its intervals
+    implausible : why its value is physically impossible
+    comment : note on what the cards of the deck do not represent
+    """
+
+    becomes: str = ""
+    nearly: str = ""
+    implausible: str = ""
+    comment: str = ""

@@ -9,11 +9,11 @@ import scipy.sparse as sp
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.ground_springs import with_ground_bushes
-from .effect import Effect, Parameter, PointTerm
+from .effect import Parameter, PointTerm, Traits
 from .effect_context import EffectContext
 from .estimate import Location
 from .family import Article, Family
-from .movable_attachment import MovableAttachment, attachments, moved, patch, there
+from .movable_attachment import MovableAttachment, attachments, closer, moved, patch, there
 from .points import strength, with_springs
 from .search_context import Candidate, SearchContext
 
@@ -33,7 +33,7 @@ class ExtraSupport(MovableAttachment):
 
     name = "extra-support"
     claim = "the structure touches a stiff object that the model lacks"
-    elastic = True
+    traits = Traits(elastic=True)
 
     @classmethod
     def near(cls, where: EffectContext, k: int) -> Self:
@@ -68,13 +68,12 @@ class ExtraSupport(MovableAttachment):
         """Direction of the spring in the basic frame (3,)."""
         return _tilted(x[3:])[0] @ np.stack([self.direction, *tangents(self.direction)])
 
-    def recentred(self, x: np.ndarray, where: EffectContext) -> tuple[Effect, np.ndarray] | None:
+    def recentred(self, x: np.ndarray, where: EffectContext) -> tuple[Self, np.ndarray] | None:
         """The effect centred on the grid it moved to, with the same direction of force."""
         again = super().recentred(x, where)
         if again is None:
             return None
         effect, start = again
-        assert isinstance(effect, ExtraSupport)
         d, n = self.pushes(x), effect.direction
         d = d * np.copysign(1.0, d @ n)
         tilt = np.stack(tangents(n)) @ d / max(float(d @ n), FLATTEST)
@@ -121,6 +120,7 @@ FAMILY = Family(
     ExtraSupport,
     conceal,
     candidates=candidates,
+    closer=closer,
     cards=("CBUSH", "PBUSH", "CORD2R"),
     settled_by="remove every contact of the structure there, and measure again",
 )

@@ -10,7 +10,7 @@ import numpy as np
 from ..geometry.facets import cell_areas
 from ..geometry.folds import share_at_folds
 from .calibration_parameters import LogField
-from .effect import Parameter
+from .effect import Parameter, Traits
 from .element_groups import ElementGroups
 
 SPREAD = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
@@ -23,7 +23,7 @@ class FoldBending(LogField):
     name = "fold-bending"
     claim = "a fold is stiffer or softer in bending than shells joined at an angle"
     kind = "nuisance"
-    writable = False
+    traits = Traits(writable=False)
 
 
 def fold_bending(groups: ElementGroups) -> list[FoldBending]:

@@ -74,10 +74,8 @@ def _chains(nodes: np.ndarray) -> Iterator[np.ndarray]:
         here, seen = int(ends[0] if len(ends) else mine[0]), [-1]
         while here >= 0:
             seen.append(here)
-            auxiliary_residual = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
-            here = next(
-                (int(j) for j in auxiliary_residual if j not in seen[-2:-1] and j != seen[1]), -1
-            )
+            next_ones = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
+            here = next((int(j) for j in next_ones if j not in seen[-2:-1] and j != seen[1]), -1)
         yield np.array(seen[1:])
 
 

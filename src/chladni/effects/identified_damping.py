@@ -13,6 +13,20 @@ LEVELS = np.linspace(-3.0, 2.0, 101)  # values of that ln that are searched
 
 
 @dataclass(frozen=True, eq=False)
+class AuxiliaryResidual:
+    """Whitened residuals r (k,) of an effect in addition to the data that are compared.
+
+    ``gradient`` (k, n_parameters) are the slopes by its own parameters. ``by_lam`` and
+    ``by_dissipated`` (k, modes) are those by λ and by the damping ratio that effects add to a mode.
+    """
+
+    r: np.ndarray
+    gradient: np.ndarray
+    by_lam: np.ndarray
+    by_dissipated: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class IdentifiedDamping:
     """Identified damping of the modes that are compared.
 
@@ -59,6 +73,26 @@ class IdentifiedDamping:
         flat = np.sqrt((TAILS + 1) / TAILS)
         steep = np.divide((TAILS + 1) * z / (TAILS + z**2), r, out=flat + 0 * r, where=r != 0)
         return r, -steep / width
+
+    def residual(
+        self, x: np.ndarray, level: int, lam: np.ndarray, dissipated: np.ndarray
+    ) -> AuxiliaryResidual:
+        """Residuals against the damping common to all modes plus that of an effect.
+
+        Parameters
+        ----------
+        x : (n_p,)              parameters of the effect; that at ``level`` is the common damping
+        lam, dissipated : (m,)  λ of the modes, and the damping ratio that effects add to them
+        """
+        f = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
+        w, steep = paired_with(self.frequency, f)
+        more = w @ dissipated
+        r, slope = self.misfit(x[level], more)
+        own = self.usual * np.exp(x[level])
+        by_more = (slope / (own + more))[:, None]
+        by_own = np.outer(slope * own / (own + more), np.eye(len(x))[level])
+        moved = w * steep * (dissipated - more[:, None]) / (2 * np.maximum(lam, 1e-9 * lam[-1]))
+        return AuxiliaryResidual(r, by_own, by_more * moved, by_more * w)
 
     def neg2_log_likely(self, more: np.ndarray) -> float:
         """-2 ln p at the most probable level, its prior included."""

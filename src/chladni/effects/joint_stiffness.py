@@ -23,7 +23,8 @@ class JointStiffness(Effect):
     """K + (f - 1) K_j + (g - 1) Σ_{i≠j} K_i: the joint times f(x_0), others of its family times g.
 
     The last parameter is ln g, where there are others. It takes the place of the factor that a
-    family shares. Hence no joint loses more than it has, and K stays positive.
+    family shares. Hence no joint loses more than it has, and K stays positive. With ``own_loads``
+    the basis contains (P⁻¹ A)ᵏ φ, which spans the mode change for any stiffness of the joint.
 
     Attributes
     ----------
@@ -73,7 +74,7 @@ class JointStiffness(Effect):
         """Loss factor of the joint, or None if it is that of the deck."""
         return None
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The terms of the joint and of the others."""
         f, slope = self.factor(x)
         own = MatrixTerm("K", self.operator, f - 1, slope * np.eye(len(x))[0])
@@ -96,10 +97,6 @@ class JointStiffness(Effect):
         """A φ of the joint; the basis already represents all of its family together."""
         return sp.csr_array((self.operator @ shapes).T)
 
-    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """Loads A u of the joint: (P⁻¹ A)ᵏ φ spans the mode change for any stiffness of it."""
-        return self.operator @ static
-
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write the joint as fitted, and the others as fitted with it."""
         assert self.joint is not None
@@ -114,13 +111,12 @@ class JointStiffness(Effect):
 
 @dataclass(frozen=True, eq=False)
 class Fastener(JointStiffness):
-    """A joint of few elements: the basis contains all relative motions that load it."""
+    """A joint of few elements: the basis contains all relative motions that load it.
+
+    The basis is loaded again by inertia, because a joint that is gone may free a mode of its own.
+    """
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """Rows b with K_j = bᵀ b."""
         assert self.joint is not None
         return self.joint.rows
-
-    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """Inertia loads M u, because a joint that is gone may free a mode of its own."""
-        return Effect.reloads(self, static, M)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..fem.derivative import Slope
 from ..model.assembly import Assembly
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter, Weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class LinearScale(Effect):
     bent: Slope | None = None
     weight_slope: float = 0.0
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The slopes of the operators times the change of the value."""
         assert self.slope is not None
         v = self.parameters[0].scale
@@ -34,10 +34,10 @@ class LinearScale(Effect):
         out = _terms(self.slope, d, slope)
         return out if self.bent is None else out + _terms(self.bent, d**2 / 2, d * slope)
 
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+    def weight(self, x: np.ndarray) -> Weight:
         """The change of the value times its mass per unit."""
         v = self.parameters[0].scale * self.weight_slope
-        return float(v * np.expm1(x[0])), np.array([v * np.exp(x[0])])
+        return Weight(float(v * np.expm1(x[0])), np.array([v * np.exp(x[0])]))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write the value into the structure."""

@@ -8,7 +8,7 @@ modes, which does not enter the comparison.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,11 +18,11 @@ from ..fem.assemble import structure
 from ..geometry.facets import point_normals, tangents
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, appended
-from .effect import Effect, Parameter, PointTerm
+from .effect import Effect, Parameter, PointTerm, Traits
 from .effect_context import EffectContext, ElementGrids
-from .estimate import Estimate
+from .estimate import Estimate, Remarks
 from .family import Article, Family
-from .movable_attachment import MovableMass, around, moved, patch, there
+from .movable_attachment import MovableMass, around, closer, moved, patch, there
 from .points import strength, with_masses
 from .search_context import Candidate, SearchContext, best_places, distinct
 
@@ -40,9 +40,9 @@ class LocalResonator(MovableMass):
     """x = (ln mass, place along both axes of the patch, ln frequency)."""
 
     name = "local-resonator"
-    lone = True  # parallel resonators form a partial fraction: enough of them fit any response
     claim = "a part on the structure vibrates on its own spring"
-    own_dofs: ClassVar[int] = 1
+    # parallel resonators form a partial fraction: enough of them fit any response
+    traits = Traits(lone=True, lump=True, own_dofs=1)
 
     nowhere: sp.csr_array = field(default_factory=lambda: sp.csr_array((1, 0)))  # zero row
 
@@ -88,14 +88,11 @@ class LocalResonator(MovableMass):
         m = self.parameters[0].value(x[0])
         return m, m * (2 * np.pi * self.parameters[3].value(x[3])) ** 2
 
-    def becomes(self, x: np.ndarray) -> str:
-        """Return "point-mass" for a tuning above the highest spectral line."""
-        f = self.parameters[3]
-        return "point-mass" if f.value(x[3]) > TYPICAL * f.scale else ""
-
-    def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
-        """Return "point-mass" if the interval of the tuning exceeds the highest spectral line."""
-        return self.becomes(x + 1.96 * self.widened(sd))
+    def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
+        """A point mass, where the tuning or its interval exceeds the highest spectral line."""
+        f, wide = self.parameters[3], 0.0 if sd is None else 1.96 * self.widened(sd)[3]
+        above = (f.value(v) > TYPICAL * f.scale for v in (x[3], x[3] + wide))
+        return Remarks(*("point-mass" if high else "" for high in above))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a GRID with CONM2, on a CBUSH from the nearest grid."""
@@ -195,6 +192,7 @@ FAMILY = Family(
     LocalResonator,
     conceal,
     candidates=candidates,
+    closer=closer,
     cards=("GRID", "CONM2", "PBUSH", "CBUSH", "CORD2R"),
     settled_by="hold or tap the parts that may vibrate there, and measure again",
 )

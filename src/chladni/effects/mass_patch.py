@@ -8,7 +8,7 @@ import numpy as np
 from ..geometry.facets import cell_areas
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
-from .effect import Effect, Parameter
+from .effect import Effect, Parameter, Traits
 from .effect_context import EffectContext
 from .element_groups import ElementGroups
 from .estimate import Estimate
@@ -26,6 +26,7 @@ class MassPatch(SheetPatch):
 
     name = "mass-patch"
     claim = "the sheet has a distributed mass that the model lacks"
+    traits = Traits(lump=True)
     quantity = "rho"
     scanned = -1.0
     grows = (0.05, np.inf)  # of the mass scanned: range accepted
@@ -55,10 +56,6 @@ class MassPatch(SheetPatch):
     def begun(cls, amount: float) -> float:
         """Start of ln mass, at most ten times the mass scanned."""
         return cls.scanned + float(np.log(np.clip(amount, 0.05, 10.0)))
-
-    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Centre of the patch and its mass."""
-        return self.deepest(x)[1], self.parameters[0].value(x[0])
 
     @classmethod
     def of_lump(

@@ -62,7 +62,7 @@ class MembranePrestress(Effect):
         """N (2,) [N/m], positive in tension."""
         return np.asarray(MOST_OF_BUCKLING * self.critical * x / np.sqrt(1 + x @ x))
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """N_k K_k."""
         s = 1 + x @ x
         slope = (

@@ -20,7 +20,7 @@ from ..fem.shell_section import section_arrays
 from ..fem.sparse_assembly import blocks, congruence
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, ShellSection, SolidSection
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter, Traits
 from .joints import SOFT, with_family
 
 ADHESIVE, WELD, FASTENER = 0.5, 0.3, 0.5  # prior sd of ln k
@@ -38,11 +38,11 @@ class ModelFamily(Effect):
     name = "family"
     claim = "joints and elements never have exactly the stiffness of the deck"
     kind = "nuisance"
-    writable = False
+    traits = Traits(writable=False)
 
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The operator of the family times the change of the factor."""
         (factor,), (v,) = self.parameters, x
         return (MatrixTerm("K", self.operator, factor.value(v) - 1, np.array([factor.slope(v)])),)
@@ -54,7 +54,7 @@ class CalibratedFamily(ModelFamily):
 
     claim = "joints of one kind are far stiffer or softer than in the deck"
     kind = "calibration"
-    writable = True
+    traits = Traits()
     called = "stiffness, times the deck's"
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:

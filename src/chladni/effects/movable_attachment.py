@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.facets import tangents
-from .effect import WIDER, Effect, Parameter, PointTerm
+from .effect import WIDER, Effect, Parameter, PointTerm, Traits, Weight
 from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate, Location, in_mm
 from .search_context import Candidate, SearchContext, best_places, distinct
@@ -120,7 +120,7 @@ class MovableAttachment(Effect):
         """The effect near the k-th of ``where.grids``."""
         raise NotImplementedError
 
-    def recentred(self, x: np.ndarray, where: EffectContext) -> tuple[Effect, np.ndarray] | None:
+    def recentred(self, x: np.ndarray, where: EffectContext) -> tuple[Self, np.ndarray] | None:
         """The effect centred on the grid it moved to, if beyond ``FAR`` of the patch's size."""
         if np.abs(x[1:3]).max() < FAR:
             return None
@@ -171,15 +171,19 @@ class MovableMass(MovableAttachment):
     """A mass at an unknown place, whose first parameter is its logarithm."""
 
     matrix = "M"
+    traits = Traits(lump=True)
 
-    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Place and mass."""
-        return self.at(x), self.parameters[0].value(x[0])
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+    def weight(self, x: np.ndarray) -> Weight:
         """The mass itself."""
         m = self.parameters[0].value(x[0])
-        return m, m * np.eye(len(x))[0]
+        return Weight(m, m * np.eye(len(x))[0])
+
+
+def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
+    """The effect centred on the place it moved to, from the base of its fit."""
+    assert isinstance(effect, MovableAttachment)
+    again = effect.recentred(x, context.where)
+    return None if again is None else Candidate(*again, context.bases[-1])
 
 
 def moved(strength: Parameter) -> tuple[Parameter, ...]:

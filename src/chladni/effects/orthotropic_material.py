@@ -1,13 +1,12 @@
 """A sheet that is stiffer along one axis than across it, due to rolling, fibres or growth rings."""
 
 from dataclasses import dataclass, field, replace
-from typing import Self
 
 import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
-from .effect import Effect, FieldChange, Parameter
+from .effect import Effect, FieldChange, Parameter, Traits
 from .effect_context import EffectContext
 from .element_groups import ElementGroups
 from .estimate import Estimate
@@ -24,18 +23,13 @@ class OrthotropicMaterial(Effect):
 
     name = "orthotropic-material"
     claim = "the sheet is stiffer along one direction than across it"
-    remakes_structure = True
+    traits = Traits(remakes_structure=True)
 
     E: float = 0.0
     nu: float = 0.3
     positions: tuple[int, ...] = ()
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))
     axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    reference: np.ndarray | None = None  # x of the structure's own material
-
-    def with_reference_state(self, x: np.ndarray) -> Self:
-        """The effect on a structure that already has the material of x."""
-        return replace(self, reference=x.copy())
 
     def moduli(self, x: np.ndarray) -> tuple[float, float, float, float]:
         """(E1, E2, G12 [Pa], nu12), nu12 = nu_m sqrt(E1/E2), nu_m the mean of nu12 and nu21."""
@@ -60,9 +54,9 @@ class OrthotropicMaterial(Effect):
             [x[0] + base, x[1] + base, (x[0] + x[1]) / 2 + base + np.log(m / self.nu), x[2]]
         )
 
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+    def terms(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """ln factors of the four components of the plane stiffness."""
-        has = 0.0 if self.reference is None else self._logs(self.reference)
+        has = 0.0 if self.in_structure is None else self._logs(self.in_structure)
         logs, h = self._logs(x) - has, 1e-6
         slopes = np.stack(
             [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ModelError
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from .effect import MatrixTerm, Parameter
+from .effect import MatrixTerm, Parameter, Traits
 from .family import Article, Family
 from .joint_stiffness import Fastener
 from .joints import Connection
@@ -32,7 +32,7 @@ class OverConstraint(Fastener):
 
     name = "over-constraint"
     claim = "a joint is compliant where the model has a rigid tie"
-    rounds = 1
+    traits = Traits(rounds=1)
 
     tie: RigidTie | None = None
     firm: float = 1.0
@@ -41,7 +41,7 @@ class OverConstraint(Fastener):
         """Remaining share of the firm spring, k / (k + k_0)."""
         return 1.0 / (1.0 + self.firm / self.parameters[0].value(x))
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """(f - 1) K_j, without a difference of nearly equal numbers."""
         k = self.parameters[0].value(x[0])
         lost = 1.0 / (1.0 + k / self.firm)

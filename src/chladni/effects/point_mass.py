@@ -8,7 +8,7 @@ import numpy as np
 from ..model.assembly import Assembly
 from .effect_context import EffectContext
 from .family import Article, Family
-from .movable_attachment import MovableMass, attachments, moved, patch, there
+from .movable_attachment import MovableMass, attachments, closer, moved, patch, there
 from .points import strength, with_masses
 from .search_context import Candidate, SearchContext
 
@@ -70,6 +70,7 @@ FAMILY = Family(
     PointMass,
     conceal,
     candidates=candidates,
+    closer=closer,
     of_lump=PointMass.of_lump,
     cards=("CONM2",),
     settled_by="weigh the structure with all attached parts",

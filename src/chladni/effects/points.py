@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from ..model.assembly import Assembly
 from ..model.ground_springs import with_springs as with_springs
 from ..model.point_masses import with_masses as with_masses
-from .effect import Effect, Parameter, PointTerm
+from .effect import Effect, Parameter, PointTerm, Weight
 
 NOTHING = -30.0  # ln of a strength over its median that is as good as zero
 
@@ -46,10 +46,10 @@ class MassEffect(AtPoints):
         """Mass at every grid (n,) [kg]."""
         return self.parameters[0].value(x[0]) * np.broadcast_to(self.shares, len(self.grids))
 
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+    def weight(self, x: np.ndarray) -> Weight:
         """Total mass."""
         total = float(self.each(x).sum())
-        return total, np.array([total])
+        return Weight(total, np.array([total]))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CONM2 at each grid."""

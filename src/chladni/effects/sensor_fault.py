@@ -26,10 +26,11 @@ class ChannelGain(Effect):
     mask: np.ndarray = field(default_factory=lambda: np.zeros(0))
     sign: int = 1
 
-    def outputs(self, x: np.ndarray) -> ChannelChange:
+    def terms(self, x: np.ndarray) -> tuple[ChannelChange, ...]:
         """x / ln 10 (+ iπ / ln 10 for a reversed sign) on these channels."""
         value = self.mask * (x[0] + (1j * np.pi if self.sign < 0 else 0)) / LN10
-        return ChannelChange(value.astype(complex), (self.mask / LN10)[:, None].astype(complex))
+        slope = (self.mask / LN10)[:, None].astype(complex)
+        return (ChannelChange(value.astype(complex), slope),)
 
 
 def channel_gain(n_outputs: int, sd: float) -> ChannelGain:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..fem.locate import Share
 from ..model.assembly import Assembly
+from .effect import Weight
 from .effect_context import EffectContext
 from .family import Article, Family
 from .points import AtPoints, strength, with_masses
@@ -32,9 +33,9 @@ class SensorMass(AtPoints):
             total[grid] = total.get(grid, 0.0) + weight * m
         return with_masses(assembly, tuple(total), np.array(list(total.values())))
 
-    def off_the_scales(self, x: np.ndarray) -> float:
-        """Total mass of the sensors, without which the article is weighed."""
-        return len(self.places) * self.parameters[0].value(x[0])
+    def weight(self, x: np.ndarray) -> Weight:
+        """The sensors, without which the article is weighed."""
+        return Weight(0.0, np.zeros(1), len(self.places) * self.parameters[0].value(x[0]))
 
 
 def sensor_mass(where: EffectContext) -> list[SensorMass]:

@@ -17,7 +17,7 @@ from ..fem.locate import Share
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from ..model.ground_springs import with_ground_bushes
-from .effect import Effect, PointTerm
+from .effect import Effect, PointTerm, Weight
 from .effect_context import EffectContext
 from .family import Article, Family
 from .points import strength, with_masses
@@ -59,9 +59,9 @@ class ShakerRestraint(Effect):
             if (n := rows.shape[0])
         )
 
-    def off_the_scales(self, x: np.ndarray) -> float:
-        """Mass of the gauge."""
-        return float(self.values(x)[2])
+    def weight(self, x: np.ndarray) -> Weight:
+        """The gauge, without which the article is weighed."""
+        return Weight(0.0, np.zeros(3), float(self.values(x)[2]))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CBUSH to ground in a frame of the drive, and a CONM2."""

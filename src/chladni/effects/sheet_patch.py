@@ -143,7 +143,7 @@ class SheetPatch(Effect):
         R2 = self.radius_at(x) ** 2
         return R2 / (R2 + blur) * np.exp(-((d2 / (2 * (R2 + blur))) ** np.exp(x[4])))
 
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+    def terms(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """The logarithm over the groups, with its slope by central differences."""
         h = 1e-5
         slope = np.stack(

@@ -13,7 +13,7 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Part
 from .calibration_parameters import scaled
-from .effect import Parameter
+from .effect import Parameter, Traits
 from .element_groups import ElementGroups
 from .family import Article, Family
 from .property_bands import with_bands
@@ -25,7 +25,7 @@ class StiffnessPatch(SheetLoss):
     """E(x) = E0 (1 - β q(x)), β = 0.9 / (1 + e^-x), for membrane and bending; always positive."""
 
     name = "stiffness-patch"
-    elastic = True
+    traits = Traits(elastic=True)
     claim = "the sheet is softer here than in the deck, with the same mass"
     quantity = "E"
     scanned = -1.0

@@ -28,7 +28,7 @@ from .calibration_parameters import (
     value,
     with_scaled,
 )
-from .effect import ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
+from .effect import Effect, Parameter, Term, Weight
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location
 from .joints import solid_parts
@@ -70,41 +70,18 @@ class UserParameter(Effect):
         y = bound * np.tanh(x[0] / bound)
         return np.array([y]), float(1 - (y / bound) ** 2)
 
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Field changes of all members."""
+    def terms(self, x: np.ndarray) -> tuple[Term, ...]:
+        """Terms of all members."""
         y, slope = self.y(x)
-        return tuple(
-            replace(c, gradient=slope * c.gradient) for m in self.members for c in m.fields(y)
-        )
+        every = (t for m in self.members for t in m.terms(y))
+        return tuple(replace(t, gradient=slope * t.gradient) for t in every)
 
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """Point terms of all members."""
-        y, slope = self.y(x)
-        return tuple(
-            replace(t, gradient=slope * t.gradient) for m in self.members for t in m.terms(y)
-        )
-
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """Operators of all members."""
-        y, slope = self.y(x)
-        return tuple(
-            replace(t, gradient=slope * t.gradient) for m in self.members for t in m.matrices(y)
-        )
-
-    def outputs(self, x: np.ndarray) -> ChannelChange | None:
-        """Channel changes of the first member that has any; only effects of the test have them."""
-        found = (m.outputs(self.y(x)[0]) for m in self.members)
-        return next((c for c in found if c is not None), None)
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Change of the weighed mass by all members."""
+    def weight(self, x: np.ndarray) -> Weight:
+        """Mass of all members."""
         y, slope = self.y(x)
         each = [m.weight(y) for m in self.members]
-        return sum(w for w, _ in each), slope * np.sum([g for _, g in each], axis=0)
-
-    def off_the_scales(self, x: np.ndarray) -> float:
-        """Mass [kg] of all members that is removed before weighing."""
-        return sum(m.off_the_scales(self.y(x)[0]) for m in self.members)
+        gradient = slope * np.sum([w.gradient for w in each], axis=0)
+        return Weight(sum(w.mass for w in each), gradient, sum(w.removed for w in each))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write all members."""

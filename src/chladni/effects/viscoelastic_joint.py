@@ -24,8 +24,8 @@ from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Part, SolidSection
-from .effect import AuxiliaryResidual, MatrixTerm, Parameter, Rise
-from .estimate import Estimate, Location
+from .effect import MatrixTerm, Parameter, Rise, Traits
+from .estimate import Estimate, Location, Remarks
 from .family import Article, Family
 from .identified_damping import LEVEL_SD, IdentifiedDamping, paired_with
 from .joint_stiffness import JointStiffness
@@ -55,19 +55,19 @@ class AdhesiveStiffness(JointStiffness):
 
     name = "adhesive-stiffness"
     claim = "a bead of adhesive is far softer or stiffer than in the deck"
-    rounds = 2
+    traits = Traits(rounds=2, own_loads=True)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """E of the bead."""
         return super().reported(x, sd)[:1]
 
-    def implausible(self, x: np.ndarray) -> str:
-        """Report a modulus that no sealant has, where the deck has a sealant."""
+    def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
+        """A modulus that no sealant has is implausible, where the deck has a sealant."""
         E = self.parameters[0].value(x[0])
         if self.parameters[0].scale >= SEALANT or E <= SEALANT:
-            return ""
-        return (
-            f"E of {E / 1e6:.0f} MPa is too high for a sealant, which has less than "
+            return Remarks()
+        return Remarks(
+            implausible=f"E of {E / 1e6:.0f} MPa is too high for a sealant, which has less than "
             f"{SEALANT / 1e6:g}"
         )
 
@@ -79,16 +79,14 @@ class ViscoelasticJoint(JointStiffness):
     Attributes
     ----------
     band : from the first flexible mode of the deck to the highest spectral line [Hz]
-    damping : of the identified modes
     """
 
     name = "viscoelastic-joint"
     claim = "a joint is compliant and dissipates: its modulus is complex and rises with frequency"
-    rounds = 2
-    lone = True  # the damping of the modes supports only one such effect
+    # the damping of the modes supports only one such effect
+    traits = Traits(rounds=2, own_loads=True, lone=True, level=2)
 
     band: tuple[float, float] = (1.0, 1.0)
-    damping: IdentifiedDamping | None = None
 
     @property
     def reference(self) -> float:
@@ -104,7 +102,7 @@ class ViscoelasticJoint(JointStiffness):
         """η."""
         return self.exponent(x)[0]
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """Remove the deck's joint, add the viscoelastic one, and scale the others of its family."""
         e, (eta, a, slope) = np.eye(len(x)), self.exponent(x)
         rise = Rise(a / 2, slope / 2 * e[1], self.reference, self.band, eta, eta * e[1])
@@ -114,38 +112,6 @@ class ViscoelasticJoint(JointStiffness):
             MatrixTerm("K", self.operator, factor, factor * e[0], rise),
             *self.of_others(x),
         )
-
-    def auxiliary_residual(
-        self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray
-    ) -> AuxiliaryResidual | None:
-        """Residuals of the identified damping against a common level plus the joint's loss."""
-        if self.damping is None:
-            return None
-        f = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
-        w, steep = paired_with(self.damping.frequency, f)
-        more = w @ dissipated
-        r, slope = self.damping.misfit(x[2], more)
-        own = self.damping.usual * np.exp(x[2])
-        by_more = (slope / (own + more))[:, None]
-        by_own = np.outer(slope * own / (own + more), np.eye(len(x))[2])
-        moved = w * steep * (dissipated - more[:, None]) / (2 * np.maximum(lam, 1e-9 * lam[-1]))
-        return AuxiliaryResidual(r, by_own, by_more * moved, by_more * w)
-
-    @property
-    def neg2_log_without(self) -> float:
-        """-2 ln p of the identified damping with a common level only."""
-        return 0.0 if self.damping is None else self.damping.neg2_log_evidence()
-
-    def deck_comment(self, x: np.ndarray) -> str:
-        """Modulus over frequency, for a frequency response with MATF1 or PBUSHT."""
-        name, (eta, a, _) = self.parameters[0], self.exponent(x)
-        f = np.geomspace(*self.band, 5)
-        rows = [f"{k:.4g} Hz: {name.name} times {(k / self.reference) ** a:.4f}" for k in f]
-        head = f"{self.text}: {name.name} in its card is valid at {self.reference:.4g} Hz"
-        tail = (
-            f"GE {eta:.4f} at all frequencies; tables of MATF1 (SOL 108, 111) or PBUSHT hold both"
-        )
-        return "\n".join([head, *rows, tail])
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Modulus or stiffness at the reference, and the loss factor."""
@@ -160,10 +126,22 @@ class ViscoelasticJoint(JointStiffness):
         )
         return replace(self.where(), text=f"{self.text}; {rise}")
 
-    def becomes(self, x: np.ndarray) -> str:
-        """Return "adhesive-stiffness" for a bead whose loss is below that of an epoxy."""
+    def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
+        """An elastic bead, where the loss is below that of an epoxy; the modulus over frequency."""
         solid = self.joint is not None and self.joint.kind == "solids"
-        return "adhesive-stiffness" if solid and self.exponent(x)[0] < FAINT else ""
+        elastic = "adhesive-stiffness" if solid and self.exponent(x)[0] < FAINT else ""
+        return Remarks(becomes=elastic, comment=self.over_frequency(x))
+
+    def over_frequency(self, x: np.ndarray) -> str:
+        """Modulus over frequency in words, for a response with MATF1 or PBUSHT."""
+        name, (eta, a, _) = self.parameters[0], self.exponent(x)
+        f = np.geomspace(*self.band, 5)
+        rows = [f"{k:.4g} Hz: {name.name} times {(k / self.reference) ** a:.4f}" for k in f]
+        head = f"{self.text}: {name.name} in its card is valid at {self.reference:.4g} Hz"
+        tail = (
+            f"GE {eta:.4f} at all frequencies; tables of MATF1 (SOL 108, 111) or PBUSHT hold both"
+        )
+        return "\n".join([head, *rows, tail])
 
 
 def longest_beads(built: Structure) -> list[Connection]:

@@ -16,8 +16,8 @@ from ..errors import ModelError
 from ..fem.assemble import structure
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from .effect import Parameter
-from .estimate import Estimate
+from .effect import Parameter, Traits
+from .estimate import Estimate, Remarks
 from .family import Article, Family
 from .joint_stiffness import Fastener
 from .joints import MOST_RUN, Connection, fasteners, with_factor_on, with_family, without_joint
@@ -45,9 +45,8 @@ class WeldCompliance(Fastener):
     """K + (f - 1) K_j + (g - 1) Σ_{i≠j} K_i: the joint times f = s e^x, others of its family g."""
 
     name = "weld-compliance"
-    elastic = True
     claim = "a weld or a fastener is softer than in the deck"
-    rounds = 1
+    traits = Traits(elastic=True, rounds=1)
 
     @staticmethod
     def strength(softness: float) -> Parameter:
@@ -71,9 +70,9 @@ class WeldCompliance(Fastener):
         low, here, high = (self.left(x[0] + k * 1.96 * self.widened(sd)[0])[0] for k in (-1, 0, 1))
         return (Estimate("K", here, "of the deck's", low, high),)
 
-    def becomes(self, x: np.ndarray) -> str:
-        """Return "weld-missing" where the joint carries nearly no load."""
-        return "weld-missing" if x[0] < NONE_LEFT else ""
+    def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
+        """A missing weld, where the joint carries nearly no load."""
+        return Remarks(becomes="weld-missing" if x[0] < NONE_LEFT else "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +99,9 @@ class WeldMissing(WeldCompliance):
         """Zero stiffness, with an upper limit that would carry a twentieth of the load."""
         return (Estimate("K", 0.0, "of the deck's", 0.0, self.left(NONE_LEFT)[0]),)
 
-    def becomes(self, x: np.ndarray) -> str:
-        """Return "", because there is no simpler effect."""
-        return ""
+    def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
+        """None, because there is no simpler effect."""
+        return Remarks()
 
 
 def of_one(

@@ -19,7 +19,7 @@ from ..fem.sparse_assembly import blocks, congruence
 from ..geometry.sampling import nearest_points
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter, Traits
 from .element_groups import ElementGroups
 from .joints import fasteners
 from .property_bands import in_bands
@@ -38,7 +38,7 @@ class WeldPatch(Effect):
     name = "weld-patch"
     claim = "the sheet around welds is stiffer or softer than the part"
     kind = "calibration"
-    elastic = True
+    traits = Traits(elastic=True)
 
     operators: tuple[sp.csr_array, ...] = ()
     ring: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # of each shell, -1 outside
@@ -50,7 +50,7 @@ class WeldPatch(Effect):
         """q and ∂q/∂ln R of every ring."""
         return bell(self.parameters[1].value(x[1]), self.distance, self.variance)
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The operators of the rings times the change of their factor."""
         q, dq = self.bell(x)
         return tuple(

@@ -18,7 +18,8 @@ from ..effects.calibration_parameters import REASONS
 from ..effects.effect import Effect
 from ..effects.model_families import FAR
 from ..effects.user_parameters import UserParameter
-from ..reduced.reduced_model import State, evaluate, slices
+from ..reduced.effect_dofs import slices
+from ..reduced.reduced_model import State, evaluate
 from .calibration_result import Identifiability, ParameterKnowledge, ValueAndSpread
 from .hypothesis_fit import UpdatingProblem
 from .likelihood import Data

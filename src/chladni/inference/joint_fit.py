@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.effect import Effect
+from ..effects.effect import Effect, changes_channels
 from ..reduced.reduced_model import State, evaluate
 from .hypothesis_fit import HypothesisFit
 from .map_fit import MassMeasurement, descend, prior_residuals
@@ -123,8 +123,7 @@ def _positions(
 
 def of_the_object(effect: Effect) -> bool:
     """True where an effect belongs to the object in all its states, not to one test of it."""
-    idle = effect.outputs(np.zeros(len(effect.parameters)))
-    return effect.kind in ("calibration", "nuisance") and idle is None
+    return effect.kind in ("calibration", "nuisance") and not changes_channels(effect)
 
 
 def _of_state(

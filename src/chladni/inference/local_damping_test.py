@@ -26,7 +26,7 @@ def damping_test_along_effect(
     test: FitTest, hypothesis: HypothesisFit, damping: ModalDamping | None
 ) -> FitTest:
     """The given test, or the test of damping along the effect where its p-value is smaller."""
-    elastic = [e.name for e in hypothesis.effects if e.elastic]
+    elastic = [e.name for e in hypothesis.effects if e.traits.elastic]
     if damping is None or not elastic:
         return test
     lowest = float(damping.frequency.min(initial=np.inf))
@@ -58,7 +58,9 @@ def shifted(hypothesis: HypothesisFit, above: float) -> tuple[np.ndarray, np.nda
     is positive where the effect softens the mode, negative where it stiffens it.
     """
     fit = hypothesis.fit
-    kept = [(e, fit.of(e)) for e in fit.effects if e not in hypothesis.effects or not e.elastic]
+    kept = [
+        (e, fit.of(e)) for e in fit.effects if e not in hypothesis.effects or not e.traits.elastic
+    ]
     x = np.concatenate([np.zeros(0), *(own for _, own in kept)])
     idle, state = evaluate(hypothesis.model, [e for e, _ in kept], x, False), fit.state
     frequency = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)

@@ -13,8 +13,9 @@ import numpy as np
 
 from ..effects.effect import Effect, Parameter
 from ..errors import ModelError
+from ..reduced.effect_dofs import slices
 from ..reduced.matrix_stack import along
-from ..reduced.reduced_model import Reduced, State, evaluate, slices
+from ..reduced.reduced_model import Reduced, State, evaluate
 from .likelihood import Data
 
 APART = 1.96  # standard deviations of a weighing: a mass farther off has left the scales
@@ -111,9 +112,9 @@ def _by_effects(
     if lost is None:
         return
     for effect, at in slices(effects):
-        known = effect.auxiliary_residual(x[at], state.lam, lost.ratio)
-        if known is None:
+        if effect.damping is None:
             continue
+        known = effect.damping.residual(x[at], effect.traits.level, state.lam, lost.ratio)
         slope = np.zeros((len(known.r), len(x)))
         if state.dK is not None and state.dM is not None:
             dlam = along(state.dK, state.vectors) - state.lam * along(state.dM, state.vectors)
@@ -129,7 +130,9 @@ def constants(effects: Sequence[Effect]) -> float:
     with and without the effect counts there, so all hypotheses are compared on the same data.
     """
     widths = sum(2 * np.log(p.sd) for p in unknowns(effects))
-    return float(widths + sum(2 * np.log(e.trials_factor) - e.neg2_log_without for e in effects))
+    without = [0.0 if e.damping is None else e.damping.neg2_log_evidence() for e in effects]
+    places = [2 * np.log(e.trials_factor) for e in effects]
+    return float(widths + sum(p - w for p, w in zip(places, without, strict=True)))
 
 
 def fit(

@@ -11,7 +11,7 @@ from .implausible_values import strained
 def row_of(hypothesis: HypothesisFit, key: str = "") -> Row:
     """A hypothesis as a row; its key is the name of its effect unless one is given."""
     effect, fit = hypothesis.effect, hypothesis.fit
-    x, sd = fit.of(effect), fit.sd(effect)
+    known = effect.remarks(fit.of(effect), fit.sd(effect))
     return Row(
         key or effect.name,
         tuple(e.name for e in hypothesis.effects),
@@ -19,9 +19,9 @@ def row_of(hypothesis: HypothesisFit, key: str = "") -> Row:
         physics=hypothesis.physics,
         channels=bool(hypothesis.channels),
         expected=effect.expected,
-        becomes=effect.becomes(x),
-        nearly=effect.nearly(x, sd),
-        sound=not effect.implausible(x),
+        becomes=known.becomes,
+        nearly=known.nearly,
+        sound=not known.implausible,
         strained=bool(strained(fit)),
     )
 

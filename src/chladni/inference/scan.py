@@ -178,7 +178,7 @@ class _Probe(Effect):
 
     field: str = "t"
 
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+    def terms(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """The logarithm of the field in each group is one parameter."""
         return (FieldChange(self.field, x, np.eye(len(x))),)
 

@@ -63,7 +63,7 @@ def as_foretold(
     hidden = of_mesh(effects)
     bare = [_held(e, 0 * found.of(e)) if isinstance(e, MeshError) else e for e in effects]
     near = fit(model, bare, target, mass_measurement, np.where(hidden, 0.0, x))
-    sd = np.concatenate([found.sd(e) for e in found.effects if e.writable])
+    sd = np.concatenate([found.sd(e) for e in found.effects if e.traits.writable])
     x = x + _share_within(sd, step := np.where(hidden, 0.0, near.x - x)) * step
     state = evaluate(model, effects, x, False)
     near = replace(near, effects=tuple(effects), x=x, state=state, data=data)
@@ -86,7 +86,7 @@ def _kept(hypothesis: HypothesisFit) -> tuple[list[Effect], np.ndarray, tuple[Ef
     """Effects that a deck can hold, their values, and the named effects, held at theirs."""
     found = hypothesis.fit
     held = {id(e): _held(e, found.of(e)) if e.parameters else e for e in hypothesis.effects}
-    kept = [e for e in found.effects if e.writable]
+    kept = [e for e in found.effects if e.traits.writable]
     x = np.concatenate([np.zeros(0), *(found.of(e) for e in kept)])
     return [held.get(id(e), e) for e in kept], x, tuple(held.values())
 
@@ -102,8 +102,8 @@ def as_found(hypothesis: HypothesisFit) -> HypothesisFit:
     """
     fit = hypothesis.fit
     every = [calibrated_family(e) if is_strained(e, fit.of(e)) else e for e in fit.effects]
-    inside = np.concatenate([np.full(len(e.parameters), e.writable) for e in every])
-    effects, x = tuple(e for e in every if e.writable), fit.x[inside]
+    inside = np.concatenate([np.full(len(e.parameters), e.traits.writable) for e in every])
+    effects, x = tuple(e for e in every if e.traits.writable), fit.x[inside]
     state = evaluate(hypothesis.model, effects, x)
     covariance = fit.covariance[np.ix_(inside, inside)]
     found = replace(fit, effects=effects, x=x, state=state, covariance=covariance)

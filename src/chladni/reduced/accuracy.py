@@ -16,11 +16,11 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..dynamics.reduction import beyond
-from ..effects.effect import Effect, FieldChange, MatrixTerm
-from .effect_dofs import own_part, own_positions
-from .field_factors import mass_log, stiffness_log
+from ..effects.effect import Effect, MatrixTerm, PointTerm, Term, of
+from .effect_dofs import acting_at, own_part, own_positions
+from .field_factors import log_fields, mass_log, stiffness_log
 from .frequency_dependent_stiffness import UnrisenModes, applied
-from .reduced_model import Reduced, State, evaluate, log_fields, slices
+from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import ReducedProblem
 
 LIMIT = 5e-4  # largest relative frequency error that is accepted of a basis
@@ -111,7 +111,9 @@ def products(
     n = model.vectors.shape[0]
     n_own, u = len(q) - n, q[:n]
     K, M = system.elastic @ u, system.M @ u
-    logs = {k: v[groups.group, None, None] for k, v in log_fields(model, effects, x)[0].items()}
+    acting = acting_at(effects, x)
+    fields = log_fields(acting, len(groups), len(x), "" not in model.linear)[0]
+    logs = {k: v[groups.group, None, None] for k, v in fields.items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces():
         change = change + sum(
@@ -122,15 +124,15 @@ def products(
     M = M + _spread(model, np.expm1(mass_log(logs)) * groups.mass, u)
     K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
     frame = _without_rise(model, effects, x)
-    for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
-        for term in effect.terms(x[at]):
+    for (_, _, terms), first in zip(acting, own_positions(effects), strict=True):
+        for term in of(PointTerm, terms):
             rows = model.wide(term.rows, term.strained)
             idle = sp.csr_array((rows.shape[0], n - rows.shape[1]))
             own = sp.csr_array(own_part(term, first, n_own))
             b = sp.hstack([rows, idle, own], format="csr")
             added = b.T @ (term.coefficient[:, None] * (b @ q))
             K, M = (K + added, M) if term.matrix == "K" else (K, M + added)
-        for part in effect.matrices(x[at]):
+        for part in of(MatrixTerm, terms):
             m = part.operator.shape[0]
             strained = applied(part, u[:m], frame, system.M)
             added = np.pad(part.coefficient * strained, ((0, len(q) - m), (0, 0)))
@@ -144,19 +146,18 @@ class _Level(Effect):
 
     of: Effect = field(default_factory=Effect)
 
-    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """The fields of the effect."""
-        return self.of.fields(x)
-
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The matrices of the effect without their rise with frequency."""
-        return tuple(replace(part, rise=None) for part in self.of.matrices(x))
+    def terms(self, x: np.ndarray) -> tuple[Term, ...]:
+        """The terms of the effect without their rise with frequency."""
+        every = self.of.terms(x)
+        return tuple(replace(t, rise=None) if isinstance(t, MatrixTerm) else t for t in every)
 
 
 def _without_rise(model: Reduced, effects: Sequence[Effect], x: np.ndarray) -> UnrisenModes:
     """Modes without the rise, in which rising stiffness is defined; empty where none rises."""
     rising = {
-        id(e) for e, at in slices(effects) if any(m.rise is not None for m in e.matrices(x[at]))
+        id(e)
+        for e, _, terms in acting_at(effects, x)
+        if any(m.rise is not None for m in of(MatrixTerm, terms))
     }
     if not rising:
         return UnrisenModes(np.zeros(0), np.zeros((model.vectors.shape[0], 0)))

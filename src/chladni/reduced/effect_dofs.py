@@ -1,4 +1,4 @@
-"""Degrees of freedom that effects add: they follow the coordinates of the structure's basis.
+"""Effects with their terms, and the degrees of freedom that they add behind those of the basis.
 
 A mass on a spring has a resonance of its own, so it cannot be condensed onto its attachment point.
 It adds a row and a column to the reduced K and M, which is exact at every frequency.
@@ -8,13 +8,26 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects.effect import Effect, PointTerm
+from ..effects.effect import Effect, PointTerm, Term
+
+Acting = Sequence[tuple[Effect, slice, tuple[Term, ...]]]  # see :func:`acting_at`
+
+
+def acting_at(effects: Sequence[Effect], x: np.ndarray) -> Acting:
+    """Every effect, the positions of its parameters in x, and its terms there."""
+    return [(effect, at, effect.terms(x[at])) for effect, at in slices(effects)]
+
+
+def slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:
+    """Every effect and the positions of its parameters in x."""
+    ends = np.cumsum([len(e.parameters) for e in effects])
+    return [(e, slice(end - len(e.parameters), end)) for e, end in zip(effects, ends, strict=True)]
 
 
 def own_positions(effects: Sequence[Effect]) -> list[int]:
     """Position of the first degree of freedom of each effect among all that effects add."""
-    ends = np.cumsum([e.own_dofs for e in effects])
-    return [int(end) - e.own_dofs for e, end in zip(effects, ends, strict=True)]
+    ends = np.cumsum([e.traits.own_dofs for e in effects])
+    return [int(end) - e.traits.own_dofs for e, end in zip(effects, ends, strict=True)]
 
 
 def own_part(term: PointTerm, first: int, n_own: int) -> np.ndarray:

@@ -15,16 +15,24 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dynamics.reduction import Basis, beyond
-from ..effects.effect import Effect, count
+from ..effects.effect import (
+    ChannelChange,
+    Effect,
+    FieldChange,
+    MatrixTerm,
+    PointTerm,
+    ShapeChange,
+    count,
+    of,
+)
 from ..effects.element_groups import ElementGroups
 from ..effects.shell_components import COMPONENTS
-from ..errors import ModelError
 from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
-from .effect_dofs import own_part, own_positions, row, with_own
-from .field_factors import mass_log, stiffness_log
+from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
+from .field_factors import log_fields, mass_log, stiffness_log
 from .frequency_dependent_stiffness import Dissipated, Rising
 from .matrix_stack import MatrixStack, Whole, add_slopes, bordered
 from .real_modes import real_modes
@@ -159,7 +167,7 @@ class Reduced:
 
     def split_for(self, effect: Effect, x: np.ndarray) -> Self:
         """The model, split into components where the effect changes one of them."""
-        split = any(change.field in COMPONENTS for change in effect.fields(x))
+        split = any(change.field in COMPONENTS for change in of(FieldChange, effect.terms(x)))
         return self.with_components() if split and "" in self.linear else self
 
     def with_components(self) -> Self:
@@ -246,15 +254,16 @@ def evaluate(
         If the stiffness lost its positive (semi-)definiteness: an effect is wrong.
     """
     n_p = count(effects)
-    logs, slopes = log_fields(model, effects, x)
-    r, n_own = len(model.K0), sum(effect.own_dofs for effect in effects)
+    acting = acting_at(effects, x)
+    logs, slopes = log_fields(acting, len(model.groups), n_p, "" not in model.linear)
+    r, n_own = len(model.K0), sum(effect.traits.own_dofs for effect in effects)
     K, M, dK, dM = (with_own(A, n_own) for A in _shells(model, logs, slopes, gradient))
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
     doffset: np.ndarray | None = None
     base, rising = _participating(model, logs, slopes, n_own), Rising()
-    for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
-        for term in effect.terms(x[at]):
+    for (effect, at, terms), first in zip(acting, own_positions(effects), strict=True):
+        for term in of(PointTerm, terms):
             seen = model.rows(term.rows, not term.moving, term.strained)
             b = row(seen, own_part(term, first, n_own))
             target, slope = (K, dK) if term.matrix == "K" else (M, dM)
@@ -271,7 +280,7 @@ def evaluate(
                 for p, db in moved.items():
                     half = (b.T * term.coefficient) @ db
                     slope[at.start + p] += half + half.T
-        for part in effect.matrices(x[at]):
+        for part in of(MatrixTerm, terms):
             A = with_own(model.operator(part.operator), n_own)
             target, slope = (K, dK) if part.matrix == "K" else (M, dM)
             rising.add(part, A, at)
@@ -280,13 +289,14 @@ def evaluate(
                 base.add_operator(part, model.vectors, at)
             if gradient:
                 slope[at] += part.gradient[:, None, None] * A
-        extra, d_extra = effect.weight(x[at])
+        extra, d_extra, _ = effect.weight(x[at])
         weight, dweight[at] = weight + extra, dweight[at] + d_extra
-        if (change := effect.outputs(x[at])) is not None:
+        for change in of(ChannelChange, terms):
             if offset is None or doffset is None:
                 offset = np.zeros(len(change.value), complex)
                 doffset = np.zeros((len(change.value), n_p), complex)
-            offset, doffset[:, at] = offset + change.value, change.gradient
+            offset = offset + change.value
+            doffset[:, at] += change.gradient
     lam, phi = real_modes(K, M)
     lost: Dissipated | None = None
     if rising.parts:
@@ -294,24 +304,23 @@ def evaluate(
     drive, ddrive = (None, None) if base is None else base.loads(phi)
     state = State(
         lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
-        *_moved(model, effects, x, phi[:r]), lost,
+        *_moved(model, acting, phi[:r]), lost,
     )  # fmt: skip
     return state if gradient else state.without_slopes()
 
 
 def _moved(
-    model: Reduced, effects: Sequence[Effect], x: np.ndarray, phi: np.ndarray
+    model: Reduced, acting: Acting, phi: np.ndarray
 ) -> tuple[np.ndarray | None, dict[int, np.ndarray]]:
     """Change of the modes by effects at the measured places, and its derivatives."""
     total: np.ndarray | None = None
     slopes: dict[int, np.ndarray] = {}
-    for effect, at in slices(effects):
-        if (change := effect.seen(x[at])) is None:
-            continue
-        whole = change.shapes @ (model.rows(change.rows, strained=True) @ phi)
-        value = change.coefficient * whole
-        total = value if total is None else total + value
-        slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
+    for _, at, terms in acting:
+        for change in of(ShapeChange, terms):
+            whole = change.shapes @ (model.rows(change.rows, strained=True) @ phi)
+            value = change.coefficient * whole
+            total = value if total is None else total + value
+            slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
     return total, slopes
 
 
@@ -323,36 +332,6 @@ def _participating(
         return None
     w = np.exp(mass_log(logs))
     return Participating(model.base, w, w[:, None] * mass_log(slopes), n_own)
-
-
-def slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:
-    """Every effect and the positions of its parameters in x."""
-    ends = np.cumsum([len(e.parameters) for e in effects])
-    return [(e, slice(end - len(e.parameters), end)) for e, end in zip(effects, ends, strict=True)]
-
-
-def log_fields(
-    model: Reduced, effects: Sequence[Effect], x: np.ndarray
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Sum of the log fields (g,) and their gradients (g, n_p), by name.
-
-    Raises
-    ------
-    ModelError
-        If a component of the plane stiffness changes in a model that is not split into components.
-    """
-    n, n_p = len(model.groups), count(effects)
-    logs = {name: np.zeros(n) for name in ("t", "E", "rho", "bending", *COMPONENTS)}
-    slopes = {name: np.zeros((n, n_p)) for name in logs}
-    for effect, at in slices(effects):
-        for change in effect.fields(x[at]):
-            if change.field in COMPONENTS and "" in model.linear:
-                raise ModelError(
-                    f"{effect.name} changes {change.field}; the model needs with_components()"
-                )
-            logs[change.field] = logs[change.field] + change.value
-            slopes[change.field][:, at] += change.gradient
-    return logs, slopes
 
 
 def _shells(

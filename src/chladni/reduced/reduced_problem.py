@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
-from ..effects.effect import Effect
+from ..effects.effect import Effect, MatrixTerm, of
 from ..effects.effect_context import ElementGrids, element_grids
 from ..effects.element_groups import ElementGroups, element_groups
 from ..fem.assemble import Structure
@@ -76,9 +76,11 @@ class ReducedProblem:
             blocks = [np.vstack([model.following @ g, g])]
         else:
             blocks = [attachments(self.factor, rows)]
-        for _ in range(effect.rounds):
-            loads = effect.reloads(blocks[-1], self.structure.system.M)
-            blocks.append(self.factor.solve(loads))
+        again = self.structure.system.M
+        if effect.traits.own_loads:
+            again = of(MatrixTerm, effect.terms(x))[0].operator
+        for _ in range(effect.traits.rounds):  # beyond its dofs are motions of released clamps
+            blocks.append(self.factor.solve(again @ blocks[-1][: again.shape[0]]))
         n = model.vectors.shape[0]
         for k, block in enumerate(blocks):
             if len(block) < n:

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
 import scipy.sparse as sp
 
+from ..effects.effect import changes_channels
 from ..errors import ModelError
 from ..fem.modelled import modelled
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
@@ -59,7 +59,7 @@ def refined(
     their last values, or ``held`` at them.
     """
     problem = prepared.problem
-    if any(e.remakes_structure for e in hypothesis.effects):
+    if any(e.traits.remakes_structure for e in hypothesis.effects):
         problem, hypothesis = _on_new_structure(question, problem, hypothesis)
     found = _accuracy(problem, hypothesis)
     note = _said(found)
@@ -102,8 +102,8 @@ def _on_new_structure(
     assembly, found = question.assembly, []
     for effect in hypothesis.effects:
         x = hypothesis.fit.of(effect)
-        if effect.remakes_structure:
-            assembly, effect = effect.apply(assembly, x), effect.with_reference_state(x)
+        if effect.traits.remakes_structure:
+            assembly, effect = effect.apply(assembly, x), replace(effect, in_structure=x.copy())
         found.append((effect, x))
     changed = replace(question, assembly=assembly)
     data, f_max = hypothesis.data, old.setup.f_max
@@ -115,7 +115,7 @@ def _on_new_structure(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,
     )  # fmt: skip
-    of_test = [e for e in old.nuisance if e.outputs(np.zeros(len(e.parameters))) is not None]
+    of_test = [e for e in old.nuisance if changes_channels(e)]
     fresh = updating_problem(
         changed,
         reduced,

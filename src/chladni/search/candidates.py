@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from ..effects.effect import Effect
+from ..effects.effect import Effect, MatrixTerm, of
 from ..effects.effect_context import EffectContext, ElementGrids
 from ..effects.joints import Connection
 from ..effects.search_context import APART, Candidate
@@ -65,7 +65,7 @@ def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
     for example, was named as a thinning, a crack and a mass, and each improved the fit. Several
     flexible effects of one kind are excluded too: a rotor was named as two masses on springs.
     """
-    if effect.lone and any(other.name == effect.name for other, _ in problem.found):
+    if effect.traits.lone and any(other.name == effect.name for other, _ in problem.found):
         return True
     reach = APART * float(np.linalg.norm(np.ptp(problem.where.grids.point, axis=0)))
     mine = effect.location(x)
@@ -75,7 +75,7 @@ def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
             if np.linalg.norm(np.subtract(mine.point_m, its.point_m)) < reach:
                 return True
         elif other.name == effect.name and mine.channels == its.channels:
-            whole = effect.remakes_structure and set(effect.parts) & set(other.parts)
+            whole = effect.traits.remakes_structure and set(effect.parts) & set(other.parts)
             if mine.channels or mine.text == its.text or whole:
                 return True
     return False
@@ -220,7 +220,7 @@ class UpdatingContext:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
         base, model = self.baselines[-1], self.problem.reduced.model
         state = evaluate(model, base.effects, base.x, False)
-        terms = effect.matrices(x)
+        terms = of(MatrixTerm, effect.terms(x))
         return state.lam, np.array(
             [state.phi.T @ model.operator(t.operator) @ state.phi for t in terms]
         )

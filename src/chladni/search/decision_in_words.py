@@ -212,7 +212,7 @@ class DecisionWords:
         gap = {n: self.row(each[n]).neg2_log_evidence - best.neg2_log_evidence for n in others}
         odds = "; ".join(f"{evidence_in_words(gap[n] / 2)} against {n}" for n in others)
         known = [(n, self.known.fits[k]) for n, k in each.items() if n in step.names]
-        odd = [(n, t.effect.implausible(t.fit.of(t.effect))) for n, t in known]
+        odd = [(n, t.effect.remarks(t.fit.of(t.effect)).implausible) for n, t in known]
         note = f"these data do not distinguish {first} from the others: {odds}"
         impossible = [needs_impossible(n, why) for n, why in odd if why]
         return _with_check("; ".join([note, *impossible]), step.names)

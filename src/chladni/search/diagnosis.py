@@ -280,7 +280,7 @@ def best_base_fit(
 
 def fit_of_the_deck(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
     """Calibration parameters alone, no scatter or modal discrepancy: same starts, and the null."""
-    kept = [e.writable for e in problem.base]
+    kept = [e.traits.writable for e in problem.base]
     chosen = [e for e, k in zip(problem.base, kept, strict=True) if k]
     inside = np.concatenate(
         [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]

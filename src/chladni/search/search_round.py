@@ -187,9 +187,10 @@ def _of_the_same_lump(
     gain of 113, and a resonator led with 222. Begun at the resonator's place, the mass gains 226.
     """
     lead = hypotheses[0] if hypotheses else None
-    lump = None if lead is None else lead.effect.lump(lead.fit.of(lead.effect))
-    if lead is None or lump is None or not isinstance(problem.data, Responses):
+    if lead is None or not lead.effect.traits.lump or not isinstance(problem.data, Responses):
         return []
+    x = lead.fit.of(lead.effect)
+    lump = np.array(lead.effect.location(x).point_m), lead.effect.parameters[0].value(x[0])
     base, out = taken(problem, lead, ("calibration", "nuisance")), list[HypothesisFit]()
     for family in problem.families:
         begun = None if family.of_lump is None else family.of_lump(problem.where, *lump)
@@ -202,9 +203,6 @@ def _of_the_same_lump(
 def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -> Candidate | None:
     """The leader about the place it moved to, or at a better one next to its own; None: at rest."""
     x, base = lead.fit.of(lead.effect), taken(problem, lead, ("calibration",))
-    again = lead.effect.recentred(x, problem.where)
-    if again is not None:
-        return Candidate(*again, base)
     known = next((f for f in problem.families if f.name == lead.effect.name), None)
     if known is None or known.closer is None:
         return None

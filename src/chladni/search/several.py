@@ -287,13 +287,14 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
 def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
     """True for another family whose fitted effect is not the member under another name."""
     effect = hypothesis.effect
-    return member.name not in (effect.name, effect.becomes(hypothesis.fit.of(effect)))
+    return member.name not in (effect.name, effect.remarks(hypothesis.fit.of(effect)).becomes)
 
 
 def _preferred(best: HypothesisFit, lead: HypothesisFit, member: Effect) -> bool:
     """True where another effect replaces a member: it is better, or simpler and tied."""
     ahead, x = _gain(lead, best), lead.fit.of(member)
-    simpler = member.becomes(x) == best.effect.name or bool(member.implausible(x))
+    known = member.remarks(x)
+    simpler = known.becomes == best.effect.name or bool(known.implausible)
     return ahead > BETTER or (simpler and best.effect.name != member.name and ahead > -TIED)
 
 
@@ -352,7 +353,9 @@ def _close(
 ) -> tuple[AlternativeRow, ...]:
     """Other families that explain as much as a member in its place."""
     every = [
-        AlternativeRow(t.effect.name, _gain(t, lead), t.effect.implausible(t.fit.of(t.effect)))
+        AlternativeRow(
+            t.effect.name, _gain(t, lead), t.effect.remarks(t.fit.of(t.effect)).implausible
+        )
         for t in alternatives
     ]
     return tuple(alternative for alternative in every if alternative.behind < TIED)

@@ -43,7 +43,9 @@ def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
     """
 
     def turn(effect: Effect) -> int:
-        return 0 if effect not in hypothesis.effects else 1 if effect.remakes_structure else 2
+        if effect not in hypothesis.effects:
+            return 0
+        return 1 if effect.traits.remakes_structure else 2
 
     for effect in sorted(hypothesis.fit.effects, key=turn):
         assembly = effect.apply(assembly, hypothesis.fit.of(effect))
@@ -121,7 +123,7 @@ def given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
         n = len(e.parameters)
         if e.kind == "calibration":
             x[at : at + n] = [p.nominal for p in e.parameters]
-        elif e.writable:
+        elif e.traits.writable:
             x[at : at + n] = null.fit.of(e)
         at += n
     return x

@@ -12,6 +12,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..dynamics.reduction import attachments, orthonormal, shifted
+from ..effects.effect import ChannelChange, of
 from ..fem.modelled import Modelled, node_points
 from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.likelihood import LN10, Responses
@@ -46,8 +47,8 @@ def written_Q(
     n = len(data.a)
     offset = np.zeros(n, complex)
     if fault is not None:
-        changes = (effect.outputs(fault.fit.of(effect)) for effect in fault.effects)
-        offset = offset + sum(change.value for change in changes if change is not None)
+        terms = [t for effect in fault.effects for t in effect.terms(fault.fit.of(effect))]
+        offset = offset + sum(change.value for change in of(ChannelChange, terms))
     offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
     state = replace(state, offset=offset)
     return tuple(data.Q(state, use) for use in sets)

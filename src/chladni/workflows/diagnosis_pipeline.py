@@ -254,7 +254,7 @@ def _commented(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
     """Add to the deck, as comments, the parts of named effects that cards cannot hold."""
     if named is None or deck.changes is None:
         return deck
-    said = [e.deck_comment(named.fit.of(e)) for e in named.effects]
+    said = [e.remarks(named.fit.of(e)).comment for e in named.effects]
     comments = tuple(Add((), text) for text in said if text)
     return replace(deck, changes=(*deck.changes, *comments))
 
@@ -357,7 +357,7 @@ def _article_mass(question: Question, stages: UpdatedModels, deck: HypothesisFit
     sensors = sum(m for _, m in question.sensor_masses)
     if stages.final.model is not stages.nominal:
         fit = deck.fit
-        sensors += sum(e.off_the_scales(fit.of(e)) for e in fit.effects if e.writable)
+        sensors += sum(e.weight(fit.of(e)).removed for e in fit.effects if e.traits.writable)
     return mass_properties(stages.final.model.assembly)[0] - sensors
 
 

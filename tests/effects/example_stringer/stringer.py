@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
-from chladni.effects.effect import Effect, MatrixTerm, Parameter
+from chladni.effects.effect import Effect, MatrixTerm, Parameter, Traits, Weight
 from chladni.effects.effect_context import EffectContext
 from chladni.effects.family import Article, Family
 from chladni.fem.energy import only
@@ -33,8 +33,7 @@ class Stringer(Effect):
 
     name = "stringer"
     claim = "a stringer stiffens the sheet that the model does not have"
-    elastic = True
-    lone = True
+    traits = Traits(elastic=True, lone=True)
 
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     length: float = 0.0  # [m]
@@ -42,7 +41,7 @@ class Stringer(Effect):
     bending: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     mass: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
-    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """K = r² K_EA + r⁴ K_EI and M = r² M_ρA, r = a / SIDE."""
         r = self.parameters[0].value(x[0]) / SIDE
         powers = (("K", self.stretching, 2), ("K", self.bending, 4), ("M", self.mass, 2))
@@ -51,10 +50,10 @@ class Stringer(Effect):
             for matrix, A, n in powers
         )
 
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+    def weight(self, x: np.ndarray) -> Weight:
         """ρ a² L."""
         m = STEEL.rho * self.parameters[0].value(x[0]) ** 2 * self.length
-        return m, np.array([2 * m])
+        return Weight(m, np.array([2 * m]))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Bars between the grids, a part of their own."""

@@ -53,7 +53,7 @@ def test_its_operators_are_its_beams(effect):
     deck, x = small_plate(1), np.array([0.4])
     bare, whole = structure(deck).system, structure(stringer.apply(deck, x)).system
     for name in ("K", "M"):
-        added = sum(t.coefficient * t.operator for t in stringer.matrices(x) if t.matrix == name)
+        added = sum(t.coefficient * t.operator for t in stringer.terms(x) if t.matrix == name)
         due = getattr(whole, name).toarray()
         ours = (getattr(bare, name) + added).toarray()
         assert_allclose(ours, due, atol=1e-9 * np.abs(due).max())
@@ -65,8 +65,8 @@ def test_slopes_are_those_of_the_coefficients(effect):
     """Central differences of c and of the weight, to the third order of the step."""
     stringer, _ = effect
     x, h = np.array([0.3]), 1e-4
-    for k, term in enumerate(stringer.matrices(x)):
-        high, low = (stringer.matrices(x + s * h)[k].coefficient for s in (1, -1))
+    for k, term in enumerate(stringer.terms(x)):
+        high, low = (stringer.terms(x + s * h)[k].coefficient for s in (1, -1))
         assert_allclose(term.gradient[0], (high - low) / (2 * h), rtol=1e-6)
     high, low = (stringer.weight(x + s * h)[0] for s in (1, -1))
     assert_allclose(stringer.weight(x)[1][0], (high - low) / (2 * h), rtol=1e-6)
