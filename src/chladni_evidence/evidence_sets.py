@@ -152,7 +152,7 @@ def _panels(seed: int) -> Iterator[Order]:
     for s, structure in enumerate(SPECIMENS):
         for k, kind in enumerate(CATALOGUED):
             yield Order(structure, kind, seed, _mesh(kind, MESHES[(seed + k + s) % 2]))
-        yield from (Order(structure, kind, seed, "fine") for kind in package_kinds())
+        yield from (Order(structure, kind, seed, "fine") for kind in package_kinds(True))
 
 
 def _forms(seed: int) -> Iterator[Order]:

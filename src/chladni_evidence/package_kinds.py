@@ -11,10 +11,10 @@ from .hidden import Hidden, Site, near_outputs
 from .hidden_kinds import Kind
 
 
-def package_kinds() -> dict[str, Kind]:
-    """Kinds by name that act on any structure; our own effects have other code."""
+def package_kinds(anywhere: bool = False) -> dict[str, Kind]:
+    """Kinds by name, or those that act on any structure; our own effects have other code."""
     own = {family.name for family in registry.BUILT_IN}
-    others = [f for f in registry.families() if f.name not in own and not f.needs]
+    others = [f for f in registry.families() if f.name not in own and not (anywhere and f.needs)]
     return {family.name: partial(_concealed, family) for family in others}
 
 

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,13 +45,32 @@ def installed(tmp_path, monkeypatch):
     registry._installed.cache_clear()
 
 
-def example(name: str, module: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Family]:
+EXAMPLES = {  # file of an example package: its effect
+    "edge_mass": "edge-mass",
+    "corner_feet": "corner-feet",
+    "wedged_sheet": "wedged-sheet",
+    "slipping_bolts": "slipping-bolts",
+    "stringer": "stringer",
+}
+PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
+
+
+def source_of(module: str) -> str:
+    """The one file of an example; that of the stringer stands on the page on extensions."""
+    if module != "stringer":
+        return (Path(__file__).parent / "examples" / f"{module}.py").read_text(encoding="utf-8")
+    page = PAGE.read_text(encoding="utf-8")
+    return page[page.index("```python\n") + len("```python\n") :].partition("```\n")[0]
+
+
+@contextmanager
+def example(module: str, folder: Path) -> Iterator[Family]:
     """An example package, installed: its one file and one entry point."""
-    folder = tmp_path_factory.mktemp("site")
+    name = EXAMPLES[module]
     write_package(folder, f"example-{name}", {name: f"{module}:FAMILY"})
+    (folder / f"{module}.py").write_text(source_of(module), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
-        patch.syspath_prepend(str(Path(__file__).parent / f"example_{module}"))
         registry._installed.cache_clear()
         yield registry.family(name)
     registry._installed.cache_clear()
@@ -60,13 +80,15 @@ def example(name: str, module: str, tmp_path_factory: pytest.TempPathFactory) ->
 @pytest.fixture(scope="module")
 def example_edge_mass(tmp_path_factory):
     """A mass along an edge."""
-    yield from example("edge-mass", "edge_mass", tmp_path_factory)
+    with example("edge_mass", tmp_path_factory.mktemp("site")) as family:
+        yield family
 
 
-@pytest.fixture(scope="module")
-def example_stringer(tmp_path_factory):
-    """Beams across a sheet."""
-    yield from example("stringer", "stringer", tmp_path_factory)
+@pytest.fixture(scope="module", params=EXAMPLES)
+def example_family(request, tmp_path_factory):
+    """Each of the example packages."""
+    with example(request.param, tmp_path_factory.mktemp("site")) as family:
+        yield family
 
 
 JOINTED_TOP = 300.0  # Hz; six flexible modes of the two plates lie below

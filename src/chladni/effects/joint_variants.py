@@ -16,10 +16,11 @@ import numpy as np
 from ..errors import ModelError, named
 from ..geometry.beam_lines import fastener_bars
 from ..geometry.facets import tangents
+from ..model.added_beams import with_beams
 from ..model.added_points import next_id, with_points
 from ..model.assembly import Assembly, Average, Beams, Bushes, Equation, RigidBody, picked
 from ..model.point_masses import with_masses
-from ..model.properties import BeamSection, Isotropic, Part, SolidSection
+from ..model.properties import BeamSection, Isotropic, SolidSection
 from .joints import solid_parts
 
 ALL, MOVES = (1, 2, 3, 4, 5, 6), (1, 2, 3)
@@ -225,19 +226,14 @@ def _as_bars(bare: Assembly, blocks: Sequence[Block], name: str) -> Assembly:
     axis = np.array([b.place[1] - b.place[0] for b in blocks])
     up = tangents(axis / np.linalg.norm(axis, axis=1, keepdims=True))[0]
     materials = list(dict.fromkeys(b.material for b in blocks))
-    parts, part = list(made.parts), np.zeros(len(blocks), int)
     for material in materials:
         mine = [k for k, b in enumerate(blocks) if b.material == material]
         A = float(np.mean([blocks[k].area for k in mine]))
         I, J = (factor * A**2 for factor in SQUARE)
         section = BeamSection(material, A, I, I, 0.0, J, shear=(SHEAR, SHEAR))
-        part[mine] = len(parts)
-        label = name if len(materials) == 1 else f"{name} {len(parts)}"
-        parts.append(Part(1 + max(p.id for p in parts), label, section))
-    n, old = len(blocks), made.beams
-    new = Beams(next_id(made) + np.arange(n), rows, part, up, np.zeros((n, 2, 3)),
-                np.zeros((n, 2, 6), bool))  # fmt: skip
-    return replace(made, parts=tuple(parts), beams=_joined(old, new))
+        label = name if len(materials) == 1 else f"{name} {len(made.parts)}"
+        made = with_beams(made, rows[mine], section, up[mine], label)
+    return made
 
 
 def _as_springs(bare: Assembly, blocks: Sequence[Block], name: str) -> Assembly:

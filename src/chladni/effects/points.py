@@ -37,6 +37,18 @@ class AtPoints(Effect):
 
 
 @dataclass(frozen=True, eq=False)
+class SpringEffect(AtPoints):
+    """Springs to ground: one row at each of ``grids``, along each of ``directions`` (k, 3)."""
+
+    directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """Write a spring to ground at each grid: CELAS2, or CBUSH in an oblique direction."""
+        k = self.parameters[0].value(x[0])
+        return with_springs(assembly, self.grids, self.directions, k)
+
+
+@dataclass(frozen=True, eq=False)
 class MassEffect(AtPoints):
     """Masses at grids: the rows are all three translations of each."""
 

@@ -1,28 +1,20 @@
 """Stiffness of the suspension, such as bungee cords."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.assembly import Assembly
 from .effect_context import EffectContext
 from .family import Article, Family
-from .points import AtPoints, strength, with_springs
+from .points import SpringEffect, strength, with_springs
 
 
 @dataclass(frozen=True, eq=False)
-class Suspension(AtPoints):
+class Suspension(SpringEffect):
     """Springs to ground at the hangers, one stiffness for all."""
 
     name = "suspension"
     claim = "the suspension's stiffness is missing from the model"
-
-    directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of the rows
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """Write a spring to ground at each hanger: CELAS2, or CBUSH in an oblique direction."""
-        k = self.parameters[0].value(x[0])
-        return with_springs(assembly, self.grids, self.directions, k)
 
 
 def suspension(where: EffectContext) -> list[Suspension]:

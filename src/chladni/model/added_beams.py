@@ -1,4 +1,4 @@
-"""Beams added to an assembly: stringers, ribs, brackets that a deck lacks."""
+"""Beams added to an assembly: stringers, ribs, brackets, fasteners that a deck lacks."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import ModelError
 from .added_points import next_id
-from .assembly import Assembly, Beams
+from .assembly import Assembly, appended
 from .properties import BeamSection, Part
 
 
@@ -37,21 +37,40 @@ def with_beam_line(
         If a beam has no length, ``up`` lies along it, or a rod has an offset.
     """
     ends = assembly.rows(np.asarray(grids, np.int64))
-    nodes = np.column_stack([ends[:-1], ends[1:]])
-    v, along = np.asarray(up, float), np.diff(assembly.points[ends], axis=0)
-    if not len(nodes) or np.any(np.linalg.norm(np.cross(along, v), axis=1) < 1e-9):
+    return with_beams(assembly, np.column_stack([ends[:-1], ends[1:]]), section, up, name, offset)
+
+
+def with_beams(
+    assembly: Assembly,
+    nodes: np.ndarray,
+    section: BeamSection,
+    up: Sequence[float] | np.ndarray,
+    name: str,
+    offset: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+) -> Assembly:
+    """Add beams between rows of points (n, 2) as a part of their own; see :func:`with_beam_line`.
+
+    Parameters
+    ----------
+    up : (3,) or (n, 3)
+
+    Raises
+    ------
+    ModelError
+        If a beam has no length, ``up`` lies along it, or a rod has an offset.
+    """
+    n, rod = len(nodes), section.kind == "rod"
+    v = np.broadcast_to(np.asarray(up, float), (n, 3))
+    along = np.diff(assembly.points[nodes], axis=1)[:, 0]
+    if not n or np.any(np.linalg.norm(np.cross(along, v), axis=1) < 1e-9):
         raise ModelError(f"{name}: a beam needs two grids apart, and a direction across itself")
-    n, b, rod = len(nodes), assembly.beams, section.kind == "rod"
     if rod and np.any(offset):
         raise ModelError(f"{name}: a rod runs from grid to grid; only bars and beams have offsets")
-    new = Beams(
-        next_id(assembly) + np.arange(n),
-        nodes,
-        np.full(n, len(assembly.parts)),
-        np.tile(0 * v if rod else v / np.linalg.norm(v), (n, 1)),
-        np.broadcast_to(np.asarray(offset, float), (n, 2, 3)).copy(),
-        np.zeros((n, 2, 6), bool),
-    )
-    joined = {k: np.concatenate([x, getattr(new, k)]) for k, x in vars(b).items()}
+    new = appended(
+        assembly.beams, ids=next_id(assembly) + np.arange(n), nodes=nodes,
+        part=np.full(n, len(assembly.parts)),
+        up=0 * v if rod else v / np.linalg.norm(v, axis=1, keepdims=True),
+        offset=np.broadcast_to(np.asarray(offset, float), (n, 2, 3)),
+    )  # fmt: skip
     part = Part(1 + max((p.id for p in assembly.parts), default=0), name, section)
-    return replace(assembly, beams=Beams(**joined), parts=(*assembly.parts, part))
+    return replace(assembly, beams=new, parts=(*assembly.parts, part))

@@ -18,7 +18,9 @@ _ALIKE = 1e-6  # factors that are one
 def joint_changes(
     deck: Deck, before: Assembly, after: Assembly, free: Iterator[int]
 ) -> list[Change]:
-    """Edits of the cards of springs, bushes and masses that are in both and differ by a factor.
+    """Edits of the cards of springs, bushes and masses that are in both and differ.
+
+    A bush has a factor for each of its six directions, a spring or a mass has one factor.
 
     A property is changed where all its elements changed alike; bushes that changed otherwise get
     one of their own, whose id comes from ``free``.
@@ -75,15 +77,20 @@ def _pelas(deck: Deck, pid: int, factor: float) -> Change:
     raise ModelError(f"{deck.path} has no PELAS {pid}")
 
 
-_BushChange = tuple[float, tuple[float, ...]]  # factor on K; GE1 to GE6, none where it stays
+Six = tuple[float, ...]
+_BushChange = tuple[Six, Six]  # factors on K1 to K6; GE1 to GE6, none where it stays
 
 
 def _bush_changes(before: Assembly, after: Assembly) -> dict[int, _BushChange]:
     """{element id: what became of a bush that was there before}."""
-    factor, out = _factors(before, after, "bushes", "stiffness"), {}
-    pairs = zip(before.bushes.loss, after.bushes.loss, strict=False)
-    for (id, f), (old, new) in zip(factor.items(), pairs, strict=False):
-        out[id] = f, () if np.allclose(old, new, rtol=_SAME, atol=0) else tuple(new.tolist())
+    out, was, now = {}, before.bushes, after.bushes
+    columns = was.stiffness, now.stiffness, was.loss, now.loss
+    for id, a, b, old, new in zip(was.ids.tolist(), *columns, strict=False):
+        if np.any((a == 0) & (b != 0)):
+            raise ModelError(f"element {id} has K{np.flatnonzero((a == 0) & (b != 0))[0] + 1} of 0")
+        factors = np.divide(b, a, out=np.ones(6), where=a != 0)
+        lost = () if np.allclose(old, new, rtol=_SAME, atol=0) else tuple(new.tolist())
+        out[id] = tuple(factors.tolist()), lost
     return out
 
 
@@ -101,7 +108,7 @@ def _bushes(deck: Deck, changed: dict[int, _BushChange], free: Iterator[int]) ->
                 kinds.setdefault(same, []).append(int(id))
     for property, kinds in users.items():
         common = max(kinds, key=lambda c: len(kinds[c]))
-        if abs(common[0] - 1) > _SAME or common[1]:
+        if np.abs(np.subtract(common[0], 1)).max() > _SAME or common[1]:
             for j, k in _fields(deck["PBUSH"], property, common).items():
                 yield SetField("PBUSH", property, j, k)
         for change, members in kinds.items():
@@ -113,16 +120,17 @@ def _bushes(deck: Deck, changed: dict[int, _BushChange], free: Iterator[int]) ->
 
 
 def _alike(one: _BushChange, other: _BushChange) -> bool:
-    return abs(one[0] / other[0] - 1) < _ALIKE and one[1] == other[1]
+    return np.allclose(one[0], other[0], rtol=_ALIKE, atol=0) and one[1] == other[1]
 
 
 def _fields(cards: Cards, pid: int, change: _BushChange) -> dict[int, float | str]:
-    """{position: K times the factor} of a PBUSH, and GE: where it stands, or behind all else."""
+    """{position: K times its factor} of a PBUSH, and GE: where it stands, or behind all else."""
     one = cards.single(int(np.flatnonzero(cards.integers(1) == pid)[0]))
-    words, (factor, loss) = one.fields(0), change
+    words, (factors, loss) = one.fields(0), change
     keys = {words[k - 1]: k for k in range(2, len(words) + 1, 8)}
     at = range(keys["K"] + 1, min(keys["K"] + 6, len(words)) + 1) if "K" in keys else ()
-    out: dict[int, float | str] = {j: float(one.reals(j)[0]) * factor for j in at if words[j - 1]}
+    of_k = zip(at, factors, strict=False)
+    out: dict[int, float | str] = {j: float(one.reals(j)[0]) * f for j, f in of_k if words[j - 1]}
     if loss:
         key = keys.get("GE", 2 + 8 * -(-(len(words) - 1) // 8))
         out |= {key: "GE", **{key + 1 + k: v for k, v in enumerate(loss)}}

@@ -11,8 +11,7 @@ from ....units import Units
 from .. import Add, Deck, Replace, SetColumns, SetField, units_of
 from ..export.numbering import Systems
 from ..export.part_cards import material_card
-from .added_elements import added_cards
-from .beam_additions import added_beams
+from .added_elements import added_elements
 from .beam_changes import with_sections
 from .changes import Change
 from .free_ids import FreeIds, free_ids, ids_of
@@ -44,10 +43,9 @@ def changes(
         If the two differ in something no card here can say.
     """
     units = units_of(deck, units)
-    added = added_beams(before, after)
-    whole, after = after, added.rest
+    added = added_elements(before, after)
+    free, after = free_ids(deck, after), added.rest
     before, out = taken_out(deck, before, after)
-    free = free_ids(deck, whole)
     before, after, split = with_new_properties(before, after, free.properties)
     out += _materials(deck, before, after, units, free, split)
     out += laminate_changes(deck, before, after, units, free.materials)
@@ -56,7 +54,7 @@ def changes(
     out += tie_changes(deck, before, after, units)
     out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
-    if cards := [*added_cards(before, whole, units, free), *added.cards(before, units, free)]:
+    if cards := list(added.cards(before, units, free)):
         out.append(Add(cards, "added by the diagnosis"))
     return [*out, *support_changes(deck, before, after)]
 

@@ -9,9 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.effects.effect_context import EffectContext
-from chladni.effects.family import Article, Family
-from chladni.effects.points import MassEffect, strength
+from chladni.effects import Article, EffectContext, Family, MassEffect, strength
 from chladni.model.assembly import Assembly
 from chladni.model.point_masses import with_masses
 
