@@ -62,7 +62,8 @@ class BeamLine(Effect):
         ModelError
             If the section has more than areas and second moments, or the line is none.
         """
-        if section != replace(_of_area(section), **_moments(section, 1.0)):
+        s, plain = section, _of_area(section)
+        if s != replace(plain, I1=s.I1, I2=s.I2, I12=s.I12, J=s.J):
             raise ModelError(
                 f"{cls.name}: a section of unknown size has areas and second moments only, no "
                 "shear factors, non-structural mass or neutral axis of its own"
@@ -74,7 +75,7 @@ class BeamLine(Effect):
             made = with_beam_line(assembly, grids, some, up, cls.name, offset)
             return built.contribution(only(made, len(assembly.parts)))
 
-        (K, M), (K_A, M_A) = of(section), of(_of_area(section))
+        (K, M), (K_A, M_A) = of(section), of(plain)
         every: list[Operator] = [
             ("K", 2, K_A), ("K", 4, sp.csr_array(K - K_A)),
             ("M", 2, M_A), ("M", 4, sp.csr_array(M - M_A)),
@@ -116,12 +117,10 @@ class BeamLine(Effect):
 
 def sized(section: BeamSection, r: float) -> BeamSection:
     """The section r times as large: areas r², second moments of area r⁴."""
-    return replace(section, area=r**2 * section.area, **_moments(section, r**4))
+    s, m = section, r**4
+    return replace(s, area=r**2 * s.area, I1=m * s.I1, I2=m * s.I2, I12=m * s.I12, J=m * s.J)
 
 
 def _of_area(section: BeamSection) -> BeamSection:
+    """The section without second moments, and without all that does not grow with its size."""
     return BeamSection(section.material, section.area, kind=section.kind)
-
-
-def _moments(section: BeamSection, factor: float) -> dict[str, float]:
-    return {n: factor * getattr(section, n) for n in ("I1", "I2", "I12", "J")}
