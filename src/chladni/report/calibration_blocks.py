@@ -27,6 +27,10 @@ _PROFILE = (
     "-2 ln profile likelihood above the best, all other parameters fitted again, at one and two "
     "standard deviations. In brackets: the value assumed by the interval of the table."
 )
+_DRAWN = (
+    "Draws: median and 95 % interval of the posterior, frozen parameters free with their priors. "
+    "Gaussian: most probable value and 95 % interval of the Hessian, of the same unknowns."
+)
 
 
 def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = ()) -> list[Section]:
@@ -36,7 +40,7 @@ def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = (
     return [
         Section("Identifiability", _known(study.identifiability)),
         Section("Basins of the fit", _basins(study)),
-        Section("Uncertainty of the values", [*_profiles(study), *pictures]),
+        Section("Uncertainty of the values", [*_profiles(study), *_sample(study), *pictures]),
     ]
 
 
@@ -109,6 +113,25 @@ def _profiles(study: CalibrationStudy) -> list[Block]:
     ]  # fmt: skip
     heads = ("parameter", "-2 sd", "-1 sd", "+1 sd", "+2 sd")
     return [Table(heads, rows, ("parameter",), _PROFILE)] if rows else []
+
+
+def _sample(study: CalibrationStudy) -> list[Block]:
+    """Draws of the posterior against the Gaussian of the Hessian."""
+    if (found := study.sample) is None:
+        return []
+    rows = [
+        (p.name, _within(p.median, p.low, p.high, p.unit),
+         _within(p.mode, p.gaussian_low, p.gaussian_high, p.unit),
+         number(p.sd_ratio, 3), number(p.autocorrelation_time, 3), number(p.effective, 3))
+        for p in found.parameters
+    ]  # fmt: skip
+    heads = ("parameter", "draws", "Gaussian", "sd, draws / Gaussian", "autocorrelation [steps]",
+             "effective draws")  # fmt: skip
+    return [Table(heads, rows, ("parameter",), f"{_DRAWN} {found.sentence}.")] if rows else []
+
+
+def _within(value: float, low: float, high: float, unit: str) -> str:
+    return f"{quantity(value, unit)} ({quantity(low, unit)} to {quantity(high, unit)})"
 
 
 def calibration_json(result: DiagnosisResult) -> dict[str, Any]:

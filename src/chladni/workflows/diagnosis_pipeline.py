@@ -31,7 +31,7 @@ from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..search.basis_refinement import Refinement, refined
-from ..search.calibration import calibration
+from ..search.calibration import FULL, CalibrationSettings, calibration
 from ..search.compensation import compensating
 from ..search.deciding import decided
 from ..search.decision_in_words import concluded
@@ -101,15 +101,14 @@ class Searched:
 
 def searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    freeze: bool = True, quick: bool = False,
+    settings: CalibrationSettings = FULL,
 ) -> Searched:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
     Parameters
     ----------
     known : posterior of the shared parameters from other states
-    freeze : whether a calibration holds what the data do not know; states share one set
-    quick : a calibration from one start, without profiles and bands
+    settings : of a calibration
 
     Raises
     ------
@@ -142,17 +141,17 @@ def searched(
     stage = within(progress, 0.1, 0.85)
     if diagnosing:
         return Searched(case, question, prepared, compared(prepared.problem, stage), screening)
-    made = calibration(prepared.problem, stage, freeze, quick)
+    made = calibration(prepared.problem, stage, settings)
     prepared = replace(prepared, problem=made.problem)
     return Searched(case, question, prepared, made.diagnosis, screening, made.study)
 
 
 def explained(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    freeze: bool = True, quick: bool = False,
+    settings: CalibrationSettings = FULL,
 ) -> Explained:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
-    made = searched(case, diagnosing, progress, known, freeze, quick)
+    made = searched(case, diagnosing, progress, known, settings)
     question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _apply_held_out(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
