@@ -17,14 +17,13 @@ from chladni.reduced.reduced_model import evaluate
 from chladni.search.calibration import (
     PROFILED,
     _basins,
-    _with_frozen,
     _without,
     latin_hypercube,
     profiles,
 )
 from chladni.search.compensation import compensating
 from chladni.search.deciding import _leaves_the_scales
-from chladni.search.posterior import bands, gaussian_draws, posterior_sample
+from chladni.search.posterior import bands, gaussian_draws, posterior_sample, with_frozen
 
 NOISE = 0.1
 
@@ -82,7 +81,7 @@ def test_intervals_count_the_prior_of_what_is_frozen(reduced, columns):
     whole = problem(reduced, columns, np.zeros(8))
     part = _without(whole, ["x of 2"])
     assert part.base == tuple(columns[:2])
-    said = _with_frozen(whole, part, null_of(part)).covariance
+    said = with_frozen(whole, null_of(part)).covariance
     gain = null_of(part).fit.covariance @ A[:, :2].T / NOISE**2
     truth = rng.normal(size=(40000, 3)) * sd
     y = truth @ A.T + NOISE * rng.normal(size=(len(truth), 8))
@@ -212,7 +211,7 @@ def test_draws_of_a_linear_problem_have_the_covariance_of_the_whole(reduced, col
     A, sd = np.stack([c.column for c in columns], 1), [c.parameters[0].sd for c in columns]
     whole = problem(reduced, columns, np.linspace(-1, 1, 8))
     part = _without(whole, ["x of 2"])
-    found, (effects, draws) = posterior_sample(whole, part, null_of(part), silent)
+    found, (effects, draws) = posterior_sample(whole, null_of(part), silent)
     due = np.linalg.inv(A.T @ A / NOISE**2 + np.diag(1 / np.square(sd)))
     mean = due @ A.T @ np.linspace(-1, 1, 8) / NOISE**2
     assert_allclose(found.gaussian_mean, mean, atol=1e-4)  # where the descent stops

@@ -201,6 +201,48 @@ class PosteriorSample:
 
 
 @dataclass(frozen=True)
+class ArticleValue:
+    """A parameter of one article.
+
+    Attributes
+    ----------
+    value, low, high : with its 95 % interval
+    away, reach : x less that of the mean of all articles, and half of its own 95 % interval; ln
+        value where it is a factor
+    """
+
+    article: str
+    value: float
+    low: float
+    high: float
+    away: float
+    reach: float
+
+
+@dataclass(frozen=True)
+class ArticleParameter:
+    """A parameter of nominally equal articles: θ_a = μ + δ_a, δ_a ~ N(0, τ²).
+
+    Attributes
+    ----------
+    mean, low, high : μ with its 95 % interval
+    spread : τ of x, one for all parameters of this quantity; ln value where it is a factor
+    spread_low, spread_high : its 95 % interval; None where the tests do not bound it
+    articles : θ_a
+    """
+
+    name: str
+    unit: str
+    mean: float
+    low: float
+    high: float
+    spread: float
+    spread_low: float
+    spread_high: float | None
+    articles: tuple[ArticleValue, ...]
+
+
+@dataclass(frozen=True)
 class CalibrationStudy:
     """Information, basins, covariance and profiles of a calibration.
 
@@ -214,6 +256,7 @@ class CalibrationStudy:
     bands : responses that the posterior predicts
     compensating : reasons why the values stand for something else; empty where none does
     sample : draws from the posterior; None where none were asked for
+    articles : parameters of several articles fitted together; empty with one
     """
 
     identifiability: Identifiability = Identifiability()
@@ -226,3 +269,4 @@ class CalibrationStudy:
     bands: tuple[ResponseBand, ...] = ()
     compensating: tuple[str, ...] = ()
     sample: PosteriorSample | None = None
+    articles: tuple[ArticleParameter, ...] = ()

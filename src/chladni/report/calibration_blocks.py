@@ -4,7 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
-from ..inference.calibration_result import CalibrationStudy, Identifiability, ParameterKnowledge
+from ..inference.calibration_result import (
+    ArticleParameter,
+    CalibrationStudy,
+    Identifiability,
+    ParameterKnowledge,
+)
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Items, Section, Table
 from .words import number, quantity
@@ -31,6 +36,11 @@ _DRAWN = (
     "Draws: median and 95 % interval of the posterior, frozen parameters free with their priors. "
     "Gaussian: most probable value and 95 % interval of the Hessian, of the same unknowns."
 )
+_TOGETHER = (
+    "Mean and spread (one standard deviation) of nominally equal articles with 95 % intervals. The "
+    "error of the model's form is common to them and widens the interval of the mean. In brackets: "
+    "deviation of each article from the mean, which contains none of that error."
+)
 
 
 def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = ()) -> list[Section]:
@@ -40,6 +50,7 @@ def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = (
     return [
         Section("Identifiability", _known(study.identifiability)),
         Section("Basins of the fit", _basins(study)),
+        Section("Articles fitted together", _articles(study)),
         Section("Uncertainty of the values", [*_profiles(study), *_sample(study), *pictures]),
     ]
 
@@ -113,6 +124,26 @@ def _profiles(study: CalibrationStudy) -> list[Block]:
     ]  # fmt: skip
     heads = ("parameter", "-2 sd", "-1 sd", "+1 sd", "+2 sd")
     return [Table(heads, rows, ("parameter",), _PROFILE)] if rows else []
+
+
+def _articles(study: CalibrationStudy) -> list[Block]:
+    """Common mean, spread and values of several articles."""
+    if not study.articles:
+        return []
+    rows = [
+        (p.name, _within(p.mean, p.low, p.high, p.unit), _spread(p),
+         *(f"{quantity(a.value, p.unit)} ({100 * a.away:+.2g} ± {100 * a.reach:.2g} %)"
+           for a in p.articles))
+        for p in study.articles
+    ]  # fmt: skip
+    names = tuple(a.article for a in study.articles[0].articles)
+    heads = ("parameter", "mean of all units", "spread of units", *names)
+    return [Table(heads, rows, heads, _TOGETHER)]
+
+
+def _spread(p: ArticleParameter) -> str:
+    high = "not bounded" if p.spread_high is None else _percent(p.spread_high)
+    return f"{_percent(p.spread)} ({_percent(p.spread_low)} to {high})"
 
 
 def _sample(study: CalibrationStudy) -> list[Block]:

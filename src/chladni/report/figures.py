@@ -82,6 +82,11 @@ def _study(folder: Path, study: CalibrationStudy | None) -> dict[str, Path]:
         draws = np.array(sample.draws) - np.array(sample.gaussian_mean)
     if len(names) > 1:
         made["corner"] = calibration_plots.corner(folder / "corner.png", names, C, draws)
+    if study.articles:
+        units = [(p.name, p.spread, [a.away for a in p.articles], [a.reach for a in p.articles])
+                 for p in study.articles]  # fmt: skip
+        each = [a.article for a in study.articles[0].articles]
+        made["articles"] = calibration_plots.unit_places(folder / "articles.png", units, each)
     if study.bands:
         bands = [
             (

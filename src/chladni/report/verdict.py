@@ -71,6 +71,10 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
         "Posterior of each pair of parameters, change in %: one and two standard deviations of the "
         "Gaussian; points and steps are draws, if there are any.",
     ),
+    "articles": (
+        "study",
+        "Deviation of each article from the mean of all, with 95 % intervals.",
+    ),
     "bands": (
         "study",
         "Responses with the damping of the search: 90 % of the posterior, and the test.",

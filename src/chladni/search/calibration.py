@@ -38,7 +38,7 @@ from .diagnosis import (
     nominal_starts,
     without_effects,
 )
-from .posterior import bands, frozen_effects, gaussian_draws, physical_values, posterior_sample
+from .posterior import bands, gaussian_draws, physical_values, posterior_sample, with_frozen
 
 STARTS = 12  # of the Latin hypercube
 BEST = 10  # basins that are reported
@@ -102,9 +102,9 @@ def calibration(
     profiled = () if quick else tuple(profiles(problem, null))
     every, sample = gaussian_draws(null.fit), None
     if settings.sample:
-        sample, every = posterior_sample(whole, problem, null, within(progress, 0.8, 1.0))
+        sample, every = posterior_sample(whole, null, within(progress, 0.8, 1.0))
     predicted = () if quick else tuple(bands(problem, null, every))
-    null = replace(null, fit=_with_frozen(whole, problem, null))
+    null = replace(null, fit=with_frozen(whole, null))
     notes = tuple(_notes(known, basins, ends, sample))
     found = Diagnosis(nominal, null, fit_of_the_deck(problem, null), (), notes=notes)
     own = calibration_positions(null.fit.effects)
@@ -139,28 +139,6 @@ def _without(problem: UpdatingProblem, frozen: Sequence[str]) -> UpdatingProblem
 def _frozen(effect: Effect, frozen: Sequence[str]) -> bool:
     names = parameter_names([effect])
     return effect.kind == "calibration" and bool(names) and all(n in frozen for n in names)
-
-
-def _with_frozen(whole: UpdatingProblem, problem: UpdatingProblem, null: HypothesisFit) -> Fit:
-    """The fit with a covariance that counts the priors of frozen parameters.
-
-    H = [[H_ff, H_fz], [H_zf, ·]] is the information of data and priors.  Frozen parameters z move
-    the fit by -G z, G = H_ff⁻¹ H_fz.  With their prior covariance P, C = H_ff⁻¹ + G P Gᵀ
-    (Tapley, Schutz and Born 2004, Statistical Orbit Determination, ch. 6: consider covariance).
-    """
-    found, frozen = null.fit, frozen_effects(whole, problem)
-    if not frozen:
-        return found
-    effects = [*found.effects, *frozen]
-    z = unknowns(frozen)
-    x = np.concatenate([found.x, [p.mean for p in z]])
-    state = evaluate(null.model, effects, x)
-    J = found.data.residual(state, True)[1]
-    J = np.concatenate([J, prior_residuals(effects, whole.mass_measurement, x, state)[1]])
-    n = len(found.x)
-    moved = np.linalg.solve(J[:, :n].T @ J[:, :n], J[:, :n].T @ J[:, n:])
-    spread = moved * [p.sd for p in z]
-    return replace(found, covariance=found.covariance + spread @ spread.T)
 
 
 def latin_hypercube(problem: UpdatingProblem, count: int = STARTS) -> list[np.ndarray]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,13 +31,35 @@ SEED = 20250102
 Draws = tuple[tuple[Effect, ...], np.ndarray]  # effects, and their x (draws, n)
 
 
-def frozen_effects(whole: UpdatingProblem, problem: UpdatingProblem) -> list[Effect]:
-    """Calibration parameters that are held in the problem and free in the whole."""
-    return [e for e in whole.base if e not in problem.base]
+def frozen_effects(whole: UpdatingProblem, null: HypothesisFit) -> list[Effect]:
+    """Calibration parameters of the whole problem that the fit holds."""
+    return [e for e in whole.base if e not in null.fit.effects]
+
+
+def with_frozen(whole: UpdatingProblem, null: HypothesisFit) -> Fit:
+    """The fit with a covariance that counts the priors of frozen parameters.
+
+    H = [[H_ff, H_fz], [H_zf, ·]] is the information of data and priors.  Frozen parameters z move
+    the fit by -G z, G = H_ff⁻¹ H_fz.  With their prior covariance P, C = H_ff⁻¹ + G P Gᵀ
+    (Tapley, Schutz and Born 2004, Statistical Orbit Determination, ch. 6: consider covariance).
+    """
+    found, frozen = null.fit, frozen_effects(whole, null)
+    if not frozen:
+        return found
+    effects = [*found.effects, *frozen]
+    z = unknowns(frozen)
+    x = np.concatenate([found.x, [p.mean for p in z]])
+    state = evaluate(null.model, effects, x)
+    J = found.data.residual(state, True)[1]
+    J = np.concatenate([J, prior_residuals(effects, whole.mass_measurement, x, state)[1]])
+    n = len(found.x)
+    moved = np.linalg.solve(J[:, :n].T @ J[:, :n], J[:, :n].T @ J[:, n:])
+    spread = moved * [p.sd for p in z]
+    return replace(found, covariance=found.covariance + spread @ spread.T)
 
 
 def posterior_sample(
-    whole: UpdatingProblem, problem: UpdatingProblem, null: HypothesisFit, progress: Progress
+    whole: UpdatingProblem, null: HypothesisFit, progress: Progress
 ) -> tuple[PosteriorSample, Draws]:
     """Sample all unknowns: free and frozen parameters with their priors, and nuisances.
 
@@ -48,9 +71,9 @@ def posterior_sample(
     FileError
         If the sampler is not installed.
     """
-    effects = [*null.fit.effects, *frozen_effects(whole, problem)]
+    effects = [*null.fit.effects, *frozen_effects(whole, null)]
     start = np.concatenate([null.fit.x, [p.mean for p in unknowns(effects)[len(null.fit.x) :]]])
-    mass, data, model = problem.mass_measurement, null.data, null.model
+    mass, data, model = whole.mass_measurement, null.data, null.model
     best = fit(model, effects, data, mass, start).kept()
 
     def log_density(x: np.ndarray) -> float:
@@ -74,7 +97,7 @@ def _summary(best: Fit, chains: Chains) -> PosteriorSample:
     x = chains.draws[:, own]
     gaussian = np.sqrt(np.diag(best.covariance))[own]
     median, low, high, mode, less, more = (
-        _at(best, own, values)
+        values_at(best, own, values)
         for values in (
             np.median(x, axis=0), *np.quantile(x, INSIDE, axis=0), best.x[own],
             best.x[own] - REACH * gaussian, best.x[own] + REACH * gaussian,
@@ -96,13 +119,6 @@ def _summary(best: Fit, chains: Chains) -> PosteriorSample:
         tuple(best.x[own].tolist()),
         tuple(map(tuple, best.covariance[np.ix_(own, own)].tolist())),
     )  # fmt: skip
-
-
-def _at(best: Fit, own: np.ndarray, values: np.ndarray) -> list[NamedValue]:
-    """Physical values of the calibration parameters at these x."""
-    x = best.x.copy()
-    x[own] = values
-    return list(physical_values(best.effects, x))
 
 
 def gaussian_draws(found: Fit) -> Draws:
@@ -153,3 +169,10 @@ def physical_values(effects: Sequence[Effect], x: np.ndarray) -> Iterator[NamedV
                 (rows[k].value, rows[k].unit) if k < len(rows) else (p.value(own[k]), p.unit)
             )
             yield NamedValue(next(names), float(value), unit, float(own[k]))
+
+
+def values_at(found: Fit, own: np.ndarray, x: np.ndarray) -> list[NamedValue]:
+    """Physical values of the calibration parameters at x, which stand at these positions."""
+    whole = found.x.copy()
+    whole[own] = x
+    return list(physical_values(found.effects, whole))

@@ -99,6 +99,33 @@ def _pair(ax: Axes, C: np.ndarray, x: np.ndarray, i: int, j: int) -> None:
         axis(min(-reach, *x[:, n], 0.0), max(reach, *x[:, n], 0.0))
 
 
+def unit_places(
+    path: Path | str,
+    rows: Sequence[tuple[str, float, Sequence[float], Sequence[float]]],
+    articles: Sequence[str],
+) -> Path:
+    """Plot each article's deviation from the mean of all in per cent, over the spread of units.
+
+    Parameters
+    ----------
+    rows : (name, spread τ, deviations of the articles, half of their 95 % intervals), ln value
+    """
+    figure = Figure(figsize=(7.2, 0.5 * len(rows) + 1.2), layout="constrained")
+    ax = figure.subplots()
+    at = np.arange(len(rows))[::-1]
+    tau, *places = (100 * np.array([row[n] for row in rows]) for n in (1, 2, 3))
+    ax.barh(at, 2 * tau, left=-tau, height=0.7, color=AFTER, alpha=0.25, label="± spread of units")
+    for k, name in enumerate(articles):
+        shift = 0.5 * (k / max(len(articles) - 1, 1) - 0.5)
+        away, reach = (each[:, k] for each in places)
+        ax.errorbar(away, at - shift, xerr=reach, fmt="o", ms=3.5, lw=1, capsize=2, label=name)
+    ax.set_yticks(at, [row[0] for row in rows])
+    ax.axvline(0, color="#999999", lw=0.6)
+    ax.set_xlabel("deviation from the mean of all units [%]", fontsize=9)
+    figure.legend(loc="outside upper right", ncols=4, **LEGEND)
+    return save(figure, path)
+
+
 def response_bands(
     path: Path | str,
     bands: Sequence[tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]],

@@ -30,6 +30,7 @@ from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
+from ..search.articles import articles_together
 from ..search.basis_refinement import Refinement, refined
 from ..search.calibration import FULL, CalibrationSettings, calibration
 from ..search.compensation import compensating
@@ -142,8 +143,12 @@ def searched(
     if diagnosing:
         return Searched(case, question, prepared, compared(prepared.problem, stage), screening)
     made = calibration(prepared.problem, stage, settings)
-    prepared = replace(prepared, problem=made.problem)
-    return Searched(case, question, prepared, made.diagnosis, screening, made.study)
+    articles = articles_together(question, prepared, made.diagnosis.null)
+    prepared, study = (
+        replace(prepared, problem=made.problem),
+        replace(made.study, articles=articles),
+    )
+    return Searched(case, question, prepared, made.diagnosis, screening, study)
 
 
 def explained(
@@ -185,16 +190,14 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     return replace(
-        result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen,
-        study=study,
+        result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
     )  # fmt: skip
 
 
 def _apply_held_out(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
-    if not diagnosing:  # nothing is to be named
-        prepared = replace(prepared, too_little="")
+    prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
     decision, known = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, decision, known)
     if decision.named:  # it is compared with what calibrate answers
@@ -302,10 +305,8 @@ def _result(
     )
     rows = frequency_rows(question, prepared, stages.test, every, real)
     fitted, held = _scores(question, prepared, found, stages, real)
-    left, away = (
-        remainder(prepared, found),
-        dict.fromkeys((*implausible_values(deck.fit), *strained(last.fit))),
-    )
+    left = remainder(prepared, found)
+    away = dict.fromkeys((*implausible_values(deck.fit), *strained(last.fit)))
     spot = residual_localisation(last, question.mass_measurement)
     weighed = None if question.mass_measurement is None else question.mass_measurement.mass
     return DiagnosisResult(
