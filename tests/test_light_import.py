@@ -22,6 +22,7 @@ HEAVY = {
     "dask",
     "control",
     "sdynpy",
+    "emcee",
 }
 
 

@@ -1,10 +1,30 @@
-"""Load effects and commands that installed packages offer by entry points."""
+"""Load optional packages, and the effects and commands that installed packages offer."""
 
 from collections.abc import Callable, Container
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from types import ModuleType
 from typing import Any
 
-from .errors import ExtensionError
+from .errors import ExtensionError, FileError
+
+
+def optional_package(name: str, install: str) -> ModuleType:
+    """An optional package.
+
+    Parameters
+    ----------
+    install : what pip installs to have it
+
+    Raises
+    ------
+    FileError
+        If it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise FileError(f"{name} cannot be imported ({error}); pip install {install}") from None
 
 
 def installed(

@@ -12,18 +12,18 @@ from chladni.effects.effect import ChannelChange, Effect, Parameter
 from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.inference.map_fit import Fit, MassMeasurement, Status, fit
 from chladni.inference.result import Agreement, MassComparison, Scores
+from chladni.progress import silent
 from chladni.reduced.reduced_model import evaluate
 from chladni.search.calibration import (
     PROFILED,
     _basins,
-    _with_frozen,
     _without,
-    bands,
     latin_hypercube,
     profiles,
 )
 from chladni.search.compensation import compensating
 from chladni.search.deciding import _leaves_the_scales
+from chladni.search.posterior import bands, gaussian_draws, posterior_sample, with_frozen
 
 NOISE = 0.1
 
@@ -81,7 +81,7 @@ def test_intervals_count_the_prior_of_what_is_frozen(reduced, columns):
     whole = problem(reduced, columns, np.zeros(8))
     part = _without(whole, ["x of 2"])
     assert part.base == tuple(columns[:2])
-    said = _with_frozen(whole, part, null_of(part)).covariance
+    said = with_frozen(whole, null_of(part)).covariance
     gain = null_of(part).fit.covariance @ A[:, :2].T / NOISE**2
     truth = rng.normal(size=(40000, 3)) * sd
     y = truth @ A.T + NOISE * rng.normal(size=(len(truth), 8))
@@ -182,7 +182,7 @@ def test_bands_are_as_wide_as_the_posterior_and_show_held_out_channels_first(
     given = UpdatingProblem(reduced, data, None, (effect,), (), None, ("a", "b", "c", "d"))
     found = fit(reduced.model, [effect], data, None, np.array([0.04]))
     null = HypothesisFit(Effect(), replace(found, covariance=np.array([[sd**2]])), reduced.model)
-    every = list(bands(given, null))
+    every = list(bands(given, null, gaussian_draws(null.fit)))
     assert [b.label for b in every] == ["c", "a", "b", "d"]
     assert [b.held_out for b in every] == [True, False, False, False]
     width = np.log(np.array(every[0].high) / every[0].low)
@@ -203,3 +203,27 @@ def test_a_calibration_does_not_keep_a_deck_that_leaves_the_scales(reduced, off,
     null = SimpleNamespace(model=reduced.model)
     assert _leaves_the_scales(given, null, np.zeros(1)) is leaves
     assert not _leaves_the_scales(replace(given, mass_measurement=None), null, np.zeros(1))
+
+
+def test_draws_of_a_linear_problem_have_the_covariance_of_the_whole(reduced, columns):
+    """What is frozen is free among the draws: their covariance is (AᵀA/σ² + P⁻¹)⁻¹ of all."""
+    pytest.importorskip("emcee")
+    A, sd = np.stack([c.column for c in columns], 1), [c.parameters[0].sd for c in columns]
+    whole = problem(reduced, columns, np.linspace(-1, 1, 8))
+    part = _without(whole, ["x of 2"])
+    found, (effects, draws) = posterior_sample(whole, null_of(part), silent)
+    due = np.linalg.inv(A.T @ A / NOISE**2 + np.diag(1 / np.square(sd)))
+    mean = due @ A.T @ np.linspace(-1, 1, 8) / NOISE**2
+    assert_allclose(found.gaussian_mean, mean, atol=1e-4)  # where the descent stops
+    assert_allclose(found.gaussian_covariance, due, rtol=1e-6)
+    assert [p.name for p in found.parameters] == ["x of 0", "x of 1", "x of 2"]
+    assert draws.shape == (60, 3)
+    assert len(effects) == 3
+    assert found.converged
+    for k, p in enumerate(found.parameters):
+        near = 5 * np.sqrt(due[k, k] / p.effective)
+        assert p.median == pytest.approx(mean[k], abs=2 * near)
+        assert p.sd_ratio == pytest.approx(1.0, abs=5 / np.sqrt(p.effective))
+        assert (p.high - p.low) == pytest.approx(p.gaussian_high - p.gaussian_low, rel=0.2)
+    assert "not converged" not in found.sentence
+    assert "not converged" in replace(found, converged=False).sentence

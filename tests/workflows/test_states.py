@@ -1,67 +1,19 @@
 """Several recordings and several states of one object in one case."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.builders.commands import ran
+from tests.builders.plate_recordings import MASS, PLACE, SHAKERS, T, a_case, record
 
 import chladni
-from chladni.effects.points import with_masses
 from chladni.ema.setup import PoleTable
 from chladni.io.nastran import write_assembly
-from chladni.io.tables.write_tables import write_npz, write_poles
+from chladni.io.tables.write_tables import write_poles
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.report.diagnosis_json import diagnosis_json, from_json, read_diagnosis
 from chladni_specimens.plates import plate
-
-SENSORS = [(0.0, 0.11), (0.05, 0.22), (0.15, 0.11), (0.2, 0.1833), (0.25, 0.0), (0.3, 0.22)]
-SHAKERS = [(0.0, 0.0), (0.3, 0.0367)]
-PLACE, MASS, T = (0.25, 0.1833), 0.02, 1.015e-3
-DECK = plate(0.3, 0.22, 6, 6, 1e-3)
-HEAD = """[model]
-deck = "plate.bdf"
-units = "SI"
-[test]
-mass = {mass}
-[band]
-fit = [20.0, 190.0]
-"""
-
-
-def at(assembly, places):
-    away = np.linalg.norm(assembly.points[None, :, :2] - np.asarray(places)[:, None], axis=2)
-    return tuple(int(assembly.ids[k]) for k in away.argmin(axis=1))
-
-
-def labels(assembly, places):
-    return tuple(f"{g}:+Z" for g in at(assembly, places))
-
-
-def record(path, t=T, mass=0.0, shakers=SHAKERS[:1], seed=0):
-    """Accelerances of a plate by a mesh twice as fine, 0.5 % noise; what it weighs [kg]."""
-    article = plate(0.3, 0.22, 12, 12, t)
-    if mass:
-        article = with_masses(article, at(article, [PLACE]), mass)
-    write_assembly(article, path.with_suffix(".bdf"))
-    model = chladni.load(path.with_suffix(".bdf"), "SI")
-    ends, drives = (list(labels(article, p)) for p in (SENSORS, shakers))
-    H = chladni.frf(model, ends, drives, np.linspace(15, 230, 900)).frfs[0].to("accelerance")
-    z = np.random.default_rng(seed).normal(size=(2, *H.values.shape))
-    values = H.values * (1 + 0.005 * (z[0] + 1j * z[1]) / np.sqrt(2))
-    named = labels(DECK, SENSORS), labels(DECK, shakers)
-    write_npz(path, replace(H, values=values, outputs=named[0], inputs=named[1]))
-    return round(chladni.modes(model, 7).mass, 5)
-
-
-def a_case(folder, mass, *recordings):
-    """A case.toml with these [[recording]]."""
-    write_assembly(DECK, folder / "plate.bdf")
-    more = ["[[recording]]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in r.items())
-            for r in recordings]  # fmt: skip
-    (folder / "case.toml").write_text(HEAD.format(mass=mass) + "\n".join(more) + "\n")
-    return chladni.load_case(folder)
 
 
 @pytest.fixture(scope="module")

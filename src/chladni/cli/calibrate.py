@@ -1,5 +1,6 @@
 """``chladni calibrate``: calibration parameters alone, no new physics."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -18,16 +19,25 @@ def run(
             help="Fit the deck with other models of its welds, adhesive and screws; compare them.",
         ),
     ] = False,
+    sample: Annotated[
+        bool,
+        typer.Option(
+            "--sample",
+            help="Draw from the posterior (needs emcee: pip install 'chladni[posterior]').",
+        ),
+    ] = False,
     out: Out = None,
 ) -> None:
     """Fit E, rho and t of the parts, or the case's parameters; write the updated deck and a page.
 
     Choose modes by their frequency: [band] fit and exclude in case.toml.
     """
+    if variants and sample:
+        raise typer.BadParameter("--sample draws for one model; leave out --variants")
     if variants:
         _variants(source, out)
     else:
-        diagnosed("calibrate", source, out, calibrate)
+        diagnosed("calibrate", source, out, partial(calibrate, sample=sample))
 
 
 def _variants(source: Path, out: Path | None) -> None:

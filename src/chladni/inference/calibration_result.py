@@ -137,6 +137,112 @@ class ResponseBand:
 
 
 @dataclass(frozen=True)
+class SampledParameter:
+    """A parameter over the draws of the posterior, and over the Gaussian of its Hessian.
+
+    Attributes
+    ----------
+    median, low, high : of the draws; 95 % lie between the last two
+    mode, gaussian_low, gaussian_high : the most probable value, 95 % interval of the Gaussian
+    sd_ratio : standard deviation of x of the draws over that of the Gaussian
+    autocorrelation_time : steps between independent draws
+    effective : number of independent draws that tell as much
+    """
+
+    name: str
+    unit: str
+    median: float
+    low: float
+    high: float
+    mode: float
+    gaussian_low: float
+    gaussian_high: float
+    sd_ratio: float
+    autocorrelation_time: float
+    effective: float
+
+
+@dataclass(frozen=True)
+class PosteriorSample:
+    """Draws from the posterior of all unknowns; frozen parameters are free with their priors.
+
+    Attributes
+    ----------
+    parameters : of the calibration
+    walkers, steps, discarded : independent chains, their length, and the part that is left out
+    converged : whether chains are fifty autocorrelation times long in every unknown
+    autocorrelation_time : longest of all unknowns, nuisances included [steps]
+    draws : (kept, p)   of x of the parameters, thinned
+    gaussian_mean, gaussian_covariance : (p,), (p, p)   of x
+    """
+
+    parameters: tuple[SampledParameter, ...] = ()
+    walkers: int = 0
+    steps: int = 0
+    discarded: int = 0
+    converged: bool = False
+    autocorrelation_time: float = 0.0
+    draws: tuple[tuple[float, ...], ...] = ()
+    gaussian_mean: tuple[float, ...] = ()
+    gaussian_covariance: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """Length and convergence of the chains in words."""
+        least = min((p.effective for p in self.parameters), default=0.0)
+        made = (
+            f"{self.walkers} chains of {self.steps} steps sample the posterior: autocorrelation "
+            f"time {self.autocorrelation_time:.3g} steps at most, {least:.0f} effective draws of a "
+            "parameter at least"
+        )
+        if self.converged:
+            return made
+        return f"{made}; not converged: chains shorter than 50 autocorrelation times mislead"
+
+
+@dataclass(frozen=True)
+class ArticleValue:
+    """A parameter of one article.
+
+    Attributes
+    ----------
+    value, low, high : with its 95 % interval
+    away, reach : x less that of the mean of all articles, and half of its own 95 % interval; ln
+        value where it is a factor
+    """
+
+    article: str
+    value: float
+    low: float
+    high: float
+    away: float
+    reach: float
+
+
+@dataclass(frozen=True)
+class ArticleParameter:
+    """A parameter of nominally equal articles: θ_a = μ + δ_a, δ_a ~ N(0, τ²).
+
+    Attributes
+    ----------
+    mean, low, high : μ with its 95 % interval
+    spread : τ of x, one for all parameters of this quantity; ln value where it is a factor
+    spread_low, spread_high : its 95 % interval; None where the tests do not bound it
+    articles : θ_a
+    """
+
+    name: str
+    unit: str
+    mean: float
+    low: float
+    high: float
+    spread: float
+    spread_low: float
+    spread_high: float | None
+    articles: tuple[ArticleValue, ...]
+
+
+@dataclass(frozen=True)
 class CalibrationStudy:
     """Information, basins, covariance and profiles of a calibration.
 
@@ -149,6 +255,8 @@ class CalibrationStudy:
     profiles : of the free parameters
     bands : responses that the posterior predicts
     compensating : reasons why the values stand for something else; empty where none does
+    sample : draws from the posterior; None where none were asked for
+    articles : parameters of several articles fitted together; empty with one
     """
 
     identifiability: Identifiability = Identifiability()
@@ -160,3 +268,5 @@ class CalibrationStudy:
     profiles: tuple[LikelihoodProfile, ...] = ()
     bands: tuple[ResponseBand, ...] = ()
     compensating: tuple[str, ...] = ()
+    sample: PosteriorSample | None = None
+    articles: tuple[ArticleParameter, ...] = ()

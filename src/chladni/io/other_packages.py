@@ -5,8 +5,6 @@ pandas (for pyFBS) or python-control. Numbers are SI throughout.
 """
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
@@ -16,7 +14,8 @@ from ..dynamics.frf import FRF, UNIT, Quantity
 from ..dynamics.modes import ModalModel
 from ..dynamics.statespace import StateSpace
 from ..ema.setup import Role, Sensor
-from ..errors import FileError, LabelError, named
+from ..errors import LabelError, named
+from ..extensions import optional_package
 from .tables.write_tables import write_csv as write_csv
 from .tables.write_tables import write_npz as write_npz
 from .uff.write_shapes import write_shapes as write_shapes
@@ -50,20 +49,6 @@ _GIVE = f"give quantity, one of {named(UNIT)}"
 _AXES = {name: [f"{name}_{k}" for k in (1, 2, 3)] for name in ("Position", "Direction")}  # pyFBS
 
 
-def _package(name: str, install: str) -> ModuleType:
-    """An optional package.
-
-    Raises
-    ------
-    FileError
-        If it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise FileError(f"{name} cannot be imported ({error}); pip install {install}") from None
-
-
 def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
     """Convert responses or modes to a data set.
 
@@ -77,7 +62,7 @@ def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
     FileError
         If xarray is not installed.
     """
-    Dataset = _package("xarray", "'chladni[xarray]'").Dataset
+    Dataset = optional_package("xarray", "'chladni[xarray]'").Dataset
     if isinstance(data, ModalModel):
         return Dataset(
             {
@@ -165,7 +150,7 @@ def to_sdynpy(data: FRF | ModalModel) -> Any:
     LabelError
         If a label is no single component (412:n).
     """
-    sdynpy = _package("sdynpy", "sdynpy")
+    sdynpy = optional_package("sdynpy", "sdynpy")
     if isinstance(data, ModalModel):
         at = sdynpy.coordinate_array(data.dofs[:, 0], data.dofs[:, 1])
         return sdynpy.shape_array(at, data.shapes.T, data.frequency, data.damping)
@@ -265,7 +250,7 @@ def to_pyfbs(
     FileError
         If pandas is not installed.
     """
-    frame = _package("pandas", "pandas").DataFrame
+    frame = optional_package("pandas", "pandas").DataFrame
     quantity = {"receptance": "Displacement", "mobility": "Velocity"}.get(
         frf.quantity, "Acceleration"
     )
@@ -370,7 +355,7 @@ def to_control(system: StateSpace) -> Any:
     FileError
         If python-control is not installed.
     """
-    control = _package("control", "control")
+    control = optional_package("control", "control")
     names = [[text.replace(":", " ") for text in side] for side in (system.inputs, system.outputs)]
     matrices = (np.array(m) for m in (system.A, system.B, system.C, system.D))
     return control.ss(*matrices, inputs=names[0], outputs=names[1])

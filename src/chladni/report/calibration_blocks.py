@@ -4,7 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
-from ..inference.calibration_result import CalibrationStudy, Identifiability, ParameterKnowledge
+from ..inference.calibration_result import (
+    ArticleParameter,
+    CalibrationStudy,
+    Identifiability,
+    ParameterKnowledge,
+)
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Items, Section, Table
 from .words import number, quantity
@@ -27,6 +32,15 @@ _PROFILE = (
     "-2 ln profile likelihood above the best, all other parameters fitted again, at one and two "
     "standard deviations. In brackets: the value assumed by the interval of the table."
 )
+_DRAWN = (
+    "Draws: median and 95 % interval of the posterior, frozen parameters free with their priors. "
+    "Gaussian: most probable value and 95 % interval of the Hessian, of the same unknowns."
+)
+_TOGETHER = (
+    "Mean and spread (one standard deviation) of nominally equal articles with 95 % intervals. The "
+    "error of the model's form is common to them and widens the interval of the mean. In brackets: "
+    "deviation of each article from the mean, which contains none of that error."
+)
 
 
 def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = ()) -> list[Section]:
@@ -36,7 +50,8 @@ def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = (
     return [
         Section("Identifiability", _known(study.identifiability)),
         Section("Basins of the fit", _basins(study)),
-        Section("Uncertainty of the values", [*_profiles(study), *pictures]),
+        Section("Articles fitted together", _articles(study)),
+        Section("Uncertainty of the values", [*_profiles(study), *_sample(study), *pictures]),
     ]
 
 
@@ -109,6 +124,45 @@ def _profiles(study: CalibrationStudy) -> list[Block]:
     ]  # fmt: skip
     heads = ("parameter", "-2 sd", "-1 sd", "+1 sd", "+2 sd")
     return [Table(heads, rows, ("parameter",), _PROFILE)] if rows else []
+
+
+def _articles(study: CalibrationStudy) -> list[Block]:
+    """Common mean, spread and values of several articles."""
+    if not study.articles:
+        return []
+    rows = [
+        (p.name, _within(p.mean, p.low, p.high, p.unit), _spread(p),
+         *(f"{quantity(a.value, p.unit)} ({100 * a.away:+.2g} ± {100 * a.reach:.2g} %)"
+           for a in p.articles))
+        for p in study.articles
+    ]  # fmt: skip
+    names = tuple(a.article for a in study.articles[0].articles)
+    heads = ("parameter", "mean of all units", "spread of units", *names)
+    return [Table(heads, rows, heads, _TOGETHER)]
+
+
+def _spread(p: ArticleParameter) -> str:
+    high = "not bounded" if p.spread_high is None else _percent(p.spread_high)
+    return f"{_percent(p.spread)} ({_percent(p.spread_low)} to {high})"
+
+
+def _sample(study: CalibrationStudy) -> list[Block]:
+    """Draws of the posterior against the Gaussian of the Hessian."""
+    if (found := study.sample) is None:
+        return []
+    rows = [
+        (p.name, _within(p.median, p.low, p.high, p.unit),
+         _within(p.mode, p.gaussian_low, p.gaussian_high, p.unit),
+         number(p.sd_ratio, 3), number(p.autocorrelation_time, 3), number(p.effective, 3))
+        for p in found.parameters
+    ]  # fmt: skip
+    heads = ("parameter", "draws", "Gaussian", "sd, draws / Gaussian", "autocorrelation [steps]",
+             "effective draws")  # fmt: skip
+    return [Table(heads, rows, ("parameter",), f"{_DRAWN} {found.sentence}.")] if rows else []
+
+
+def _within(value: float, low: float, high: float, unit: str) -> str:
+    return f"{quantity(value, unit)} ({quantity(low, unit)} to {quantity(high, unit)})"
 
 
 def calibration_json(result: DiagnosisResult) -> dict[str, Any]:

@@ -75,9 +75,18 @@ def _study(folder: Path, study: CalibrationStudy | None) -> dict[str, Path]:
         rows = [(p.name, p.neg2_log_likelihood, p.quadratic) for p in study.profiles]
         path = folder / "profiles.png"
         made["profiles"] = calibration_plots.likelihood_profiles(path, rows)
-    if len(study.names) > 1:
-        C = np.array(study.covariance)
-        made["corner"] = calibration_plots.corner(folder / "corner.png", study.names, C)
+    names, C, draws = study.names, np.array(study.covariance), None
+    if (sample := study.sample) is not None:
+        names = tuple(p.name for p in sample.parameters)
+        C = np.array(sample.gaussian_covariance)
+        draws = np.array(sample.draws) - np.array(sample.gaussian_mean)
+    if len(names) > 1:
+        made["corner"] = calibration_plots.corner(folder / "corner.png", names, C, draws)
+    if study.articles:
+        units = [(p.name, p.spread, [a.away for a in p.articles], [a.reach for a in p.articles])
+                 for p in study.articles]  # fmt: skip
+        each = [a.article for a in study.articles[0].articles]
+        made["articles"] = calibration_plots.unit_places(folder / "articles.png", units, each)
     if study.bands:
         bands = [
             (

@@ -68,7 +68,12 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     ),
     "corner": (
         "study",
-        "Posterior of each pair of parameters, change in %: one and two standard deviations.",
+        "Posterior of each pair of parameters, change in %: one and two standard deviations of the "
+        "Gaussian; points and steps are draws, if there are any.",
+    ),
+    "articles": (
+        "study",
+        "Deviation of each article from the mean of all, with 95 % intervals.",
     ),
     "bands": (
         "study",

@@ -7,7 +7,6 @@
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,8 +20,7 @@ from ..inference.calibration_result import (
     CalibrationStudy,
     Identifiability,
     LikelihoodProfile,
-    NamedValue,
-    ResponseBand,
+    PosteriorSample,
 )
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted, wide_start
 from ..inference.identifiability import calibration_positions, identifiability, parameter_names
@@ -40,13 +38,13 @@ from .diagnosis import (
     nominal_starts,
     without_effects,
 )
+from .posterior import bands, gaussian_draws, physical_values, posterior_sample, with_frozen
 
 STARTS = 12  # of the Latin hypercube
 BEST = 10  # basins that are reported
 REACH = 0.02  # probability beyond each end of the hypercube: two standard deviations of a prior
 SAME = 1.0  # in -2 ln evidence and in standard deviations: fits as near as that are one basin
 PROFILED = (-2.0, -1.0, 1.0, 2.0)  # standard deviations from the best at which a profile is taken
-BANDS, DRAWS = 4, 60  # channels whose predicted response is kept, and draws of the posterior
 PROFILE_STEPS = 6  # of a fit with one parameter held; it starts where the covariance says
 SEED = 20250102
 
@@ -60,17 +58,31 @@ class Calibrated:
     study: CalibrationStudy
 
 
-def calibration(
-    problem: UpdatingProblem, progress: Progress = silent, freeze: bool = True,
-    quick: bool = False,
-) -> Calibrated:  # fmt: skip
-    """Fit the calibration parameters that the data can determine; no new physics.
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """Extent of a calibration.
 
-    Parameters
+    Attributes
     ----------
     freeze : False keeps parameters free that the data do not know; they are named all the same
     quick : fit from the prior mean alone, without further starts, profiles and bands
+    sample : draw from the posterior
     """
+
+    freeze: bool = True
+    quick: bool = False
+    sample: bool = False
+
+
+FULL = CalibrationSettings()
+
+
+def calibration(
+    problem: UpdatingProblem, progress: Progress = silent,
+    settings: CalibrationSettings = FULL,
+) -> Calibrated:  # fmt: skip
+    """Fit the calibration parameters that the data can determine; no new physics."""
+    freeze, quick = settings.freeze, settings.quick
     progress("identifiability", 0.0)
     whole, known = problem, identifiability(about_nominal(problem))
     problem = _without(whole, known.frozen if freeze else ())
@@ -88,17 +100,19 @@ def calibration(
     basins = _basins(null, ends)
     progress("profiles", 0.75)
     profiled = () if quick else tuple(profiles(problem, null))
-    predicted = () if quick else tuple(bands(problem, null))
-    null = replace(null, fit=_with_frozen(whole, problem, null))
-    found = Diagnosis(
-        nominal, null, fit_of_the_deck(problem, null), (), notes=tuple(_notes(known, basins, ends))
-    )
+    every, sample = gaussian_draws(null.fit), None
+    if settings.sample:
+        sample, every = posterior_sample(whole, null, within(progress, 0.8, 1.0))
+    predicted = () if quick else tuple(bands(problem, null, every))
+    null = replace(null, fit=with_frozen(whole, null))
+    notes = tuple(_notes(known, basins, ends, sample))
+    found = Diagnosis(nominal, null, fit_of_the_deck(problem, null), (), notes=notes)
     own = calibration_positions(null.fit.effects)
     study = CalibrationStudy(
         known, 0 if quick else STARTS, basins[:BEST], tuple(_names(null.fit)),
         tuple(null.fit.x[own].tolist()),
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
-        profiled, predicted,
+        profiled, predicted, sample=sample,
     )  # fmt: skip
     return Calibrated(problem, named_by_fits(problem, found), study)
 
@@ -125,29 +139,6 @@ def _without(problem: UpdatingProblem, frozen: Sequence[str]) -> UpdatingProblem
 def _frozen(effect: Effect, frozen: Sequence[str]) -> bool:
     names = parameter_names([effect])
     return effect.kind == "calibration" and bool(names) and all(n in frozen for n in names)
-
-
-def _with_frozen(whole: UpdatingProblem, problem: UpdatingProblem, null: HypothesisFit) -> Fit:
-    """The fit with a covariance that counts the priors of frozen parameters.
-
-    H = [[H_ff, H_fz], [H_zf, ·]] is the information of data and priors.  Frozen parameters z move
-    the fit by -G z, G = H_ff⁻¹ H_fz.  With their prior covariance P, C = H_ff⁻¹ + G P Gᵀ
-    (Tapley, Schutz and Born 2004, Statistical Orbit Determination, ch. 6: consider covariance).
-    """
-    found = null.fit
-    frozen = [e for e in whole.base if e not in problem.base]
-    if not frozen:
-        return found
-    effects = [*found.effects, *frozen]
-    z = unknowns(frozen)
-    x = np.concatenate([found.x, [p.mean for p in z]])
-    state = evaluate(null.model, effects, x)
-    J = found.data.residual(state, True)[1]
-    J = np.concatenate([J, prior_residuals(effects, whole.mass_measurement, x, state)[1]])
-    n = len(found.x)
-    moved = np.linalg.solve(J[:, :n].T @ J[:, :n], J[:, :n].T @ J[:, n:])
-    spread = moved * [p.sd for p in z]
-    return replace(found, covariance=found.covariance + spread @ spread.T)
 
 
 def latin_hypercube(problem: UpdatingProblem, count: int = STARTS) -> list[np.ndarray]:
@@ -212,7 +203,7 @@ def _basins(null: HypothesisFit, ends: Sequence[Fit]) -> tuple[Basin, ...]:
     return tuple(
         Basin(
             b[0].neg2_log_evidence - basins[0][0].neg2_log_evidence, len(b),
-            tuple(_values(null.fit.effects, b[0].x)),
+            tuple(physical_values(null.fit.effects, b[0].x)),
         )
         for b in basins
     )  # fmt: skip
@@ -222,25 +213,11 @@ def _names(found: Fit) -> list[str]:
     return parameter_names([e for e in found.effects if e.kind == "calibration"])
 
 
-def _values(effects: Sequence[Effect], x: np.ndarray) -> Iterator[NamedValue]:
-    """Physical values of the calibration parameters."""
-    names = iter(parameter_names([e for e in effects if e.kind == "calibration"]))
-    at = 0
-    for effect in effects:
-        own = x[at : at + len(effect.parameters)]
-        at += len(effect.parameters)
-        if effect.kind != "calibration":
-            continue
-        rows = effect.reported(own, np.array([p.sd for p in effect.parameters]))
-        for k, p in enumerate(effect.parameters):
-            value, unit = (
-                (rows[k].value, rows[k].unit) if k < len(rows) else (p.value(own[k]), p.unit)
-            )
-            yield NamedValue(next(names), float(value), unit, float(own[k]))
-
-
-def _notes(known: Identifiability, basins: Sequence[Basin], ends: Sequence[Fit]) -> Iterator[str]:
-    """Sentences on what was frozen and on how many starts agree."""
+def _notes(
+    known: Identifiability, basins: Sequence[Basin], ends: Sequence[Fit],
+    sample: PosteriorSample | None,
+) -> Iterator[str]:  # fmt: skip
+    """Sentences on what was frozen, on how many starts agree, and on the draws."""
     for p in known.parameters:
         if p.frozen:
             yield f"frozen at the deck's value: {p.why}"
@@ -249,6 +226,8 @@ def _notes(known: Identifiability, basins: Sequence[Basin], ends: Sequence[Fit])
             f"{basins[0].starts} of {len(ends)} starts of a Latin hypercube ended in the best "
             "basin: within 1 of its -2 ln evidence and one standard deviation of its parameters"
         )
+    if sample is not None:
+        yield sample.sentence
 
 
 def profiles(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[LikelihoodProfile]:
@@ -266,7 +245,7 @@ def profiles(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[Likeliho
         best, *each = costs[n * (1 + len(PROFILED)) : (n + 1) * (1 + len(PROFILED))]
         away = sd * np.array(PROFILED)
         prior = (found.x[k] + away - p.mean) ** 2 - (found.x[k] - p.mean) ** 2
-        at = [list(_values(found.effects, found.x + d * (np.arange(len(found.x)) == k)))[n]
+        at = [list(physical_values(found.effects, found.x + d * (np.arange(len(found.x)) == k)))[n]
               for d in away]  # fmt: skip
         data = max(1 / sd**2 - 1 / p.sd**2, 0.0)
         yield LikelihoodProfile(
@@ -298,32 +277,3 @@ def _held_cost(null: HypothesisFit, mass: MassMeasurement | None, k: int, z: flo
     except ModelError:
         return float("inf")
     return float(r @ r)
-
-
-def bands(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[ResponseBand]:
-    """90 % bands of the responses over draws of the posterior, of held-out channels first.
-
-    Parameters and nuisances are drawn together from their Gaussian posterior, frozen parameters
-    held: what these could change, the free ones undo in the responses.
-    """
-    data, found = null.data, null.fit
-    if not isinstance(data, Responses):
-        return
-    held = np.asarray(~data.use.any(axis=0))
-    order = np.argsort(~held, kind="stable")[:BANDS]
-    root = np.linalg.cholesky((found.covariance + found.covariance.T) / 2)
-    rng = np.random.default_rng(SEED)
-    draws = []
-    for _ in range(DRAWS):
-        with suppress(ModelError):
-            x = found.x + root @ rng.normal(size=len(found.x))
-            deviation = data.deviation(evaluate(null.model, found.effects, x, False))
-            draws.append(np.abs(data.values * 10**deviation)[:, order, 0])
-    if not draws:
-        return
-    low, high = np.quantile(draws, (0.05, 0.95), axis=0)
-    f, measured = data.s.imag / (2 * np.pi), np.abs(data.values[..., 0])
-    for n, k in enumerate(order):
-        columns = (f, measured[:, k], low[:, n], high[:, n])
-        label = problem.labels[k] if k < len(problem.labels) else f"channel {k + 1}"
-        yield ResponseBand(label, bool(held[k]), *(tuple(c.tolist()) for c in columns))

@@ -32,6 +32,7 @@ class OtherRecording:
     frf: FRF
     level: float | None = None
     control: Control = "force"
+    article: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +69,7 @@ class Question:
     others: tuple[OtherRecording, ...] = ()
     level: float | None = None  # of the recording that is fitted [N], [m/s²]
     control: Control = "force"  # quantity that was kept at the level
+    article: str = ""  # of the recording that is fitted
     accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
     effects: tuple[str, ...] = ()  # names of the effects that are tried; empty: all
     identified_noise: bool = False  # whiten with the covariance of the identification

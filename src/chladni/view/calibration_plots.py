@@ -44,14 +44,20 @@ def likelihood_profiles(
     return save(figure, path)
 
 
-def corner(path: Path | str, names: Sequence[str], covariance: np.ndarray) -> Path:
-    """Plot the Gaussian posterior of every pair of parameters: 39 % and 86 % ellipses, in per cent.
+def corner(
+    path: Path | str, names: Sequence[str], covariance: np.ndarray, draws: np.ndarray | None = None
+) -> Path:
+    """Plot the posterior of every pair of parameters in per cent.
+
+    Ellipses of the Gaussian hold 39 % and 86 %; points and bars are draws, if there are any.
 
     Parameters
     ----------
     covariance : (p, p)   of ln value
+    draws : (n, p)   of ln value from the mean of the Gaussian
     """
     names, C = list(names[:MOST]), 1e4 * np.asarray(covariance)[:MOST, :MOST]
+    x = np.zeros((0, len(names))) if draws is None else 100 * np.asarray(draws)[:, :MOST]
     p = len(names)
     side = max(1.25 * p, 2.6)
     figure = Figure(figsize=(side + 0.8, side), layout="constrained")
@@ -62,7 +68,7 @@ def corner(path: Path | str, names: Sequence[str], covariance: np.ndarray) -> Pa
             if j > i:
                 ax.set_visible(False)
                 continue
-            _pair(ax, C, i, j)
+            _pair(ax, C, x, i, j)
             ax.tick_params(labelsize=6, labelbottom=i == p - 1, labelleft=j == 0 and i > 0)
             if i == p - 1:
                 ax.set_xlabel(names[j], fontsize=7, rotation=20, ha="right")
@@ -71,20 +77,53 @@ def corner(path: Path | str, names: Sequence[str], covariance: np.ndarray) -> Pa
     return save(figure, path)
 
 
-def _pair(ax: Axes, C: np.ndarray, i: int, j: int) -> None:
-    """One density on the diagonal, else two ellipses."""
+def _pair(ax: Axes, C: np.ndarray, x: np.ndarray, i: int, j: int) -> None:
+    """One density on the diagonal, else two ellipses; the draws with them."""
     if i == j:
         z = np.linspace(-3, 3, 61)
         ax.plot(z * np.sqrt(C[i, i]), np.exp(-(z**2) / 2), color=AFTER, lw=1.2)
+        if len(x):
+            count, edges = np.histogram(x[:, i], 20)
+            share = count / len(x) / np.diff(edges) * np.sqrt(2 * np.pi * C[i, i])
+            ax.stairs(share, edges, color=BEFORE, lw=1.0)
         ax.set_yticks([])
         return
     at = np.ix_((j, i), (j, i))
     root = np.linalg.cholesky(C[at] + 1e-12 * np.trace(C[at]) * np.eye(2))
     for k, strength in ((1, 0.35), (2, 0.15)):
-        x, y = k * root @ np.stack([np.cos(_ANGLE), np.sin(_ANGLE)])
-        ax.fill(x, y, color=AFTER, alpha=strength, lw=0)
+        ellipse = k * root @ np.stack([np.cos(_ANGLE), np.sin(_ANGLE)])
+        ax.fill(*ellipse, color=AFTER, alpha=strength, lw=0)
+    ax.plot(x[:, j], x[:, i], ".", color=BEFORE, ms=1.2)
     for axis, n in ((ax.set_xlim, j), (ax.set_ylim, i)):
-        axis(-3 * np.sqrt(C[n, n]), 3 * np.sqrt(C[n, n]))
+        reach = 3 * np.sqrt(C[n, n])
+        axis(min(-reach, *x[:, n], 0.0), max(reach, *x[:, n], 0.0))
+
+
+def unit_places(
+    path: Path | str,
+    rows: Sequence[tuple[str, float, Sequence[float], Sequence[float]]],
+    articles: Sequence[str],
+) -> Path:
+    """Plot each article's deviation from the mean of all in per cent, over the spread of units.
+
+    Parameters
+    ----------
+    rows : (name, spread τ, deviations of the articles, half of their 95 % intervals), ln value
+    """
+    figure = Figure(figsize=(7.2, 0.5 * len(rows) + 1.2), layout="constrained")
+    ax = figure.subplots()
+    at = np.arange(len(rows))[::-1]
+    tau, *places = (100 * np.array([row[n] for row in rows]) for n in (1, 2, 3))
+    ax.barh(at, 2 * tau, left=-tau, height=0.7, color=AFTER, alpha=0.25, label="± spread of units")
+    for k, name in enumerate(articles):
+        shift = 0.5 * (k / max(len(articles) - 1, 1) - 0.5)
+        away, reach = (each[:, k] for each in places)
+        ax.errorbar(away, at - shift, xerr=reach, fmt="o", ms=3.5, lw=1, capsize=2, label=name)
+    ax.set_yticks(at, [row[0] for row in rows])
+    ax.axvline(0, color="#999999", lw=0.6)
+    ax.set_xlabel("deviation from the mean of all units [%]", fontsize=9)
+    figure.legend(loc="outside upper right", ncols=4, **LEGEND)
+    return save(figure, path)
 
 
 def response_bands(

@@ -10,7 +10,9 @@ from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..effects.joints import solid_parts
 from ..effects.weld_patch import FIELD as WELD_PATCH
+from ..inference.posterior_samples import sampler_package
 from ..progress import Progress, silent
+from ..search.calibration import CalibrationSettings
 from .diagnosis_result import DiagnosisResult
 from .given_case import Source, given_case
 from .states import diagnose_states
@@ -20,6 +22,7 @@ def calibrate(
     source: Source,
     recording: Measured | Sequence[Measured] = (),
     *,
+    sample: bool = False,
     progress: Progress = silent,
     **words: Unpack[CaseWords],
 ) -> DiagnosisResult:
@@ -30,14 +33,17 @@ def calibrate(
     Parameters
     ----------
     source, recording, progress, words : as in :func:`chladni.diagnose` (SI, Hz)
+    sample : draw from the posterior with the package emcee
 
     Raises
     ------
     FileError, LabelError, ModelError
         One sentence that names the argument (or file and line), the offender and the alternatives.
     """
+    if sample:
+        sampler_package()  # a missing one is named before any work
     case = given_case(source, recording, words)
-    found = diagnose_states(case, False, progress)
+    found = diagnose_states(case, False, progress, CalibrationSettings(sample=sample))
     return replace(found, notes=(*found.notes, *proposed(case)), origin=case)
 
 

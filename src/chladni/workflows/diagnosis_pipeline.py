@@ -30,8 +30,9 @@ from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
+from ..search.articles import articles_together
 from ..search.basis_refinement import Refinement, refined
-from ..search.calibration import calibration
+from ..search.calibration import FULL, CalibrationSettings, calibration
 from ..search.compensation import compensating
 from ..search.deciding import decided
 from ..search.decision_in_words import concluded
@@ -101,15 +102,14 @@ class Searched:
 
 def searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    freeze: bool = True, quick: bool = False,
+    settings: CalibrationSettings = FULL,
 ) -> Searched:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
     Parameters
     ----------
     known : posterior of the shared parameters from other states
-    freeze : whether a calibration holds what the data do not know; states share one set
-    quick : a calibration from one start, without profiles and bands
+    settings : of a calibration
 
     Raises
     ------
@@ -142,17 +142,21 @@ def searched(
     stage = within(progress, 0.1, 0.85)
     if diagnosing:
         return Searched(case, question, prepared, compared(prepared.problem, stage), screening)
-    made = calibration(prepared.problem, stage, freeze, quick)
-    prepared = replace(prepared, problem=made.problem)
-    return Searched(case, question, prepared, made.diagnosis, screening, made.study)
+    made = calibration(prepared.problem, stage, settings)
+    articles = articles_together(question, prepared, made.diagnosis.null)
+    prepared, study = (
+        replace(prepared, problem=made.problem),
+        replace(made.study, articles=articles),
+    )
+    return Searched(case, question, prepared, made.diagnosis, screening, study)
 
 
 def explained(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    freeze: bool = True, quick: bool = False,
+    settings: CalibrationSettings = FULL,
 ) -> Explained:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
-    made = searched(case, diagnosing, progress, known, freeze, quick)
+    made = searched(case, diagnosing, progress, known, settings)
     question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _apply_held_out(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
@@ -186,16 +190,14 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     return replace(
-        result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen,
-        study=study,
+        result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
     )  # fmt: skip
 
 
 def _apply_held_out(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
-    if not diagnosing:  # nothing is to be named
-        prepared = replace(prepared, too_little="")
+    prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
     decision, known = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, decision, known)
     if decision.named:  # it is compared with what calibrate answers
@@ -303,10 +305,8 @@ def _result(
     )
     rows = frequency_rows(question, prepared, stages.test, every, real)
     fitted, held = _scores(question, prepared, found, stages, real)
-    left, away = (
-        remainder(prepared, found),
-        dict.fromkeys((*implausible_values(deck.fit), *strained(last.fit))),
-    )
+    left = remainder(prepared, found)
+    away = dict.fromkeys((*implausible_values(deck.fit), *strained(last.fit)))
     spot = residual_localisation(last, question.mass_measurement)
     weighed = None if question.mass_measurement is None else question.mass_measurement.mass
     return DiagnosisResult(

@@ -17,9 +17,12 @@ from ..io.nastran import assembly, read_deck, write_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
 from ..results import Result
+from ..search.calibration import CalibrationSettings
 from .diagnosis_result import DiagnosisResult
 from .given_case import Source, given_case
 from .states import diagnose_states
+
+QUICK = CalibrationSettings(quick=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +125,10 @@ def _fitted(
     if variant.assembly is None:
         return JointModelFit(variant.name, variant.refused), None
     if not variant.model:
-        found = diagnose_states(case, False, progress, quick=True)
+        found = diagnose_states(case, False, progress, QUICK)
         return _row(variant, found), found
     try:
-        found = diagnose_states(with_joints(case, variant.assembly), False, progress, quick=True)
+        found = diagnose_states(with_joints(case, variant.assembly), False, progress, QUICK)
     except ChladniError as error:
         return JointModelFit(variant.name, str(error)), None
     return _row(variant, found), found

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..case import Case
 from ..case.recording_groups import relation
+from ..ema.setup import Recording
 from ..errors import FileError
 from ..inference.map_fit import MassMeasurement
 from ..search.preparation import prepare
@@ -55,8 +56,10 @@ def question_of(case: Case) -> Question:
     )
     if frfs:
         first = case.recordings[0]
-        return replace(base_question, frf=frfs[0], others=_others(case), level=first.level,
-                       control=first.control)  # fmt: skip
+        return replace(
+            base_question, frf=frfs[0], others=_others(case), level=first.level,
+            control=first.control, article=_article(first),
+        )  # fmt: skip
     state = poles[0].of(poles[0].states[0])
     return replace(base_question, frequency=state.frequency, frequency_sd=state.frequency_sd)
 
@@ -77,10 +80,17 @@ def _others(case: Case) -> tuple[OtherRecording, ...]:
     first = case.recordings[0]
     kinds = [(r, relation(first, r)) for r in case.recordings[1:] if r.frf is not None]
     return tuple(
-        OtherRecording(r.name, kind, r.frf, r.level, r.control)
+        OtherRecording(
+            r.name, kind, r.frf, r.level, r.control, _article(first if kind == "repeat" else r)
+        )
         for r, kind in kinds
         if r.frf is not None and kind != "state"
     )
+
+
+def _article(r: Recording) -> str:
+    """Return the name of the article; without one, that of the recording."""
+    return r.article or r.name
 
 
 def prepared(case: Case) -> Prepared:

@@ -16,6 +16,7 @@ from ..inference.result import CalibratedParameter
 from ..inference.written_hypothesis import as_written
 from ..parallel import one_blas_thread
 from ..progress import Progress, within
+from ..search.calibration import FULL, CalibrationSettings
 from ..search.diagnosis import Diagnosis
 from ..search.result_parts import shared_values
 from .diagnosis_pipeline import Explained, build_result, explained
@@ -26,35 +27,38 @@ from .screening_of_case import RecordingAtFault, at_fault
 
 
 def diagnose_states(
-    case: Case, diagnosing: bool, progress: Progress, quick: bool = False
-) -> DiagnosisResult:
+    case: Case, diagnosing: bool, progress: Progress,
+    settings: CalibrationSettings = FULL,
+) -> DiagnosisResult:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread.
 
     Parameters
     ----------
-    quick : calibrate one state from one start, without profiles and bands
+    settings : of a calibration; states share one set of parameters, so that none is frozen
     """
     with one_blas_thread():
         case = with_natural_frequencies(case)
         names = states(case.recordings)
         try:
             if len(names) < 2 or ("test", "use") in case.given:
-                known = explained(case, diagnosing, progress, quick=quick)
+                known = explained(case, diagnosing, progress, settings=settings)
                 return build_result(known, diagnosing, progress)
-            return _in_states(case, names, diagnosing, progress)
+            shared = replace(settings, freeze=False)
+            return _in_states(case, names, diagnosing, progress, shared)
         except RecordingAtFault as fault:
             return at_fault(case, fault.screening, diagnosing)
 
 
 def _in_states(
-    case: Case, names: tuple[str, ...], diagnosing: bool, progress: Progress
-) -> DiagnosisResult:
+    case: Case, names: tuple[str, ...], diagnosing: bool, progress: Progress,
+    settings: CalibrationSettings,
+) -> DiagnosisResult:  # fmt: skip
     every: list[Explained] = []
     for k, name in enumerate(names):
         stage = within(progress, 0.8 * k / len(names), 0.8 * (k + 1) / len(names))
         known = _joint(every, [_lead(e.found) for e in every]).posterior() if every else None
         state = _one_state(case, names, name)
-        every.append(explained(state, diagnosing, stage, known, freeze=False))
+        every.append(explained(state, diagnosing, stage, known, settings))
     joint = _joint(every, [_as_deck(e) for e in every])
     changed = any(e.found.verdict != "nothing missing" for e in every)
     every = [_with(e, fit, changed) for e, fit in zip(every, joint.fits, strict=True)]

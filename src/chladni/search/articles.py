@@ -1,0 +1,161 @@
+"""Articles of one design fitted together: their common mean, their spread, each one's own values.
+
+The mean of all tests is fitted like one test.  It carries the error of the model's form, and that
+error once.  The differences between the tests carry none of it (:mod:`..inference.unit_spread`), so
+that articles are told apart far better than any one is known.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm, t
+
+from ..effects.calibration_parameters import RandomField
+from ..effects.effect import Effect
+from ..ema.identification import Identified, equalised
+from ..ema.recording_noise import sample_noise
+from ..inference.calibration_result import ArticleParameter, ArticleValue
+from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
+from ..inference.identifiability import calibration_positions
+from ..inference.joint_fit import of_the_object
+from ..inference.likelihood import LN10, Responses
+from ..inference.map_fit import unknowns
+from ..inference.unit_spread import KNOWN, unit_spread
+from ..reduced.reduced_model import evaluate, slices
+from .posterior import values_at, with_frozen
+from .question import Prepared, Question
+
+Tests = dict[str, list[tuple[np.ndarray, np.ndarray]]]  # article: ln H over the first's, its noise
+
+
+def articles_together(
+    question: Question, prepared: Prepared, null: HypothesisFit
+) -> tuple[ArticleParameter, ...]:
+    """Fit all articles of a case together; empty where it has one, or no responses.
+
+    Parameters
+    ----------
+    null : the fit of the first, which may hold parameters that are free in the prepared problem
+    """
+    data = null.data
+    if not isinstance(data, Responses) or prepared.identified is None:
+        return ()
+    tests = _tests(question, prepared, data, prepared.identified)
+    if len(tests) < 2:
+        return ()
+    logs = np.array([np.mean([log for log, _ in each], axis=0) for each in tests.values()])
+    noise = np.sqrt(np.mean([(sd**2).mean(axis=0) / len(sd) for sd in map(_sd, tests.values())], 0))
+    apart = (logs - logs.mean(axis=0)) / LN10
+    plain = data.exactly()
+    plain = replace(plain, values=plain.values * np.exp(logs.mean(axis=0)), spread=None)
+    mean = _mean_fit(prepared.problem, null, replace(plain, noise=noise / np.sqrt(len(logs))))
+    effects = mean.fit.effects
+    J, y = _differences(mean, replace(plain, noise=noise, identified=None), apart)
+    own = _of_one_article(effects)
+    group, sd = _groups(effects)[own], np.array([p.sd for p in unknowns(effects)])[own]
+    found = unit_spread(J[:, own], y, group, sd)
+    away = np.zeros((len(logs), len(mean.fit.x)))
+    away[:, own] = found.away
+    width = np.zeros(len(mean.fit.x))
+    width[own] = np.diag(found.covariance)
+    tau, low, high = (_by_parameter(v, group, own, len(width)) for v in
+                      (found.tau, found.low, found.high))  # fmt: skip
+    return _summary(mean, tuple(tests), away, width, (tau, low, high))
+
+
+def _tests(
+    question: Question, prepared: Prepared, data: Responses, identified: Identified
+) -> Tests:
+    """The tests of every article at the level of the first: ln of H over the first's, and noise."""
+    assert question.frf is not None
+    first = equalised(identified, data.s)
+    out: Tests = {
+        question.article: [(np.zeros_like(first), sample_noise(identified, question.frf, data.s))]
+    }
+    for test in prepared.others:
+        other = test.recording
+        alike = other.relation == "repeat" or other.level in (None, question.level)
+        if other.relation in ("repeat", "article") and alike:
+            pair = (np.log(equalised(test.identified, data.s) / first),
+                    sample_noise(test.identified, other.frf, data.s))  # fmt: skip
+            out.setdefault(other.article, []).append(pair)
+    return out
+
+
+def _sd(each: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    return np.array([sd for _, sd in each])
+
+
+def _mean_fit(whole: UpdatingProblem, null: HypothesisFit, plain: Responses) -> HypothesisFit:
+    """The fit of the mean of all tests, errors of form about the state of the first."""
+    data, known = plain, null.data
+    if isinstance(known, Responses) and known.error is not None:
+        data = plain.allowing_errors(null.fit.state, known.error.delta, known.curved)
+    found = fitted(null.model, null.fit.effects, data, whole.mass_measurement, null.fit.x)
+    mean = replace(null, fit=found)
+    return replace(mean, fit=with_frozen(whole, mean))
+
+
+def _differences(
+    mean: HypothesisFit, quiet: Responses, apart: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes at the mean, and differences of the tests from it, whitened without errors of form."""
+    known = mean.data
+    if isinstance(known, Responses) and known.error is not None:
+        quiet = replace(quiet, about=known.about, error=known.error).using(quiet.use)
+    J = quiet.scaled(evaluate(mean.model, mean.fit.effects, mean.fit.x), True)[1]
+    return J, quiet.stacked(apart / quiet.std()).T
+
+
+def _of_one_article(effects: Sequence[Effect]) -> np.ndarray:
+    """Positions of what differs between articles: parameters, scatter within parts, gains."""
+    each = [
+        np.arange(at.start, at.stop) for e, at in slices(effects)
+        if e.kind == "calibration" or isinstance(e, RandomField) or not of_the_object(e)
+    ]  # fmt: skip
+    return np.concatenate([np.zeros(0, int), *each])
+
+
+def _groups(effects: Sequence[Effect]) -> np.ndarray:
+    """Number of the quantity of every calibration parameter: E, rho, t, ...; others ``KNOWN``."""
+    names = [p.name for e in effects if e.kind == "calibration" for p in e.parameters]
+    known = list(dict.fromkeys(names))
+    return np.array(
+        [known.index(p.name) if e.kind == "calibration" else KNOWN
+         for e in effects for p in e.parameters]
+    )  # fmt: skip
+
+
+def _by_parameter(v: np.ndarray, group: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
+    """The value of its group for every parameter (n,); 0 for others."""
+    out = np.zeros(n)
+    out[own] = np.where(group == KNOWN, 0.0, np.append(v, 0.0)[group])
+    return out
+
+
+def _summary(
+    mean: HypothesisFit, names: tuple[str, ...], away: np.ndarray, width: np.ndarray,
+    spread: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> tuple[ArticleParameter, ...]:  # fmt: skip
+    """Mean, spread and places of all parameters with 95 % intervals.
+
+    The mean of A articles is off μ by τ/√A, where τ is known from A - 1 differences: Student's t.
+    """
+    fit, (tau, low, high) = mean.fit, spread
+    own, count = calibration_positions(fit.effects), len(names)
+    z, form = norm.ppf(0.975), np.diag(fit.covariance)
+    reach = np.sqrt(z**2 * form + t.ppf(0.975, count - 1) ** 2 * tau**2 / count)[own]
+    x, each = fit.x[own], z * np.sqrt(form + width)[own]
+    middle, least, most = (values_at(fit, own, v) for v in (x, x - reach, x + reach))
+    places = [[values_at(fit, own, x + a[own] + side) for side in (0.0, -each, each)] for a in away]
+    return tuple(
+        ArticleParameter(
+            middle[k].name, middle[k].unit, middle[k].value, least[k].value, most[k].value,
+            float(tau[j]), float(low[j]), float(high[j]) if np.isfinite(high[j]) else None,
+            tuple(ArticleValue(name, value[k].value, less[k].value, more[k].value, float(a[j]),
+                               float(z * np.sqrt(width[j])))
+                  for name, (value, less, more), a in zip(names, places, away, strict=True)),
+        )
+        for k, j in enumerate(own)
+    )  # fmt: skip
