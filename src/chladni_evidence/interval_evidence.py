@@ -2,8 +2,9 @@
 
 If the likelihood is right, the posterior probability below the truth is uniform, for every value
 and for every combination of values (Talts et al. 2018, Validating Bayesian inference algorithms
-with simulation-based calibration, arXiv:1804.06788). p of the test of fit is uniform as well.  Articles whose
-values scatter less than the priors cannot show that: their intervals hold the truth too often.
+with simulation-based calibration, arXiv:1804.06788). p of the test of fit is uniform as well.
+Articles whose values scatter less than the priors cannot show that: their intervals hold the truth
+too often.
 """
 
 import json
