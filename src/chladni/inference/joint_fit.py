@@ -136,8 +136,7 @@ def _of_state(
 def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:
     """The effects with the posterior of other states as their prior.
 
-    Laplace's standard deviations are too narrow, so they are widened.  No prior becomes wider than
-    it was.
+    No prior becomes wider than it was.
     """
     return [_informed(e, posterior) if of_the_object(e) else e for e in effects]
 
@@ -147,10 +146,9 @@ def _informed(effect: Effect, posterior: Posterior) -> Effect:
         posterior.get((effect.name, effect.text, k), (p.mean, p.sd))
         for k, p in enumerate(effect.parameters)
     ]
-    wide = effect.widened(np.array([sd for _, sd in estimates]))
     own = [
-        replace(p, mean=mean, sd=float(sd))
-        for p, (mean, _), sd in zip(effect.parameters, estimates, wide, strict=True)
+        replace(p, mean=mean, sd=min(float(sd), p.sd))
+        for p, (mean, sd) in zip(effect.parameters, estimates, strict=True)
     ]
     return replace(effect, parameters=tuple(own))
 
