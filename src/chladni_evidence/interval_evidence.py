@@ -29,19 +29,21 @@ from chladni.effects.calibration_parameters import (
 from chladni.inference.adequacy import adequacy
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.model.assembly import Assembly
-from chladni.output import make_folder
+from chladni.output import make_folder, write_text
 from chladni.search.diagnosis import without_effects
 from chladni.search.preparation import prepare
 from chladni.search.question import Question
 from chladni.workflows.question_of_case import question_of
 
 from .bench_of_structure import SPECIMENS, form_bench, panel_bench
-from .made_case import made_case, write_case
+from .made_case import MadeCase, made_case, write_case
 from .part_scatter import Scales
 
-NOISES = ("formulation", "identified")
+NOISES = ("formulation", "identified", "frequencies")  # the last: of a table without FRFs
+LISTED, ERROR = 14, 5e-4  # natural frequencies of that table, and sd of their logarithms
 STRUCTURES = ("plate", "panel", "bonded plates", "ribbed plate")
 MAKERS = ("fine", "calculix")
+ELASTIC = 5.0  # Hz: below lie the rigid modes
 KNOWN = 0.5  # share of the prior sd below which the data know a combination
 
 
@@ -115,12 +117,25 @@ def answered(structure: str, maker: str, seed: int, cache: Path) -> list[Calibra
     bench = (panel_bench if structure in SPECIMENS else form_bench)(structure, seed)
     made = made_case(bench, "nothing", seed, maker, cache, draw=of_prior)
     with TemporaryDirectory() as folder:
-        write_case(made, Path(folder, "case"), Path(folder, "truth.json"))
-        question = question_of(load_case(Path(folder, "case")))
-        return [
-            _answer(replace(question, identified_noise=noise == "identified"), made.truth, noise)
-            for noise in NOISES
-        ]
+        case = Path(folder, "case")
+        write_case(made, case, Path(folder, "truth.json"))
+        question = question_of(load_case(case))
+        every = [replace(question, identified_noise=noise == "identified") for noise in NOISES[:2]]
+        _tabulate(case, made)
+        every.append(question_of(load_case(case)))
+        return [_answer(q, made.truth, noise) for q, noise in zip(every, NOISES, strict=True)]
+
+
+def _tabulate(case: Path, made: MadeCase) -> None:
+    """Replace the recording of a case by a table of natural frequencies."""
+    f = np.array([f for f in made.truth["frequency_hz"] if f > ELASTIC][:LISTED])
+    f *= np.exp(ERROR * np.random.default_rng([made.truth["seed"], 3]).normal(size=len(f)))
+    rows = [f"{k},{hz:.4f}" for k, hz in enumerate(f, 1)]
+    write_text(case / "modes.csv", "\n".join(["mode,frequency_hz", *rows, ""]))
+    head, rest = (case / "case.toml").read_text(encoding="utf-8").split("[test]")
+    mass = [line for line in rest.splitlines() if line.startswith("mass")]
+    words = [head + "[test]", 'recordings = ["modes.csv"]', *mass, ""]
+    write_text(case / "case.toml", "\n".join(words))
 
 
 def _answer(question: Question, truth: dict[str, Any], noise: str) -> CalibratedArticle:
