@@ -22,7 +22,8 @@ from ..inference.joint_fit import of_the_object
 from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import unknowns
 from ..inference.unit_spread import KNOWN, unit_spread
-from ..reduced.reduced_model import evaluate, slices
+from ..reduced.effect_dofs import slices
+from ..reduced.reduced_model import evaluate
 from .posterior import values_at, with_frozen
 from .question import Prepared, Question
 
