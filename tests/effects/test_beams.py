@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import Basis
 from chladni.effects.calibration_parameters import calibration_parameter, defaults, random_field
+from chladni.effects.effect import WIDER
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
@@ -226,7 +227,7 @@ def test_across_a_tube_nothing_is_known_and_nothing_counts(where):
     mass = PointMass.near(where, len(where.grids) // 2)
     sd = np.array([0.1, 0.6, 1.5])
     radius = mass.location(np.zeros(3), sd).radius_m
-    assert radius == pytest.approx(1.96 * 0.6 * mass.patch.size)
+    assert radius == pytest.approx(1.96 * WIDER * 0.6 * mass.patch.size)
 
 
 def test_at_the_end_of_a_tube_the_slope_is_that_inwards(where):

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.effect import WIDER
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.extra_support import ExtraSupport
 from chladni.fem.assemble import structure
@@ -72,7 +73,7 @@ def test_a_place_is_known_as_well_as_the_fit_says(support):
     """95 % of a Gaussian in a plane lie in the radius √5.99 sd (χ² of two); no less than h."""
     rng, sd = np.random.default_rng(0), np.array([0.1, 0.8, 0.8, 0.1, 0.1])
     radius = support.location(np.zeros(5), sd).radius_m
-    drawn = support.patch.size * 0.8 * rng.normal(size=(20000, 2))
+    drawn = support.patch.size * WIDER * 0.8 * rng.normal(size=(20000, 2))
     assert np.mean(np.linalg.norm(drawn, axis=1) < radius) == pytest.approx(0.95, abs=0.01)
     longer = support.location(np.zeros(5), sd * [1, 1, 2, 1, 1]).radius_m
     assert longer == pytest.approx(2 * radius)  # what one way is less known counts
@@ -85,4 +86,4 @@ def test_at_the_edge_of_a_fold_what_leads_off_it_is_no_doubt(support):
     """All grids that face as it does lie on a line: the other parameter stays at its prior."""
     line = replace(support.patch, flat=support.patch.flat * [1.0, 0.0])
     known = replace(support, patch=line).location(np.zeros(5), np.array([0.1, 0.8, 1.5, 0.1, 0.1]))
-    assert known.radius_m == pytest.approx(1.96 * 0.8 * support.patch.size)
+    assert known.radius_m == pytest.approx(1.96 * WIDER * 0.8 * support.patch.size)

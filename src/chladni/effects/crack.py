@@ -181,7 +181,7 @@ class Crack(Effect):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Remaining 12I/t³ with its 95 % interval."""
-        value, high, low = (left(x[0] + s * 1.96 * sd[0]) for s in (0, -1, 1))
+        value, high, low = (left(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
         return (Estimate("12I/T3", value, "-", low, high),)
 
 

@@ -90,7 +90,7 @@ class LocalResonator(MovableMass):
 
     def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
         """A point mass, where the tuning or its interval exceeds the highest spectral line."""
-        f, wide = self.parameters[3], 0.0 if sd is None else 1.96 * sd[3]
+        f, wide = self.parameters[3], 0.0 if sd is None else 1.96 * self.widened(sd)[3]
         above = (f.value(v) > TYPICAL * f.scale for v in (x[3], x[3] + wide))
         return Remarks(*("point-mass" if high else "" for high in above))
 

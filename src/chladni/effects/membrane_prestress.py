@@ -85,7 +85,7 @@ class MembranePrestress(Effect):
         """N along and across, each interval with the other force fixed."""
         out = []
         for k, p in enumerate(self.parameters):
-            step = 1.96 * sd[k] * np.eye(2)[k]
+            step = 1.96 * self.widened(sd)[k] * np.eye(2)[k]
             low, here, high = (float(self.force(x + s * step)[k]) for s in (-1, 0, 1))
             out.append(Estimate(p.name, here, "N/m", low, high))
         return tuple(out)

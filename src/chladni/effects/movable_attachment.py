@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.facets import tangents
-from .effect import Effect, Parameter, PointTerm, Traits, Weight
+from .effect import WIDER, Effect, Parameter, PointTerm, Traits, Weight
 from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate, Location, in_mm
 from .search_context import Candidate, SearchContext, best_places, distinct
@@ -146,7 +146,7 @@ class MovableAttachment(Effect):
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
 
     def _reach(self, x: np.ndarray, sd: np.ndarray) -> float:
-        """95 % radius in units of the patch's size.
+        """95 % radius in units of the patch's size, widened as the intervals are.
 
         In a plane the radius is at most √5.99 times the larger standard deviation. Along a line (of
         beams, or the edge of a fold) it is 1.96 times the standard deviation. An axis counts only
@@ -157,7 +157,7 @@ class MovableAttachment(Effect):
         moves = np.ptp(self.patch.flat, axis=0) > _FLAT * size
         times = np.sqrt(5.99) if moves.all() else 1.96
         known = moves & (self.patch.inside(at) == at)
-        return float(times * sd[1:3][known].max(initial=0.0))
+        return float(times * WIDER * sd[1:3][known].max(initial=0.0))
 
     def nearest(self, x: np.ndarray) -> int:
         """Id of the grid nearest to the place."""

@@ -41,7 +41,7 @@ class OrthotropicMaterial(Effect):
         """E1, E2, G12 and nu12."""
         moduli = super().reported(x, sd)[:3]
         nu = [
-            self.moduli(np.append(x[:3], x[3] + s * 1.96 * sd[3]))[3]
+            self.moduli(np.append(x[:3], x[3] + s * 1.96 * self.widened(sd)[3]))[3]
             for s in (-1, 0, 1)
         ]
         return *moduli, Estimate("nu12", nu[1], "-", nu[0], nu[2])

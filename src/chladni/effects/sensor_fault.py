@@ -55,7 +55,7 @@ class SensorFault(ChannelGain):
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The factor on the channel, negative for a reversed sign."""
         (gain,) = self.parameters
-        low, high = sorted(self.sign * v for v in gain.interval(x[0], sd[0]))
+        low, high = sorted(self.sign * v for v in gain.interval(x[0], self.widened(sd)[0]))
         return (Estimate(gain.name, self.sign * gain.value(x[0]), gain.unit, low, high),)
 
 

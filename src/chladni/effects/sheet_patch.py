@@ -236,7 +236,7 @@ class SheetLoss(SheetPatch):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Value where the loss is largest, and the radius R; ``location`` holds the place."""
-        rows, reach = super().reported(x, sd), 1.96 * sd[0]
+        rows, reach = super().reported(x, sd), 1.96 * self.widened(sd)[0]
         q = float(self.bump(x, self.deepest(x)[1][None])[0])
         here, *ends = (self.value_of(q * self.lost(x[0] + s * reach)) for s in (0, -1, 1))
         return replace(rows[0], value=here, low=min(ends), high=max(ends)), rows[1]

@@ -94,7 +94,7 @@ class UserParameter(Effect):
         """Value and interval within the bounds; :meth:`on_bound` detects a value at a bound."""
         if len(x) > 1 or not len(self.parameters):
             return self.members[0].reported(x, sd)
-        p, reach = self.parameters[0], 1.96 * sd
+        p, reach = self.parameters[0], 1.96 * self.widened(sd)
         low, here, high = (p.value(float(self.y(x + s * reach)[0][0])) for s in (-1, 0, 1))
         return (Estimate(p.name, here, p.unit, low, high),)
 

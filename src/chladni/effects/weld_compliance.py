@@ -67,7 +67,7 @@ class WeldCompliance(Fastener):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Remaining share of the joint's stiffness."""
-        low, here, high = (self.left(x[0] + k * 1.96 * sd[0])[0] for k in (-1, 0, 1))
+        low, here, high = (self.left(x[0] + k * 1.96 * self.widened(sd)[0])[0] for k in (-1, 0, 1))
         return (Estimate("K", here, "of the deck's", low, high),)
 
     def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:

@@ -146,9 +146,10 @@ def _informed(effect: Effect, posterior: Posterior) -> Effect:
         posterior.get((effect.name, effect.text, k), (p.mean, p.sd))
         for k, p in enumerate(effect.parameters)
     ]
+    wide = effect.widened(np.array([sd for _, sd in estimates]))
     own = [
-        replace(p, mean=mean, sd=min(float(sd), p.sd))
-        for p, (mean, sd) in zip(effect.parameters, estimates, strict=True)
+        replace(p, mean=mean, sd=float(sd))
+        for p, (mean, _), sd in zip(effect.parameters, estimates, wide, strict=True)
     ]
     return replace(effect, parameters=tuple(own))
 
