@@ -4,6 +4,7 @@ Every class is a part of ``calibration.json``.  Logarithms are natural: 0.06 is 
 """
 
 from dataclasses import dataclass
+from math import log, sqrt
 
 
 @dataclass(frozen=True)
@@ -243,6 +244,77 @@ class ArticleParameter:
 
 
 @dataclass(frozen=True)
+class WorstMode:
+    """A mode of the test, its partner in the calibrated deck [Hz] and their MAC."""
+
+    test_hz: float
+    model_hz: float
+    mac: float | None = None
+
+
+@dataclass(frozen=True)
+class RegionShare:
+    """A part in the strain energy of the modes that still deviate.
+
+    Attributes
+    ----------
+    worst, good : its mean share in the strain energy of these modes, and of the others
+    factor : on its stiffness that fits the deviations of all frequencies best alone
+    removed : share of Σ ln(f_model / f_test)² that this removes
+    state : "free" or "frozen" where its stiffness was a parameter of the calibration
+    field : word of [[parameter]] for its stiffness
+    """
+
+    part: str
+    worst: float
+    good: float
+    factor: float
+    removed: float
+    state: str = ""
+    field: str = "E"
+
+
+@dataclass(frozen=True)
+class RegionsToFree:
+    """Where the modes that the calibrated deck misses most store their strain energy.
+
+    Attributes
+    ----------
+    worst, good : modes with the largest deviation or the lowest MAC, and the others
+    regions : all parts, the one first that explains most of the deviations
+    """
+
+    worst: tuple[WorstMode, ...] = ()
+    good: tuple[WorstMode, ...] = ()
+    regions: tuple[RegionShare, ...] = ()
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of ln(f_model / f_test) over all of these modes."""
+        every = [log(m.model_hz / m.test_hz) ** 2 for m in (*self.worst, *self.good)]
+        return sqrt(sum(every) / len(every)) if every else 0.0
+
+    @property
+    def proposed(self) -> tuple[RegionShare, ...]:
+        """At most three that are not free and explain more than a direction at random would."""
+        chance = 1 / max(len(self.worst) + len(self.good), 1)
+        return tuple(r for r in self.regions if not r.state and r.removed > chance)[:3]
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Lines for the next case.toml that free the proposed parts."""
+        return tuple(
+            line
+            for r in self.proposed
+            for line in (
+                "[[parameter]]",
+                *([] if r.field == "K" else [f'parts = ["{r.part}"]']),
+                f'field = "{r.field}"',
+            )
+        )
+
+
+@dataclass(frozen=True)
 class CalibrationStudy:
     """Information, basins, covariance and profiles of a calibration.
 
@@ -257,6 +329,7 @@ class CalibrationStudy:
     compensating : reasons why the values stand for something else; empty where none does
     sample : draws from the posterior; None where none were asked for
     articles : parameters of several articles fitted together; empty with one
+    guidance : parts that a next calibration could free; None with fewer than three paired modes
     """
 
     identifiability: Identifiability = Identifiability()
@@ -270,3 +343,4 @@ class CalibrationStudy:
     compensating: tuple[str, ...] = ()
     sample: PosteriorSample | None = None
     articles: tuple[ArticleParameter, ...] = ()
+    guidance: RegionsToFree | None = None

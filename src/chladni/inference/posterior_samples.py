@@ -1,9 +1,9 @@
 """Draws from a posterior density by a kept sampler, scaled by the Gaussian of its Hessian.
 
-The walkers move in z, x = x̂ + L z with C = L Lᵀ.  Proposals z' = √(1-β²) z + β ξ, ξ ~ N(0, I), keep
-N(0, I) as it is: where the posterior is this Gaussian, every proposal is accepted in any dimension
-(Cotter, Roberts, Stuart and White 2013, Statistical Science 28, 424-446).  The sampler is emcee
-(Foreman-Mackey, Hogg, Lang and Goodman 2013, PASP 125, 306-312).
+The walkers move in z, x = x̂ + L z with C = L Lᵀ.  Proposals are z' = √(1-β²) z + β ξ, ξ ~ N(0, I).
+They keep N(0, I) as it is.  Where the posterior is this Gaussian, every proposal is accepted in any
+dimension (Cotter, Roberts, Stuart and White 2013, Statistical Science 28, 424-446).  The sampler is
+emcee (Foreman-Mackey, Hogg, Lang and Goodman 2013, PASP 125, 306-312).
 """
 
 from collections.abc import Callable

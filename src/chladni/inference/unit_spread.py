@@ -1,10 +1,10 @@
 """Spread of nominally equal articles, from the differences between their tests alone.
 
 Article a has θ_a = μ + δ_a, δ_a ~ N(0, τ_g²) for each group g of parameters.  All tests share the
-error f of the model's form: y_a = f + J θ_a + n_a.  A contrast c, Σ c_a = 0 and |c| = 1, loses f
-and μ: z = Σ c_a y_a = J φ + n with φ ~ N(0, τ²).  The A - 1 orthonormal contrasts are independent
-draws of this, and their marginal likelihood gives τ (restricted maximum likelihood: Patterson and
-Thompson 1971, Biometrika 58, 545-554; empirical Bayes).
+error f of the model's form: y_a = f + J θ_a + n_a.  Contrasts c with Σ c_a = 0 and |c| = 1 lose f
+and μ.  They leave z = Σ c_a y_a = J φ + n with φ ~ N(0, τ²).  A - 1 orthonormal contrasts are
+independent draws of this.  Their marginal likelihood gives τ: empirical Bayes, or restricted
+maximum likelihood (Patterson and Thompson 1971, Biometrika 58, 545-554).
 """
 
 from dataclasses import dataclass

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
+from types import UnionType
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from ..inference.calibration_result import (
@@ -11,8 +12,8 @@ from ..inference.calibration_result import (
     ParameterKnowledge,
 )
 from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Block, Items, Section, Table
-from .words import number, quantity
+from .blocks import Block, Code, Items, Section, Table, Text
+from .words import number, percent, quantity
 
 Made = TypeVar("Made")
 _NONE = "–"
@@ -41,10 +42,28 @@ _TOGETHER = (
     "error of the model's form is common to them and widens the interval of the mean. In brackets: "
     "deviation of each article from the mean, which contains none of that error."
 )
+_REGIONS = (
+    "They deviate most or have the lowest MAC. Share of each part in their strain energy, and in "
+    "that of the other paired modes. Change of its stiffness that alone fits all frequencies best, "
+    "and share of the squared deviations that this removes."
+)
+_NEXT = "Words for the next case.toml, in addition to the parameters that are free now:"
+_NO_REGION = (
+    "No part that was held explains more of the deviations than one at random would: chladni "
+    "diagnose looks for what is missing."
+)
+MOST_REGIONS = 12  # parts in the table
 
 
-def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = ()) -> list[Section]:
-    """Sections of a calibration's page; none after a diagnosis."""
+def study_sections(
+    study: CalibrationStudy | None, pictures: Sequence[Block] = (), energy: Sequence[Block] = ()
+) -> list[Section]:
+    """Sections of a calibration's page; none after a diagnosis.
+
+    Parameters
+    ----------
+    pictures, energy : of the uncertainty, and of the regions to free next
+    """
     if study is None:
         return []
     return [
@@ -52,6 +71,7 @@ def study_sections(study: CalibrationStudy | None, pictures: Sequence[Block] = (
         Section("Basins of the fit", _basins(study)),
         Section("Articles fitted together", _articles(study)),
         Section("Uncertainty of the values", [*_profiles(study), *_sample(study), *pictures]),
+        Section("Regions to free next", [*_regions(study), *energy]),
     ]
 
 
@@ -141,6 +161,29 @@ def _articles(study: CalibrationStudy) -> list[Block]:
     return [Table(heads, rows, heads, _TOGETHER)]
 
 
+def _regions(study: CalibrationStudy) -> list[Block]:
+    """Parts by their strain energy in the worst modes, and words for the next case."""
+    if (found := study.guidance) is None:
+        return []
+    rows = [
+        (r.part, _share(r.worst), _share(r.good), percent(r.factor, 1.0), _share(r.removed),
+         r.state or _NONE)
+        for r in found.regions[:MOST_REGIONS]
+    ]  # fmt: skip
+    heads = ("part", "energy, worst modes", "energy, others", "change of its stiffness",
+             "deviation removed", "in this calibration")  # fmt: skip
+    worst = ", ".join(f"{number(m.test_hz, 4)} Hz" for m in found.worst)
+    left = f"The frequencies deviate by {_share(found.rms)} rms. Worst modes: {worst}."
+    table = Table(heads, rows, ("part", "in this calibration"), f"{left} {_REGIONS}")
+    if not found.words:
+        return [table, Text([_NO_REGION])]
+    return [table, Text([_NEXT]), Code(found.words)]
+
+
+def _share(x: float) -> str:
+    return f"{number(100 * x, 2)} %"
+
+
 def _spread(p: ArticleParameter) -> str:
     high = "not bounded" if p.spread_high is None else _percent(p.spread_high)
     return f"{_percent(p.spread)} ({_percent(p.spread_low)} to {high})"
@@ -193,6 +236,8 @@ def _made(kind: type[Made], found: Mapping[str, Any]) -> Made:
 
 def _typed(hint: Any, value: Any) -> Any:
     """A value of JSON in the type of its field: lists become tuples, objects dataclasses."""
+    if isinstance(hint, UnionType):  # a field that may be None
+        hint = get_args(hint)[0]
     if is_dataclass(hint) and isinstance(value, Mapping):
         return _made(hint, value)  # type: ignore[arg-type]
     if not isinstance(value, list):

@@ -9,7 +9,9 @@ import numpy as np
 from ..dynamics.frf import FRF, UNIT
 from ..effects.estimate import Location
 from ..ema.correlation import deviation
+from ..fem.energy import shell_energies
 from ..geometry.cells import point_means
+from ..geometry.facets import cell_areas
 from ..inference.calibration_result import CalibrationStudy
 from ..inference.result import Alternative, NamedEffect, Scores
 from ..view import annotations, calibration_plots, plots, scene
@@ -21,6 +23,7 @@ from .words import hertz
 _GRID = 8  # channels in the overview
 _SHAPES = 6
 CALM = 27.0  # gain up to which a map of the residual stays pale: less names nothing
+MOST_ENERGY = 0.98  # share of the shells whose colours are within the limits
 Bands = Sequence[tuple[float, float]]
 
 
@@ -63,7 +66,33 @@ def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pa
     made |= _scores(folder, result) | _left(folder, result, shown)
     made |= frequencies(folder, rows) | mac_picture(folder, shown) | _modes(folder, result, shown)
     made |= {path.stem: path for path in draw_levels(folder, result.levels).values()}
+    made |= _energy(folder, result, shown)
     return made | _study(folder, result.study) | curves(folder, shown)
+
+
+def _energy(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
+    """Draw where the worst modes store more strain energy than the others."""
+    found = None if result.study is None else result.study.guidance
+    if found is None or result.models is None or not found.good:
+        return {}
+    model = result.models.final.model
+    shells = model.assembly.shells
+    if not len(shells):
+        return {}
+    f, area = model.modes.frequency, cell_areas(model.assembly.points, shells.nodes)
+    sides = []
+    for modes in (found.worst, found.good):
+        at = [int(np.abs(f - m.model_hz).argmin()) for m in modes]
+        energy = shell_energies(model.structure, model.modes.shapes[:, at])
+        sides.append((energy / energy.sum(axis=0)).mean(axis=1) / area * area.sum())
+    values = np.full(len(shown.seen.faces), np.nan)  # faces of shells come first
+    values[: len(shells)] = sides[0] - sides[1]
+    top = float(np.quantile(np.abs(values[: len(shells)]), MOST_ENERGY))
+    name = "strain energy of the worst modes less that of the others"
+    path = scene.scalar_map(
+        folder / "energy.png", shown.seen, values, name, cmap="RdBu_r", limits=(-top, top)
+    )
+    return {"energy": path}
 
 
 def _study(folder: Path, study: CalibrationStudy | None) -> dict[str, Path]:

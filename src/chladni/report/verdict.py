@@ -75,6 +75,10 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
         "study",
         "Deviation of each article from the mean of all, with 95 % intervals.",
     ),
+    "energy": (
+        "guidance",
+        "Strain energy per area of the worst modes less that of the others, over the mean.",
+    ),
     "bands": (
         "study",
         "Responses with the damping of the search: 90 % of the posterior, and the test.",
@@ -190,7 +194,7 @@ def sections(
         level_section(result.levels, of_levels),
         Section("Joints at each level", _joints(result)),
         Section("Calibrated parameters", _calibrated(result)),
-        *study_sections(result.study, shown("study")),
+        *study_sections(result.study, shown("study"), shown("guidance")),
         Section("Test and model", shown("frf")),
         Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),
         Section("Frequencies", [*_frequencies(result), *shown("modes")]),

@@ -1,8 +1,8 @@
 """Articles of one design fitted together: their common mean, their spread, each one's own values.
 
 The mean of all tests is fitted like one test.  It carries the error of the model's form, and that
-error once.  The differences between the tests carry none of it (:mod:`..inference.unit_spread`), so
-that articles are told apart far better than any one is known.
+error once.  The differences between the tests carry none of it (:mod:`..inference.unit_spread`).
+The deviations of articles from their mean are known far better than the values of any one.
 """
 
 from collections.abc import Sequence

@@ -14,6 +14,7 @@ from ..inference.hypothesis_fit import HypothesisFit, LocalOptimum
 from ..inference.joint_fit import JointFit
 from ..inference.likelihood import LN10
 from ..inference.pole_data import Poles
+from ..inference.residual_localisation import ResidualLocalisation
 from ..inference.result import (
     Agreement,
     Alternative,
@@ -28,6 +29,7 @@ from .question import Prepared
 from .verdict_models import real_poles
 
 STRUCTURED = 5.0  # times the standard deviation of the recording: more than that is not noise
+BLIND_SHARE = 0.05  # of the shells and beams that the test cannot see: more is said
 HEAVIER = 0.02  # of the deck's mass: paint and sealant, which no deck of sheets contains
 
 
@@ -295,3 +297,13 @@ def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
     if diagnosis.two_log_bayes_factor(lead) > TIED:
         return f"{lead.effect.name} accounts for more of it than mesh error and scatter"
     return "mesh error and scatter within the parts account for it as well as any effect tried"
+
+
+def blind_note(spot: ResidualLocalisation | None) -> tuple[str, ...]:
+    """Return a warning if the sensors are blind to local losses on much of the structure."""
+    if spot is None or spot.blind < BLIND_SHARE:
+        return ()
+    return (
+        f"on {spot.blind:.0%} of the structure the test cannot detect a local loss of half the "
+        "stiffness or mass (grey in the map of the remaining gain)",
+    )

@@ -43,9 +43,11 @@ from ..search.measured_modes import MeasuredModes, measured_modes
 from ..search.other_recordings import scored_others
 from ..search.preparation import NOT_WEIGHED, prepare
 from ..search.question import Prepared, Question
+from ..search.regions_to_free import regions_to_free
 from ..search.result_parts import (
     agreement,
     alternatives,
+    blind_note,
     calibrated,
     laid_on_sheets,
     named_effects,
@@ -67,8 +69,6 @@ from .screening_of_case import (
     screened_unprepared,
     unmendable,
 )
-
-BLIND_SHARE = 0.05  # of the shells and beams
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +144,8 @@ def searched(
         return Searched(case, question, prepared, compared(prepared.problem, stage), screening)
     made = calibration(prepared.problem, stage, settings)
     articles = articles_together(question, prepared, made.diagnosis.null)
-    prepared, study = (
-        replace(prepared, problem=made.problem),
-        replace(made.study, articles=articles),
-    )
+    study = replace(made.study, articles=articles)
+    prepared = replace(prepared, problem=made.problem)
     return Searched(case, question, prepared, made.diagnosis, screening, study)
 
 
@@ -181,7 +179,10 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     if not diagnosing:
         reasons = compensating(found.plain.fit, result, question.mass_measurement)
         distrust = (*distrust, *reasons)
-        study = None if study is None else replace(study, compensating=reasons)
+        if study is not None:
+            rows, fit = result.frequencies, found.plain.fit
+            next_ = regions_to_free(rows, stages.final.model, fit, study)
+            study = replace(study, compensating=reasons, guidance=next_)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen = known.screening
@@ -328,7 +329,7 @@ def _result(
             *otherwise(found),
             *away,
             left.sentence,
-            *_blind(spot),
+            *blind_note(spot),
         ),
         one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
@@ -359,16 +360,6 @@ def _article_mass(question: Question, stages: UpdatedModels, deck: HypothesisFit
         fit = deck.fit
         sensors += sum(e.weight(fit.of(e)).removed for e in fit.effects if e.traits.writable)
     return mass_properties(stages.final.model.assembly)[0] - sensors
-
-
-def _blind(spot: ResidualLocalisation | None) -> tuple[str, ...]:
-    """Return a warning if the sensors are blind to local losses on much of the structure."""
-    if spot is None or spot.blind < BLIND_SHARE:
-        return ()
-    return (
-        f"on {spot.blind:.0%} of the structure the test cannot detect a local loss of half the "
-        "stiffness or mass (grey in the map of the remaining gain)",
-    )
 
 
 def _scores(
