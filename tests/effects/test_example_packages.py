@@ -23,6 +23,7 @@ from chladni_evidence.bench_of_structure import SPECIMENS, Specimen
 from chladni_evidence.blind_make import made_of
 from chladni_evidence.evidence_sets import Order, chosen
 from chladni_evidence.made_case import write_case
+from chladni_specimens import folded_panel
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle
 from chladni_specimens.plates import STEEL, plate
 
@@ -72,6 +73,21 @@ def acting(example_family):
     )
     effect = example_family.placed(where)[0]
     return example_family, deck, reduced, effect, np.array([X.get(effect.name, 0.2)])
+
+
+def test_it_acts_on_a_folded_panel(example_family):
+    """Where sheets are curved and flanges go down at the edges, each of its places as well."""
+    deck = (
+        folded_panel(0.6, 0.3, 0.04, 0.01, 0.05, 1e-3) if not example_family.needs else two_plates()
+    )
+    reduced = reduced_problem(deck, 60.0)
+    setup = Setup((), (), mass_properties(deck)[0], 60.0)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
+    proposed = example_family.placed(where)
+    assert proposed
+    for effect in proposed:
+        x = np.array([X.get(effect.name, 0.2)])
+        assert np.abs(modes(effect.apply(deck, x)) / modes(deck) - 1).max() > 1e-4
 
 
 def modes(made, count=FIRST + 6):

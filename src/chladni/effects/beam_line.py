@@ -27,7 +27,8 @@ class BeamLine(Effect):
     Attributes
     ----------
     section : of r = 1
-    up, offset : (3,)   direction of plane 1, and place of the beams from their grids [m]
+    up : (3,) or None   direction of plane 1
+    offset : (3,)       place of the beams from their grids [m]
     length : of the line [m]
     operators : K_A, K_I, M_A and M_I with their powers of r
     """
@@ -35,7 +36,7 @@ class BeamLine(Effect):
     traits = Traits(elastic=True)
 
     section: BeamSection | None = None
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    up: tuple[float, float, float] | None = None
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     length: float = 0.0
     operators: tuple[Operator, ...] = ()
@@ -43,7 +44,7 @@ class BeamLine(Effect):
     @classmethod
     def along(
         cls, where: EffectContext, grids: Sequence[int], section: BeamSection, size: Parameter,
-        text: str, tried: int = 1, up: tuple[float, float, float] = (0.0, 0.0, 1.0),
+        text: str, tried: int = 1, up: tuple[float, float, float] | None = None,
         offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> Self:  # fmt: skip
         """Beams along a line of grids of the deck.

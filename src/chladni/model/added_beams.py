@@ -15,7 +15,7 @@ def with_beam_line(
     assembly: Assembly,
     grids: Sequence[int],
     section: BeamSection,
-    up: Sequence[float] | np.ndarray,
+    up: Sequence[float] | np.ndarray | None = None,
     name: str = "added beam",
     offset: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
 ) -> Assembly:
@@ -25,7 +25,8 @@ def with_beam_line(
     ----------
     grids : ids of two or more grids of the assembly
     section : areas and moments, about the reference line (SI)
-    up : (3,)       direction of plane 1, not along the line, basic frame
+    up : (3,)       direction of plane 1, not along the line, basic frame; by default the axis of
+        that frame which is the most across each beam
     name : of the part
     offset : (3,)   of the beams from their grids, basic frame [m]
 
@@ -44,7 +45,7 @@ def with_beams(
     assembly: Assembly,
     nodes: np.ndarray,
     section: BeamSection,
-    up: Sequence[float] | np.ndarray,
+    up: Sequence[float] | np.ndarray | None,
     name: str,
     offset: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
 ) -> Assembly:
@@ -52,7 +53,7 @@ def with_beams(
 
     Parameters
     ----------
-    up : (3,) or (n, 3)
+    up : (3,), (n, 3) or None
 
     Raises
     ------
@@ -60,8 +61,10 @@ def with_beams(
         If a beam has no length, ``up`` lies along it, or a rod has an offset.
     """
     n, rod = len(nodes), section.kind == "rod"
-    v = np.broadcast_to(np.asarray(up, float), (n, 3))
     along = np.diff(assembly.points[nodes], axis=1)[:, 0]
+    v = np.eye(3)[np.abs(along).argmin(axis=1)]
+    if up is not None:
+        v = np.broadcast_to(np.asarray(up, float), (n, 3))
     if not n or np.any(np.linalg.norm(np.cross(along, v), axis=1) < 1e-9):
         raise ModelError(f"{name}: a beam needs two grids apart, and a direction across itself")
     if rod and np.any(offset):

@@ -81,6 +81,17 @@ def test_what_beams_add_is_the_difference(deck):
         built.contribution(plate(0.1, 0.1, 2, 2, 1e-3))
 
 
+def test_every_beam_has_a_direction_across_itself(deck):
+    """Along two edges of a plate one after the other."""
+    _, before, _ = deck
+    x, y = before.points[:, 0], before.points[:, 1]
+    corners = [((x - a) ** 2 + (y - b) ** 2).argmin() for a, b in ((0, 0), (0.3, 0), (0.3, 0.2))]
+    made = with_beam_line(before, before.ids[corners], section(STEEL))
+    along = np.diff(made.points[made.beams.nodes], axis=1)[:, 0]
+    np.testing.assert_allclose(np.einsum("ij,ij->i", along, made.beams.up), 0)
+    np.testing.assert_allclose(np.linalg.norm(made.beams.up, axis=1), 1)
+
+
 def test_a_line_that_is_none_is_refused(deck):
     _, before, _ = deck
     along = before.ids[np.isclose(before.points[:, 1], 0.1)]
