@@ -176,10 +176,12 @@ Kind = TypeVar("Kind", FieldChange, PointTerm, MatrixTerm, ChannelChange, ShapeC
 
 
 class Weight(NamedTuple):
-    """Mass of an effect as weighed.
+    """Mass of an effect on the scales [kg].
 
-    ``mass`` [kg] is added to the weighed mass, that of the sheets excluded; ``gradient`` (n_p,) is
-    its slope. ``removed`` [kg] is on the structure during the test and off it on the scales.
+    Attributes
+    ----------
+    mass, gradient : float, (n_p,)   added to the weighed mass, that of the sheets excluded
+    removed : mass that is on the structure during the test and is removed before it is weighed
     """
 
     mass: float

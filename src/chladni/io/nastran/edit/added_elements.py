@@ -21,7 +21,7 @@ from .free_ids import FreeIds
 
 @dataclass(frozen=True, eq=False)
 class AddedElements:
-    """What another assembly has more than that of the deck.
+    """Elements that another assembly has in addition to those of the deck.
 
     Attributes
     ----------
