@@ -18,6 +18,7 @@ from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.family import Article
 from chladni.effects.identified_damping import IdentifiedDamping
 from chladni.effects.joints import beads, stiffness
+from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.model_families import model_families
 from chladni.effects.point_mass import PointMass
 from chladni.effects.rigid_ties import on_firm_springs
@@ -228,19 +229,22 @@ def test_candidates_begin_at_the_nominal_and_at_the_calibrated_model(by_response
     assert not calibrated[1:].any()
 
 
-@pytest.mark.parametrize("kind", [PointMass, ExtraSupport])
+@pytest.mark.parametrize("kind", [PointMass, ExtraSupport, LocalResonator])
 def test_begins_anew_where_it_moved_to(reduced, by_responses, kind):
     """Half a patch off its start it stays; a grid off, it begins at the grid it moved to."""
     where = by_responses.where
     effect = kind.near(where, where.grids.position(25))
     rest = np.zeros(len(effect.parameters) - 3)
-    assert effect.recentred(np.array([0.3, 0.5, -0.5, *rest]), where) is None
+    closer = next(f.closer for f in registry.BUILT_IN if f.effect is kind)
+    assert closer(by_responses, effect, np.array([0.3, 0.5, -0.5, *rest])) is None
     size = effect.patch.size
     step = (
         where.grids.point[where.grids.position(26)] - effect.patch.origin
     ) @ effect.patch.plane.T
     x = np.array([0.3, *(step / size), *rest])
-    again, start = effect.recentred(x, where)
+    found = closer(by_responses, effect, x)
+    again, start = found.effect, found.start
+    assert found.base is by_responses.bases[-1]
     assert again.grids == (26,)
     assert again.trials_factor == len(where.places)
     model = reduced.model_for(effect, x)
