@@ -178,6 +178,16 @@ def test_least_data(modes: int, channels: int, enough: bool) -> None:
     assert (too_little(modes, channels) == "") is enough
 
 
+@pytest.mark.parametrize(("modes", "channels"), [(0, 4), (1, 0), (2, 12), (3, 0), (3, 1), (7, 0)])
+def test_too_few_data_name_the_least_number_that_suffices(modes: int, channels: int) -> None:
+    """The reason counts numbers only where these ask for more than the least three modes."""
+    said = too_little(modes, channels)
+    due = int(said.split("at least ")[1].split()[0])
+    assert too_little(due, channels) == ""
+    assert too_little(due - 1, channels)
+    assert (f"they give {modes * (1 + channels)} numbers" in said) is (due > 3)
+
+
 def test_a_wide_band_says_nothing_of_what_lies_far_below_it() -> None:
     f = np.arange(1.0, 600.0)
     wide = FRF(np.ones((len(f), 1, 1), complex), f, ("1:+Z",), ("1:+Z",))

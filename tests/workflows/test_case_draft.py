@@ -94,6 +94,17 @@ def renumbered(frf, places, shift):
     return one, {n: places[n - shift] for n in used}
 
 
+@pytest.mark.parametrize("placed", [False, True])
+def test_numbers_that_no_coordinates_confirm_are_said(deck, frf, places, tmp_path, placed):
+    """Two channels, 1 and 2, of another structure have the numbers of two grids."""
+    two = replace(frf, values=frf.values[:, :2], outputs=("1:+Z", "2:+Z"))
+    uff = tmp_path / "two.uff"
+    write_uff(uff, two, {n: places[n] for n in (1, 2)} if placed else {})
+    made = draft(deck, [uff])
+    assert {d.matched_by for d in made.dofs} == {"grid"}
+    assert any("no coordinates that confirm" in n for n in made.notes) is not placed
+
+
 @pytest.mark.parametrize("shift", [1000, 2])
 def test_by_place_where_the_lab_has_numbers_of_its_own(deck, frf, places, tmp_path, shift):
     """Numbers that are other grids' (2) must not count where the places say otherwise."""

@@ -26,9 +26,15 @@ def too_little(modes: int, channels: int) -> str:
     if modes >= MODES and numbers(modes, channels) >= NUMBERS:
         return ""
     seen = f" on {channels} channel{'s' * (channels != 1)}" if channels else ""
-    few = f"{modes} modes{seen} do" if modes != 1 else f"1 mode{seen} does"
+    few = f"{modes} fitted mode{seen} does" if modes == 1 else f"{modes} fitted modes{seen} do"
     due = max(MODES, int(np.ceil(NUMBERS / (1 + channels))))
+    why = (
+        f"{modes} frequenc{'y' if modes == 1 else 'ies'} can follow from mass as well as stiffness"
+        if due == MODES
+        else f"they give {numbers(modes, channels)} numbers, and the calibration parameters take "
+        "three, an effect three, and two must be able to contradict it"
+    )
     return (
-        f"{few} not separate the explanations: at least {due} modes are needed, three for the "
-        "calibration parameters, three for an effect and two that can contradict it"
+        f"{few} not separate the explanations: at least {due} modes are needed, because {why}; "
+        "held-out data do not count"
     )

@@ -90,6 +90,13 @@ def matched(
         for role, labels in sides
         for label in labels
     ]
+    unproved = [d.label for d in found if d.matched_by == "grid" and np.isnan(d.distance)]
+    if unproved:
+        notes.append(
+            f"labels {named(unproved, 3)} of {recording.name} are taken as grid numbers of the "
+            "deck: the recording has no coordinates that confirm it; if they number channels, "
+            "give their places in sensors.csv"
+        )
     matched_labels = {(d.label, d.role) for d in found}
     idle = [s.label for s in table if (s.label, s.role) not in matched_labels]
     if idle:
