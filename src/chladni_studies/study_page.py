@@ -163,7 +163,7 @@ def _indices(page: Page, found: ParameterStudy, measure: str) -> Block:
             for s in shown
         }
     else:
-        axis = "elementary effect over the range, in units of the result"
+        axis = "elementary effect [unit of the result]"
         results = {
             label(s.result): {"mean |effect|": (s.mu_star, None), "its deviation": (s.sigma, None)}
             for s in shown

@@ -15,8 +15,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import chladni
 from chladni.cli.app import application
 from chladni.dynamics.frf import FRF
+from chladni.geometry.formed_mesh import FormedMesh
+from chladni.io.dyna import write_keyword
 from chladni.report import live_pages, live_panels, live_samples
 from chladni.report.blocks import Section
 from chladni.report.diagnosis_folder import shown, write_diagnosis
@@ -419,6 +422,7 @@ def test_samples_and_curves_hold_at_every_width_and_run_no_name(sampled):
         (("frf", "--input", "2:+Z", "--output", "30:+Z", "--output", "7:+Z"), ["frf"]),
         (("identify",), ["automac", "fit", "stabilisation"]),
         (("correlate",), ["frf", "mac", "shapes", "where"]),
+        (("map", "plate.bdf", "formed.k", "--units", "SI"), ["change", "thickness"]),
         (("plan", "--sensors", "6"), ["mac", "shapes", "where"]),
         (
             ("study", "--vary", "t=90%:110%", "--vary", "E=80%:120%", "--samples", "6"),
@@ -462,7 +466,13 @@ def test_every_command_draws_its_page(window, folder, tmp_path, command, names):
     """With the same layout; at both widths, without a word on the console."""
     name, *options = command
     out = tmp_path / "out"
-    done = CliRunner().invoke(application(), [name, str(folder), *options, "--out", str(out)])
+    if name == "map":
+        deck, formed, *options = options
+        form(folder / deck, tmp_path / formed)
+        options = [str(folder / deck), str(tmp_path / formed), *options]
+    else:
+        options = [str(folder), *options]
+    done = CliRunner().invoke(application(), [name, *options, "--out", str(out)])
     assert done.exit_code == 0, done.output
     for width in (1280, 390):
         window.size(width, 900)
@@ -475,6 +485,16 @@ def test_every_command_draws_its_page(window, folder, tmp_path, command, names):
     assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
     if name == "identify":
         click_a_pole(window)
+
+
+def form(deck, path):
+    """The plate of a deck, drawn thinner along its length."""
+    plate = chladni.load(deck, "SI").assembly
+    t = 1e-3 * (1 - 0.2 * plate.points[:, 0] / plate.points[:, 0].max())
+    nodes, numbers = plate.shells.nodes, np.array([p.id for p in plate.parts])
+    names = {p.id: p.name for p in plate.parts}
+    part = numbers[plate.shells.part]
+    write_keyword(path, FormedMesh(plate.ids, plate.points, nodes, part, t[nodes], names), "SI")
 
 
 def click_a_pole(window):
