@@ -192,7 +192,9 @@ def _modes(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pat
     f = model.modes.frequency
     at = [int(np.abs(f - one).argmin()) for one in found]
     motion = np.asarray(model.structure.T @ model.modes.shapes[:, at])
-    motion = motion.reshape(len(shown.seen.points), 6, -1)[:, :3]
+    deck = model.structure.assembly  # an added effect may have brought grids
+    rows = deck.rows(shown.ids) if len(shown.ids) else slice(None)
+    motion = motion.reshape(len(deck.points), 6, -1)[rows, :3]
     path, numbers = folder / "modes.png", [k + 1 for k in at]
     return {"modes": scene.montage(path, shown.seen, motion, f[at], numbers)}
 
