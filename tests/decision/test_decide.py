@@ -320,6 +320,8 @@ def test_what_relieves_strained_joints_is_one_of_both():
         ((1.1, 1.1), (1.1, 1.1), (0.9, 1.1), False, "PLAIN"),
         ((1.1, 1.1), (1.1, 1.1), (1.1, 1.1), False, "GIVEN"),
         ((1.1, 1.1), (1.1, 1.1), (0.9, 0.9), True, "GIVEN"),
+        ((0.9, 1.1), (0.9, 1.1), (0.9, 1.1), False, "PLAIN"),
+        ((0.9, 1.1), (0.9, 1.1), (0.9, 1.1), True, "FOUND"),  # plain values, or mass, cannot be
     ],
 )
 def test_numbers_of_a_calibration_serve_no_worse_than_the_deck(

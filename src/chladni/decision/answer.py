@@ -67,9 +67,10 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
 
     Plain calibration would distort E, rho and t to compensate for errors of mesh and joints. The
     candidates, in this order, are the numbers found by the null, these fitted again without
-    scatter, and plain calibration. Each of the first two must fit no worse than the given deck,
-    with and without its mesh error. Plain calibration must have plausible numbers and not fit worse
-    in every respect. Otherwise the given deck stays; where it leaves the scales, the best is taken
+    scatter, and plain calibration. The last must have plausible numbers and the weighed mass. The
+    first of the former two that fits no worse than the given deck, with and without its mesh error,
+    is taken. Otherwise it is plain calibration or the first of the two, if that is not worse in
+    both respects. Otherwise the given deck stays; where it leaves the scales, the best is taken
     instead. Joints beyond their usual scatter count as calibrated, whatever E, rho and t gain.
     """
     table, rules = case.table, case.rules
@@ -82,14 +83,18 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
     if not rules.prudent:
         return decision
     before = table.deck(CalibratedDeck.GIVEN)
-    for deck in (CalibratedDeck.FOUND, CalibratedDeck.WRITTEN):
-        Q = table.deck(deck)
-        if Q and not any(q > b for q, b in zip(Q, before, strict=True)):  # no Q is no worse
+
+    def worse(deck: CalibratedDeck) -> list[bool]:
+        return [q > b for q, b in zip(table.deck(deck), before, strict=True)]
+
+    physical = CalibratedDeck.FOUND, CalibratedDeck.WRITTEN
+    plain = () if table.implausible else (CalibratedDeck.PLAIN,)
+    for deck in physical:
+        if table.deck(deck) and not any(worse(deck)):  # no Q is no worse
             return replace(decision, deck=deck)
-    if not table.implausible:
-        Q = table.deck(CalibratedDeck.PLAIN)
-        if not all(q > b for q, b in zip(Q, before, strict=True)):
-            return decision
+    for deck in (*plain, *physical):
+        if table.deck(deck) and not all(worse(deck)):
+            return replace(decision, deck=deck)
     if table.off_the_scales and (best := _best_deck(table)) is not None:
         return replace(decision, deck=best)
     verdict = decision.verdict

@@ -213,7 +213,7 @@ class HypothesisTable:
     poles : whether natural frequencies are compared
     enough : whether there are data enough to separate explanations as a rule
     contradicted : whether there are more numbers than any effect has unknowns
-    implausible : whether plain calibration has implausible values
+    implausible : whether plain calibration has implausible values, or not the weighed mass
     decks : Q of each calibration, with and without the mesh error; () where there is no such fit;
         of ``GIVEN`` that of the given deck
     off_the_scales : whether the given deck has another mass than was weighed, where calibration is

@@ -28,7 +28,7 @@ from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.least_data import CONTRADICTED
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_test_along_effect
-from ..inference.map_fit import APART, fit
+from ..inference.map_fit import fit
 from ..inference.pole_data import Poles
 from ..inference.rows_of_fits import row_of
 from ..inference.written_hypothesis import as_found, as_written, of_mesh
@@ -239,7 +239,7 @@ def _leaves_the_scales(problem: UpdatingProblem, null: HypothesisFit, x: np.ndar
     if weighed is None:
         return False
     state = evaluate(null.model, problem.base, x, False)
-    return bool(abs(state.weight - weighed.mass) > APART * weighed.sd)
+    return not weighed.agrees(float(state.weight))
 
 
 def numbers(

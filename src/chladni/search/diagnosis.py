@@ -165,7 +165,8 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         tuple(t.effect.name for t in found.hypotheses),
         nominal=found.nominal.neg2_log_evidence,
         poles=isinstance(found.null.data, Poles),
-        implausible=bool(implausible_values(found.plain.fit)),
+        implausible=bool(implausible_values(found.plain.fit))
+        or not _keeps_mass(problem, found.plain),
         families=len(problem.families),
     )
     tests = dict(found.tests)
@@ -175,6 +176,12 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         table = table.having(chances.of(table.rows[said.key]))
         tests |= {said.key: chances.test} if chances.test else {}
     return replace(found, verdict=said.verdict, table=table, tests=tests)
+
+
+def _keeps_mass(problem: UpdatingProblem, plain: HypothesisFit) -> bool:
+    """True where plain calibration has the weighed mass, or nothing was weighed."""
+    weighed = problem.mass_measurement
+    return weighed is None or weighed.agrees(float(plain.fit.state.weight))
 
 
 def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
