@@ -67,11 +67,13 @@ class CalibrationSettings:
     freeze : False keeps parameters free that the data do not know; they are named all the same
     quick : fit from the prior mean alone, without further starts, profiles and bands
     sample : draw from the posterior
+    starts : number of starts of a Latin hypercube
     """
 
     freeze: bool = True
     quick: bool = False
     sample: bool = False
+    starts: int = STARTS
 
 
 FULL = CalibrationSettings()
@@ -95,7 +97,7 @@ def calibration(
             known = again
             problem, null = without_effects(_without(whole, known.frozen))
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
-    ends = [] if quick else list(_ends(problem, null, within(progress, 0.3, 0.7)))
+    ends = [] if quick else list(_ends(problem, null, settings.starts, within(progress, 0.3, 0.7)))
     null = _restarted(problem, null, ends)
     basins = _basins(null, ends)
     progress("profiles", 0.75)
@@ -109,7 +111,7 @@ def calibration(
     found = Diagnosis(nominal, null, fit_of_the_deck(problem, null), (), notes=notes)
     own = calibration_positions(null.fit.effects)
     study = CalibrationStudy(
-        known, 0 if quick else STARTS, basins[:BEST], tuple(_names(null.fit)),
+        known, 0 if quick else settings.starts, basins[:BEST], tuple(_names(null.fit)),
         tuple(null.fit.x[own].tolist()),
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
         profiled, predicted, sample=sample,
@@ -141,7 +143,7 @@ def _frozen(effect: Effect, frozen: Sequence[str]) -> bool:
     return effect.kind == "calibration" and bool(names) and all(n in frozen for n in names)
 
 
-def latin_hypercube(problem: UpdatingProblem, count: int = STARTS) -> list[np.ndarray]:
+def latin_hypercube(problem: UpdatingProblem, count: int) -> list[np.ndarray]:
     """Starts that fill the priors of the calibration parameters evenly, the rest at its mean.
 
     McKay, Beckman and Conover (1979), Technometrics 21, 239-245; a fixed seed.
@@ -156,9 +158,11 @@ def latin_hypercube(problem: UpdatingProblem, count: int = STARTS) -> list[np.nd
     return list(out)
 
 
-def _ends(problem: UpdatingProblem, null: HypothesisFit, progress: Progress) -> Iterator[Fit]:
+def _ends(
+    problem: UpdatingProblem, null: HypothesisFit, count: int, progress: Progress
+) -> Iterator[Fit]:
     """Fits from every start to the same likelihood; a start that is no structure has none."""
-    model, mass, starts = null.model, problem.mass_measurement, latin_hypercube(problem)
+    model, mass, starts = null.model, problem.mass_measurement, latin_hypercube(problem, count)
     data = null.data
 
     def one(x: np.ndarray) -> Fit | None:
