@@ -1,10 +1,10 @@
-"""The patch about welds is what the deck then holds, smooth in its radius, and nothing at first."""
+"""A patch about joints is what the deck then holds, smooth in its radius, and nothing at first."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.weld_patch import bell, weld_patch
+from chladni.effects.weld_patch import PATCHES, bell, spiders, weld_patch
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
@@ -15,17 +15,17 @@ from chladni.reduced.reduced_problem import reduced_problem
 from chladni.search.preparation import carrying
 from chladni_specimens.plates import plate
 
-FREE = FreeParameter("patch", "weld-patch")
+FREE = {field: FreeParameter("patch", field) for field in PATCHES}
 
 
-@pytest.fixture(scope="module")
-def patch(reduced):
-    return weld_patch(reduced.groups, FREE)
+@pytest.fixture(scope="module", params=PATCHES)
+def patch(reduced, request):
+    return weld_patch(reduced.groups, FREE[request.param])
 
 
-def test_shells_that_touch_a_weld_are_its_innermost_ring(reduced, patch):
+def test_shells_that_touch_a_weld_are_its_innermost_ring(reduced):
     """The three welds of the two plates lie at x = 0.05 m; the screw and the bead are none."""
-    assembly = reduced.structure.assembly
+    assembly, patch = reduced.structure.assembly, weld_patch(reduced.groups, FREE["weld-patch"])
     middle = assembly.points[assembly.shells.nodes].mean(axis=1)
     welds = np.array([(0.05, y) for y in (0.06, 0.15, 0.24)])
     away = np.linalg.norm(middle[:, None, :2] - welds, axis=2).min(axis=1)
@@ -33,6 +33,19 @@ def test_shells_that_touch_a_weld_are_its_innermost_ring(reduced, patch):
     assert set(patch.parts) == {"lower", "upper"}
     assert (patch.ring[away < 0.02] == 0).all()
     assert (patch.ring[away > 0.15] < 0).all()
+
+
+def test_a_spider_holds_the_sheets_about_its_feet(reduced):
+    """The screw at (0.2, 0.05) m spreads over both plates; welds and bead have no spiders."""
+    assembly, patch = reduced.structure.assembly, weld_patch(reduced.groups, FREE["rigid-patch"])
+    assert "2 spiders" in patch.text
+    assert set(patch.parts) == {"lower", "upper"}
+    feet = np.concatenate([rows for _, rows in spiders(assembly)])
+    touching = np.isin(assembly.shells.nodes, feet).any(axis=1)
+    assert ((patch.ring == 0) == touching).all()
+    middle = assembly.points[assembly.shells.nodes].mean(axis=1)
+    away = np.linalg.norm(middle[:, :2] - (0.2, 0.05), axis=1)
+    assert (patch.ring[away > 0.2] < 0).all()
 
 
 def test_it_does_nothing_at_the_deck_s_values(patch):
@@ -88,7 +101,8 @@ def test_frequencies_are_those_of_the_full_model_all_over_the_prior(reduced, pat
         assert np.abs(f / full - 1).max() < max(1e-3, 2 * said)
 
 
-def test_a_deck_without_welds_is_refused():
+@pytest.mark.parametrize(("field", "what"), [(PATCHES[0], "welds of"), (PATCHES[1], "spiders of")])
+def test_a_deck_without_such_joints_is_refused(field, what):
     made = reduced_problem(plate(0.4, 0.3, 4, 3, 1.5e-3), 100.0)
-    with pytest.raises(ModelError, match="no shells that touch welds of solids"):
-        weld_patch(made.groups, FREE)
+    with pytest.raises(ModelError, match=f"no shells that touch {what}"):
+        weld_patch(made.groups, FREE[field])

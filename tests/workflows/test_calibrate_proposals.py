@@ -11,10 +11,11 @@ def case(assembly, parameters=()):
     return SimpleNamespace(assembly=assembly, parameters=parameters)
 
 
-def test_adhesive_and_welds_of_a_deck_are_proposed():
-    glue, patch = proposed(case(panel(COARSE)))
+def test_adhesive_welds_and_spiders_of_a_deck_are_proposed():
+    glue, patch, reach = proposed(case(panel(COARSE)))
     assert 'field = "adhesive-stiffness" and parts = ["glue"]' in glue
     assert 'field = "weld-patch" frees the sheet about its welds' in patch
+    assert 'field = "rigid-patch" frees the sheet about its RBE2 and RBE3' in reach
 
 
 def test_nothing_is_proposed_where_there_is_no_joint_or_the_user_chose():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.registry import families
-from ..effects.weld_patch import FIELD as WELD_PATCH
+from ..effects.weld_patch import PATCHES
 from ..errors import FileError, LabelError, did_you_mean
 from ..io.nastran import Deck
 from ..model.assembly import Assembly
@@ -105,7 +105,7 @@ def _field(section: TomlSection) -> str:
 
 def _placed_names() -> tuple[str, ...]:
     """Effects of which deck and test tell where they act, those of installed packages too."""
-    return (*(f.name for f in families() if f.placed is not None), WELD_PATCH)
+    return (*(f.name for f in families() if f.placed is not None), *PATCHES)
 
 
 def _placed(section: TomlSection, made: Assembly, what: str, name: str) -> FreeParameter:
@@ -116,7 +116,7 @@ def _placed(section: TomlSection, made: Assembly, what: str, name: str) -> FreeP
                 f"{section.at(key)} is for numbers ({', '.join(FIELDS)}); {what} has its own prior"
             )
     given, positions, _ = _members(section, made, None)
-    if what == WELD_PATCH:
+    if what in PATCHES:
         return FreeParameter(name, what, tuple(given), positions=tuple(positions))
     if given and what != "orthotropic-material":
         raise FileError(f"{section.at('parts')}: {what} belongs to the test, not to parts")

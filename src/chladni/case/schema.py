@@ -53,6 +53,7 @@ ALIASES = {  # effects that are a calibration parameter by another name
 }
 PLACED = (  # where they act is known
     "orthotropic-material", "sensor-mass", "suspension", "shaker-restraint", "weld-patch",
+    "rigid-patch",
 )  # fmt: skip
 PLANNED = (  # names of the public contract that no model stands behind yet
     "rattle", "joint-friction",

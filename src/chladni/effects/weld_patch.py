@@ -1,7 +1,8 @@
-"""Weld patch: the sheet around welds has another modulus than the part, over a free radius.
+"""Patches about joints: the sheet around them has another modulus, over a free radius.
 
+The joints are welds of solids, or the spiders of RBE2 and RBE3, whose radius a deck can only guess.
 E of a shell is multiplied by e^{x q}, q = R²/s exp(-d²/2s), s = R² + v.  q is a bell of radius R
-about the nearest weld at distance d.  It is averaged over a shell of variance v = area/12.  It is
+about the nearest joint at distance d.  It is averaged over a shell of variance v = area/12.  It is
 smooth in R, also where R is smaller than a shell.  Shells are collected in rings of nearly equal q,
 which a deck holds as properties of their own.  The patch stands for nugget, heat-affected zone and
 the mesh of the joint (Echaniz Granado 2015, section 5.4: shells that touch weld solids get a
@@ -17,7 +18,7 @@ from ..errors import ModelError
 from ..fem.assemble import Structure
 from ..fem.sparse_assembly import blocks, congruence
 from ..geometry.sampling import nearest_points
-from ..model.assembly import Assembly
+from ..model.assembly import Assembly, Average, RigidBody
 from ..model.free_parameter import FreeParameter
 from .effect import Effect, MatrixTerm, Parameter, Traits
 from .element_groups import ElementGroups
@@ -25,9 +26,10 @@ from .joints import fasteners
 from .property_bands import in_bands
 from .stiffness_patch import softened
 
-FIELD = "weld-patch"
+FIELD, SPIDERS = "weld-patch", "rigid-patch"
+PATCHES = FIELD, SPIDERS
 SD_E, SD_R = 0.3, 0.4  # prior sd of ln of the factor on E and of ln R
-RINGS = 5  # of shells about the welds
+RINGS = 5  # of shells about the joints
 LEAST = 0.05  # of the bell's height: shells with less of it are outside
 
 
@@ -72,6 +74,14 @@ class WeldPatch(Effect):
         return in_bands(assembly, self.ring + 1, lambda part, n: softened(part, logs[n - 1]))
 
 
+@dataclass(frozen=True, eq=False)
+class RigidPatch(WeldPatch):
+    """The same about the spiders of rigid elements: their reach in the sheet is a parameter."""
+
+    name = SPIDERS
+    claim = "a rigid element holds more or less of the sheet than its grids"
+
+
 def bell(R: float, distance: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """q = R²/s exp(-d²/2s) with s = R² + v, and ∂q/∂ln R."""
     s = R**2 + variance
@@ -80,26 +90,30 @@ def bell(R: float, distance: np.ndarray, variance: np.ndarray) -> tuple[np.ndarr
 
 
 def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
-    """Return the patch about all welds of the structure, or of the named parts.
+    """Return the patch about all welds or spiders of the structure, or of the named parts.
 
     Raises
     ------
     ModelError
-        If no shell of these parts touches a weld of solids.
+        If no shell of these parts touches such a joint.
     """
     built = groups.structure
     assembly, shells = built.assembly, built.assembly.shells
-    welds = [j for j in fasteners(built) if j.kind == "solids"]
+    kind, what, each = (
+        (RigidPatch, "spiders of RBE2 and RBE3", spiders(assembly))
+        if free.field == SPIDERS
+        else (WeldPatch, "welds of solids", _welds(built))
+    )
     part = np.isin(shells.part, free.positions) if free.positions else np.ones(len(shells), bool)
-    held = assembly.rows(np.unique([g for j in welds for g in j.grids])) if welds else np.zeros(0)
+    held = np.concatenate([rows for _, rows in each]) if each else np.zeros(0, int)
     touching = part & np.isin(shells.nodes, held).any(axis=1)
     if not touching.any():
-        raise ModelError("the deck has no shells that touch welds of solids; leave weld-patch out")
+        raise ModelError(f"the deck has no shells that touch {what}; leave {kind.name} out")
     part &= np.isin(shells.part, shells.part[touching])
     area = groups_area(groups)
     R = float(np.sqrt(area[touching].mean()) / 2)
     middle = assembly.points[shells.nodes].mean(axis=1)
-    points = np.array([j.point for j in welds])
+    points = np.array([point for point, _ in each])
     distance = np.linalg.norm(middle - points[nearest_points(points, middle)], axis=1)
     wide = R * np.exp(2 * SD_R)
     inside = part & (bell(wide, distance, area / 12)[0] > LEAST)
@@ -112,12 +126,38 @@ def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
     names = tuple(assembly.parts[k].name for k in np.unique(shells.part[touching]))
     mean = [np.average(np.stack([distance, area / 12])[:, ring == k], axis=1,
                        weights=area[ring == k]) for k in count]  # fmt: skip
-    return WeldPatch(
-        unknown, f"the patch about {len(welds)} welds", names, called=free.name,
+    return kind(
+        unknown, f"the patch about {len(each)} {what.split()[0]}", names, called=free.name,
         operators=tuple(_stiffness(built, groups, np.flatnonzero(ring == k)) for k in count),
         ring=ring, distance=np.array([m[0] for m in mean]),
         variance=np.array([m[1] for m in mean]),
     )  # fmt: skip
+
+
+def _welds(built: Structure) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Middle [m] and rows of the grids of every weld of solids."""
+    found = [j for j in fasteners(built) if j.kind == "solids"]
+    return [(np.asarray(j.point), built.assembly.rows(list(j.grids))) for j in found]
+
+
+def spiders(assembly: Assembly) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Middle [m] and rows of the feet on shells of every RBE2 and RBE3 with two or more.
+
+    Those that tie a grid of a solid belong to welds and adhesive.
+    """
+    out, solids = [], [np.unique(group.nodes) for group in assembly.solids]
+    tied = np.concatenate([np.zeros(0, int), *solids])
+    for body in assembly.rigid:
+        if isinstance(body, RigidBody):
+            middle, feet = body.independent, np.array(body.dependent, dtype=int)
+        elif isinstance(body, Average):
+            middle, feet = body.reference, np.array([row for row, _, _ in body.terms], dtype=int)
+        else:
+            continue
+        feet = feet[np.isin(feet, assembly.shells.nodes)]
+        if len(feet) > 1 and middle not in tied:
+            out.append((assembly.points[feet].mean(axis=0), feet))
+    return out
 
 
 def groups_area(groups: ElementGroups) -> np.ndarray:

@@ -17,7 +17,7 @@ from ..effects.model_families import joint_nuisances
 from ..effects.registry import catalogue, family
 from ..effects.sensor_fault import channel_gain
 from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
-from ..effects.weld_patch import WeldPatch, weld_patch
+from ..effects.weld_patch import PATCHES, weld_patch
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
@@ -342,7 +342,7 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
     """
     if p.field in UNITS:
         return user_parameter(reduced.groups, p)
-    if p.field == WeldPatch.name:
+    if p.field in PATCHES:
         return weld_patch(reduced.groups, p)
     placed = family(p.field).placed
     assert placed is not None

@@ -10,6 +10,7 @@ from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..effects.joints import solid_parts
 from ..effects.weld_patch import FIELD as WELD_PATCH
+from ..effects.weld_patch import SPIDERS, spiders
 from ..inference.posterior_samples import sampler_package
 from ..progress import Progress, silent
 from ..search.calibration import CalibrationSettings
@@ -61,3 +62,5 @@ def proposed(case: Case) -> Iterator[str]:
             names = ", ".join(f'"{case.assembly.parts[k].name}"' for k in sorted(rows))
             parts = f" and parts = [{names}]" if soft else ""
             yield f'a [[parameter]] with field = "{field}"{parts} frees {what}'
+    if spiders(case.assembly):
+        yield f'a [[parameter]] with field = "{SPIDERS}" frees the sheet about its RBE2 and RBE3'
