@@ -253,6 +253,16 @@ class WorstMode:
 
 
 @dataclass(frozen=True)
+class PartDamping:
+    """Loss factor η of a part and its 95 % interval, from the damping of the modes."""
+
+    part: str
+    loss_factor: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class RegionShare:
     """A part in the strain energy of the modes that still deviate.
 
@@ -330,6 +340,7 @@ class CalibrationStudy:
     sample : draws from the posterior; None where none were asked for
     articles : parameters of several articles fitted together; empty with one
     guidance : parts that a next calibration could free; None with fewer than three paired modes
+    damping : loss factors of the parts; empty without identified damping
     """
 
     identifiability: Identifiability = Identifiability()
@@ -344,3 +355,4 @@ class CalibrationStudy:
     sample: PosteriorSample | None = None
     articles: tuple[ArticleParameter, ...] = ()
     guidance: RegionsToFree | None = None
+    damping: tuple[PartDamping, ...] = ()

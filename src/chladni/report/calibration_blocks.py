@@ -52,6 +52,10 @@ _NO_REGION = (
     "No part that was held explains more of the deviations than one at random would: chladni "
     "diagnose looks for what is missing."
 )
+_LOSSES = (
+    "Fitted afterwards: 2 ζ of a paired mode is the sum of the loss factors, each times the "
+    "share of its part in the strain energy. An interval that reaches 0 does not show damping."
+)
 MOST_REGIONS = 12  # parts in the table
 
 
@@ -72,6 +76,7 @@ def study_sections(
         Section("Articles fitted together", _articles(study)),
         Section("Uncertainty of the values", [*_profiles(study), *_sample(study), *pictures]),
         Section("Regions to free next", [*_regions(study), *energy]),
+        Section("Damping of the parts", _damping(study)),
     ]
 
 
@@ -178,6 +183,13 @@ def _regions(study: CalibrationStudy) -> list[Block]:
     if not found.words:
         return [table, Text([_NO_REGION])]
     return [table, Text([_NEXT]), Code(found.words)]
+
+
+def _damping(study: CalibrationStudy) -> list[Block]:
+    """Loss factors of the parts."""
+    rows = [(d.part, number(d.loss_factor, 2), f"{number(d.low, 2)} to {number(d.high, 2)}")
+            for d in study.damping]  # fmt: skip
+    return [Table(("part", "loss factor", "95 %"), rows, ("part",), _LOSSES)] if rows else []
 
 
 def _share(x: float) -> str:

@@ -34,6 +34,7 @@ from ..search.articles import articles_together
 from ..search.basis_refinement import Refinement, refined
 from ..search.calibration import FULL, CalibrationSettings, calibration
 from ..search.compensation import compensating
+from ..search.damping_by_part import damping_by_part
 from ..search.deciding import decided
 from ..search.decision_in_words import concluded
 from ..search.diagnosis import Diagnosis
@@ -182,7 +183,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         if study is not None:
             rows, fit = result.frequencies, found.plain.fit
             next_ = regions_to_free(rows, stages.final.model, fit, study)
-            study = replace(study, compensating=reasons, guidance=next_)
+            lossy = damping_by_part(rows, stages.final.model)
+            study = replace(study, compensating=reasons, guidance=next_, damping=lossy)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen = known.screening
