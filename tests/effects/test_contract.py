@@ -30,7 +30,7 @@ from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.suspension import suspension
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.effects.user_parameters import user_parameter
-from chladni.effects.weld_patch import WeldPatch
+from chladni.effects.weld_patch import RigidPatch, WeldPatch
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import solved
 from chladni.geometry.refine import refined
@@ -143,8 +143,9 @@ def families(kind: type[Effect] = Effect) -> set[type[Effect]]:
 
 
 def test_every_family_is_held_to_the_contract(cases):
-    """Families that need more than a bare plate are in test_families, weld patches in their own."""
-    elsewhere = {family.effect for family in registry.BUILT_IN if family.needs} | {WeldPatch}
+    """Families that need more than a bare plate are in test_families, patches about joints in their own."""
+    elsewhere = {family.effect for family in registry.BUILT_IN if family.needs}
+    elsewhere |= {WeldPatch, RigidPatch}
     assert families() == {type(case.effect) for case in cases.values()} | elsewhere
 
 
