@@ -143,7 +143,7 @@ def families(kind: type[Effect] = Effect) -> set[type[Effect]]:
 
 
 def test_every_family_is_held_to_the_contract(cases):
-    """Families that need more than a bare plate are in test_families, patches about joints in their own."""
+    """Families that need more than a bare plate, and patches about joints, have own files."""
     elsewhere = {family.effect for family in registry.BUILT_IN if family.needs}
     elsewhere |= {WeldPatch, RigidPatch}
     assert families() == {type(case.effect) for case in cases.values()} | elsewhere
