@@ -1,8 +1,8 @@
 """Coverage of intervals and uniformity of the test of fit: truths drawn from the priors.
 
-If the likelihood is right, the posterior probability below the truth is uniform, for every value
-and for every combination of values (Talts et al. 2018, Validating Bayesian inference algorithms
-with simulation-based calibration, arXiv:1804.06788). p of the test of fit is uniform as well.
+If the likelihood is right, the posterior probability below the truth is uniform. So it is for every
+combination of values, and so is p of the test of fit. Source: Talts et al. 2018, Validating
+Bayesian inference algorithms with simulation-based calibration, arXiv:1804.06788.
 Articles whose values scatter less than the priors cannot show that: their intervals hold the truth
 too often.
 """

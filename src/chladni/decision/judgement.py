@@ -79,13 +79,12 @@ def apply_held_out(case: JudgedTable, decision: Decision) -> Decision:
     row = table.rows[decision.order[0]]
     due, gain, votes = decision.due, table.gain(row), row.held_out_votes()
     decision = replace(decision, votes=votes)
-    voted = case.evidence_suffices(gain, votes, due, table.poles)
-    if voted and not _fits_worse(row, rules.harm):
+    voted, worse = case.evidence_suffices(gain, votes, due, table.poles), _worse(row, rules.harm)
+    if voted and not worse:
         return replace(
             decision, verdict=row.verdict, reason=Reason.NAMED, named=True,
             steps=steps(decision, Step(Reason.HELD_OUT, row.key)),
         )  # fmt: skip
-    row.leaves()  # its sentence says Q with the effect
     why = Reason.AGAINST if any(g < 0 for g in votes.given) else Reason.TOO_LITTLE
     why = Reason.WORSE if voted else why
     refused = replace(
@@ -106,7 +105,7 @@ def apply_held_out(case: JudgedTable, decision: Decision) -> Decision:
     )  # fmt: skip
 
 
-def _fits_worse(row: Row, harm: float) -> bool:
+def _worse(row: Row, harm: float) -> bool:
     """True if the deck with an effect has a larger Q than the calibrated deck.
 
     Physics must not worsen the fitted data either. A fault of a few channels is compared on the

@@ -76,7 +76,7 @@ class WeldPatch(Effect):
 
 @dataclass(frozen=True, eq=False)
 class RigidPatch(WeldPatch):
-    """The same about the spiders of rigid elements: their reach in the sheet is a parameter."""
+    """A patch about the spiders of rigid elements, whose reach in the sheet is a parameter."""
 
     name = SPIDERS
     claim = "a rigid element holds more or less of the sheet than its grids"
@@ -143,7 +143,7 @@ def _welds(built: Structure) -> list[tuple[np.ndarray, np.ndarray]]:
 def spiders(assembly: Assembly) -> list[tuple[np.ndarray, np.ndarray]]:
     """Middle [m] and rows of the feet on shells of every RBE2 and RBE3 with two or more.
 
-    Those that tie a grid of a solid belong to welds and adhesive.
+    Spiders that tie a grid of a solid are left out: they belong to welds and adhesive.
     """
     out, solids = [], [np.unique(group.nodes) for group in assembly.solids]
     tied = np.concatenate([np.zeros(0, int), *solids])

@@ -11,13 +11,12 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ..effects.identified_damping import SCATTER
-from ..fem.energy import part_energies
 from ..fem.modelled import Modelled
 from ..inference.calibration_result import PartDamping
 from ..inference.result import FrequencyRow
+from .regions_to_free import ELSE, energy_shares
 
 LEAST = 0.01  # share of strain energy in its best mode below which a part is left out
-REST = "springs and bushes"
 
 
 def damping_by_part(rows: Sequence[FrequencyRow], model: Modelled) -> tuple[PartDamping, ...]:
@@ -36,10 +35,8 @@ def damping_by_part(rows: Sequence[FrequencyRow], model: Modelled) -> tuple[Part
     if not paired:
         return ()
     f, zeta = np.array(paired, dtype=float).T
-    at = np.abs(model.modes.frequency[:, None] - f).argmin(axis=0)
-    share = part_energies(model.structure, model.modes.shapes[:, at])
-    share = np.vstack([share, np.clip(1 - share.sum(axis=0), 0.0, 1.0)])
-    names = [*(part.name for part in model.assembly.parts), REST]
+    share = energy_shares(model, f)
+    names = [*(part.name for part in model.assembly.parts), ELSE]
     kept = np.flatnonzero(share.max(axis=1) > LEAST)
     if len(kept) > len(f):
         return ()

@@ -49,10 +49,7 @@ def regions_to_free(
     away = np.log([(r.after_hz or 0.0) / r.test_hz for r in paired])
     mac = np.array([1.0 if r.mac_after is None else r.mac_after for r in paired])
     worst = worst_modes(away, mac)
-    f = model.modes.frequency
-    at = [int(np.abs(f - (r.after_hz or 0.0)).argmin()) for r in paired]
-    share = part_energies(model.structure, model.modes.shapes[:, at])
-    share = np.vstack([share, np.clip(1 - share.sum(axis=0), 0.0, 1.0)])
+    share = energy_shares(model, np.array([r.after_hz for r in paired], dtype=float))
     change, removed = stiffness_for(share, away)
     parts = model.assembly.parts
     frozen = study.identifiability.frozen
@@ -76,6 +73,18 @@ def regions_to_free(
               for r, w in zip(paired, worst, strict=True) if not w),
         tuple(sorted(regions, key=lambda one: -one.removed)),
     )  # fmt: skip
+
+
+def energy_shares(model: Modelled, frequency: np.ndarray) -> np.ndarray:
+    """Share of every part, and of all else as ``ELSE``, in the strain energy (parts + 1, r).
+
+    Parameters
+    ----------
+    frequency : (r,)   of modes of the model; the nearest is taken [Hz]
+    """
+    at = np.abs(model.modes.frequency[:, None] - frequency).argmin(axis=0)
+    share = part_energies(model.structure, model.modes.shapes[:, at])
+    return np.vstack([share, np.clip(1 - share.sum(axis=0), 0.0, 1.0)])
 
 
 def worst_modes(away: np.ndarray, mac: np.ndarray) -> np.ndarray:
