@@ -49,8 +49,9 @@ _REGIONS = (
 )
 _NEXT = "Words for the next case.toml, in addition to the parameters that are free now:"
 _NO_REGION = (
-    "No part that was held explains more of the deviations than one at random would: chladni "
-    "diagnose looks for what is missing."
+    "No further part explains more of the deviations than one at random would. Parts that are "
+    "free, or frozen because the data do not know them, are left out. chladni diagnose looks for "
+    "what is missing."
 )
 _LOSSES = (
     "Fitted afterwards: 2 ζ of a paired mode is the sum of the loss factors, each times the "
