@@ -193,14 +193,14 @@ def discrepancy(data: Lines, state: State) -> Discrepancy:
 def _decomposed(W: np.ndarray) -> Discrepancy:
     if not W.size:  # no flexible mode of the model is near what was measured
         return Discrepancy(np.zeros((len(W), 0)), np.zeros(0))
-    if len(W) <= MOST_PAIRS:
-        s, U = sl.eigh(W @ W.T, overwrite_a=True, check_finite=False, driver="evd")
-    else:
+    within = len(W) <= min(W.shape[1], MOST_PAIRS)
+    if not within and W.shape[1] > MOST_PAIRS:
         W = W[:, np.argsort(-(W**2).sum(axis=0))[:MOST_PAIRS]]
-        s, V = sl.eigh(W.T @ W, overwrite_a=True, check_finite=False, driver="evd")
-        U = W @ (V / np.sqrt(np.maximum(s, 1e-300)))
+    gram = W @ W.T if within else W.T @ W
+    s, U = sl.eigh(gram, overwrite_a=True, check_finite=False, driver="evd")
     kept = s > CUT / FORMULATIONS.grid[-1] ** 2
-    return Discrepancy(np.ascontiguousarray(U[:, kept]), s[kept])
+    s, U = s[kept], U[:, kept]
+    return Discrepancy(np.ascontiguousarray(U if within else W @ (U / np.sqrt(s))), s)
 
 
 def curvature(data: Lines, state: State, delta: float = USUAL) -> np.ndarray:
