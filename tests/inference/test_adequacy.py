@@ -3,11 +3,20 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import binom, kstest
 
 from chladni.effects.effect import Effect
-from chladni.inference.adequacy import _drawn, _Linear, adequacy, at_least, of_poles, ranked
+from chladni.inference.adequacy import (
+    _along_lines,
+    _drawn,
+    _Linear,
+    adequacy,
+    at_least,
+    of_poles,
+    ranked,
+)
 from chladni.inference.hypothesis_fit import HypothesisFit, fitted
 from chladni.inference.map_fit import MassMeasurement, prior_residuals
 from chladni.inference.pole_data import Poles
@@ -39,6 +48,19 @@ def test_a_model_that_is_right_fits(reduced, damped):
     data, effects = damped
     truth = evaluate(reduced.model, effects, np.array([0.03, 0.0]))
     assert answered(reduced, replace(data, values=data.model(truth)), effects).passes
+
+
+@pytest.mark.parametrize(("share", "passes"), [(0.002, True), (0.15, True), (1.5, False)])
+def test_the_size_of_the_residual_refuses_where_it_is_too_large(reduced, damped, share, passes):
+    """Noise of the usual share of the spread fits, less does too; ten times as much does not."""
+    data, effects = damped
+    state = evaluate(reduced.model, effects, np.zeros(2))
+    H, rng = data.model(state), np.random.default_rng(4)
+    noise = _along_lines(rng.normal(size=(*H.shape, 2))) @ [1, 1j]
+    spread = np.minimum(data.allowing_errors(state).std(), 1.0)
+    found = answered(reduced, replace(data, values=H * 10 ** (share * spread * noise)), effects)
+    assert found.passes is passes
+    assert (found.p > 0.05) is (share == 0.15)
 
 
 def test_a_channel_of_another_structure_does_not_fit_and_is_named(reduced, damped):

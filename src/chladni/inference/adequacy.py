@@ -5,9 +5,13 @@ priors.  Each draw is fitted as the recording, and gives equal statistics.  The 
 of the recording's least likely statistic among those of the draws (Gelman, Meng and Stern 1996,
 Statistica Sinica 6, 733-807). The prior replaces the posterior, so p is uniform for a true model.
 
-A residual below that of the known errors is reported but refuses nothing: errors were overstated.
-A model does not fit if its form error is far beyond the differences between formulations.
-It does not fit either if its modal damping would scatter more than that of one structure.
+The spread of independent samples exceeds the error of an identified response. Right models leave
+only a share of it, which differs between articles, channels and lines. The draws have shares and
+form errors of the size that right models of other articles have.
+
+A residual that is smaller than that of right models is reported, but refuses nothing.
+A model does not fit if its form error is far beyond that of right models. It does not fit either if
+its modal damping would scatter more than that of one structure.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +23,7 @@ from scipy.stats import norm
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
-from .discrepancy import RIGID, Discrepancy, learned
+from .discrepancy import LEARNED, RIGID, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Responses
 from .map_fit import MassMeasurement, prior_residuals, unknowns
@@ -30,6 +34,10 @@ from .whitening import Span, Whitening
 LEAST_P = 0.01  # p below which an explanation does not fit
 DRAWS = 300
 ALIKE = 0.88  # correlation of noise on neighbouring lines, where no span says it
+# Residuals of right models over the spread of samples: median share, and sd of its ln between
+# articles, and between the channels and the lines of one. On 40 articles by two other codes the
+# median is 0.15, sd 0.35; on tuning seeds 580-581 the channels differ by 0.6, the lines by 0.5.
+SHARE, OF_ARTICLES, OF_CHANNELS, OF_LINES = 0.15, 0.35, 0.6, 0.5
 BELOW = 0.7  # of the first flexible mode: what rings lower swings on its suspension
 
 
@@ -62,15 +70,22 @@ class _Linear:
         return None if self.known is None else self.known.span
 
     def noise(self, rng: np.random.Generator) -> np.ndarray:
-        """Noise of unit variance (n,): white in the space of the data.
+        """Errors (n,) in units of the spread: white in the space of the data, of unit variance.
 
-        Without a span it is similar on neighbouring lines, because it passed through the modes.
+        Without a span they are a random share of the spread and similar on neighbouring lines,
+        because they passed through the modes. Each channel and each line has a size of its own.
         """
         if self.span is not None:
             return self.span.projected(rng.normal(size=len(self.J)))
-        fresh = np.sqrt(1 - ALIKE**2) * rng.normal(size=(*self.use.shape, self.inputs, 2))
-        fresh[0] /= np.sqrt(1 - ALIKE**2)
-        return np.moveaxis(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0)[self.use], -1, 0).ravel()
+        shape = *self.use.shape, self.inputs, 2
+        error, of_line = (
+            _along_lines(rng.normal(size=shape)),
+            _along_lines(rng.normal(size=shape[0])),
+        )
+        of_channel = rng.normal(size=(1, shape[1]))
+        size = OF_LINES * of_line[:, None] + OF_CHANNELS * of_channel - OF_LINES**2 - OF_CHANNELS**2
+        size = SHARE * np.exp(size + OF_ARTICLES * rng.normal())
+        return np.moveaxis((size[..., None, None] * error)[self.use], -1, 0).ravel()
 
     def misfit(self, error: Discrepancy, z: np.ndarray) -> float:
         """Mean square of the whitened residual z.
@@ -102,13 +117,20 @@ class _Linear:
         return np.array(values), square
 
 
+def _along_lines(z: np.ndarray) -> np.ndarray:
+    """White noise (n_f, ...) made similar on neighbouring lines; its variance stays one."""
+    scale = np.sqrt(1 - ALIKE**2)
+    fresh = np.concatenate([z[:1], scale * z[1:]])
+    return np.asarray(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0))
+
+
 STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
-TWO_SIDED = (0, 1)  # within a span: a fit better than its errors allow has wrong errors
+TWO_SIDED = (0, 1)  # a fit better than those of right models has overstated errors
 NAMES = (
-    "the form error must be {0:.1%}; formulations of one structure differ by 0.3 to 4 %",
-    "the residual is {2:.1f} times that of the known errors",
-    "the residual of one spectral line is {2:.1f} times that of the known errors",
-    "the residual of one channel is {2:.1f} times that of the known errors",
+    "the form error must be {0:.1%}; right models have {1:.1%}",
+    "the residual is {2:.1f} times as large as a right model leaves",
+    "the residual of one spectral line is {2:.1f} times as large as a right model leaves",
+    "the residual of one channel is {2:.1f} times as large as a right model leaves",
 )
 
 
@@ -140,7 +162,7 @@ def adequacy(
     rng = np.random.default_rng(20250103)
     sd = np.array([p.sd for p in unknowns(fit.effects)])
     own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
-    p, least, better = ranked(seen, np.array(own), TWO_SIDED if model.span else ())
+    p, least, better = ranked(seen, np.array(own), TWO_SIDED)
     where, worst = _where(data, square, labels)
     ranges = np.quantile(own, (0.5, 0.005, 0.995), axis=0).T
     rows = tuple(
@@ -224,7 +246,7 @@ def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator)
     """Statistics of a recording drawn from the model: x at its prior mean, the truth drawn."""
     dx = sd * rng.normal(size=len(sd))
     error = model.error
-    delta = error.prior.drawn(rng)
+    delta = LEARNED.drawn(rng)
     r = delta * error.U @ (np.sqrt(error.s) * rng.normal(size=len(error.s)))
     r = r + model.noise(rng) - model.J @ dx
     r0 = np.zeros(known)
