@@ -2,12 +2,14 @@
 
 from dataclasses import fields, replace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from chladni.decision.decide import RULES, decide
-from chladni.decision.decision_rules import TIED, DecisionRules, gain_due
+from chladni.decision.decision_rules import TIED, DecisionRules, gain_due, odds_of_something_else
 from chladni.decision.hypothesis_table import (
     NULL,
     AlternativeRow,
@@ -130,6 +132,20 @@ def test_what_a_material_has_as_a_rule_needs_less():
     for expected, name in ((True, "orthotropic-material"), (False, "")):
         made = table(row("orthotropic-material", TIED + 1, votes=Votes(), expected=expected))
         assert named(made) == name
+
+
+def test_something_else_wins_from_its_own_odds():
+    """No test leaves the prior; the bound grows as p falls; the prior decides where it is even."""
+    prior = RULES.something_else
+    odds = [odds_of_something_else(p, prior) for p in (0.3, 0.1, 0.02, 0.009, 1e-6, 0.0)]
+    assert odds == sorted(odds)
+    assert_allclose(odds_of_something_else(1 / np.e, prior), prior)
+    assert odds_of_something_else(np.nan, prior) == prior
+    assert odds[2] < 1 < odds[3]
+    row = Row("x", ("x",), 0.0, p=0.02)
+    assert row.fits(RULES)
+    assert not row.fits(replace(RULES, something_else=1.0))
+    assert not replace(row, p_damping=1e-4).fits(RULES)
 
 
 def test_what_leaves_more_than_its_own_draws_is_not_named():

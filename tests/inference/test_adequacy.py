@@ -60,6 +60,7 @@ def test_the_size_of_the_residual_refuses_where_it_is_too_large(reduced, damped,
     spread = np.minimum(data.allowing_errors(state).std(), 1.0)
     found = answered(reduced, replace(data, values=H * 10 ** (share * spread * noise)), effects)
     assert found.passes is passes
+    assert (found.against > 0.05) is passes
     assert (found.p > 0.05) is (share == 0.15)
 
 

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from .answer import with_numbers, with_ties
 from .decision_rules import DecisionRules
-from .hypothesis_table import NULL, HypothesisTable, Missing, Row, Wanted
+from .hypothesis_table import NULL, HypothesisTable, Missing, Row, Wanted, fits
 from .judgement import JudgedTable, apply_held_out, tested, untested
 from .named_sets import largest_named
 from .reasons import ALONE, Decision, Reason, Step, steps
@@ -171,5 +171,5 @@ def _against(case: JudgedTable, refused: Decision, following: Decision) -> Reaso
     Modal damping that follows the leader's change refutes a lossless rival.
     """
     (lead, *_), (alternative, *_) = case.rows(refused.order), case.rows(following.order)
-    follows = case.table.after(alternative, lead) < case.rules.fits_damping
+    follows = not fits(case.table.after(alternative, lead), case.rules)
     return Reason.DAMPING if follows else None

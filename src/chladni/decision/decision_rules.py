@@ -35,9 +35,10 @@ class DecisionRules:
     changed: float = _rule(
         6.0, 0.0, "gain of E, rho and t from which the deck counts as calibrated"
     )
-    fits: float = _rule(0.01, 0.0, "p below which an explanation does not fit")
-    fits_damping: float = _rule(
-        0.01, 0.0, "p below which damping follows an elastic change, which is then incomplete"
+    something_else: float = _rule(
+        1 / 8,
+        0.0,
+        "prior odds of a cause outside the catalogue: with p = 0.01 of the test of fit it is even",
     )
     enough_data: bool = _rule(
         True, False, "few modes or numbers name an effect only if no other is tied with it"
@@ -80,6 +81,21 @@ class DecisionRules:
 def rule(name: str) -> Field[Any]:
     """The field of a rule, with its purpose."""
     return next(f for f in fields(DecisionRules) if f.name == name)
+
+
+def odds_of_something_else(p: float, prior: float) -> float:
+    """Largest posterior odds of a cause outside the catalogue, from p of a test of fit.
+
+    For p < 1/e the Bayes factor against the tested hypothesis is 1 / (-e p ln p) at most (Sellke,
+    Bayarri and Berger 2001, The American Statistician 55, 62-71). NaN (no test) leaves the prior.
+
+    >>> round(odds_of_something_else(0.01, 1 / 8), 2), odds_of_something_else(0.5, 1 / 8)
+    (1.0, 0.125)
+    """
+    if not p < 1 / math.e:
+        return prior
+    p = max(p, 1e-300)
+    return prior / (-math.e * p * math.log(p))
 
 
 def gain_due(tried: int, chance: float) -> float:

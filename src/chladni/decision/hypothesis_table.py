@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from .decision_rules import DecisionRules, gain_due
+from .decision_rules import DecisionRules, gain_due, odds_of_something_else
 
 NULL = "calibration"  # key of the row without any effect
 
@@ -117,19 +117,14 @@ class Row:
         """The public verdict if the row is named."""
         return "missing physics" if self.physics else "measurement fault"
 
-    def fit(self, rules: DecisionRules) -> float:
-        """P of the test of fit, or of the damping test where that refuses with a smaller p."""
+    def fits(self, rules: DecisionRules) -> bool:
+        """True if it is more probable than a cause outside the catalogue, or has no test.
+
+        Modal damping that follows an elastic change is a second test of the same row.
+        """
         if self.p is None:
             raise Missing(Wanted(Ask.TEST, self.key))
-        follows = self.p_damping
-        if follows is None or not follows < min(self.p, rules.fits_damping):
-            return self.p
-        return follows
-
-    def fits(self, rules: DecisionRules) -> bool:
-        """True if the row fits, or if there is no test."""
-        p = self.fit(rules)
-        return not p < (rules.fits if p == self.p else rules.fits_damping)
+        return fits(self.p, rules) and (self.p_damping is None or fits(self.p_damping, rules))
 
     def held_out_votes(self) -> Votes:
         """The votes; raise ``Missing`` if they are not known."""
@@ -264,6 +259,14 @@ class HypothesisTable:
     def having(self, *rows: Row) -> "HypothesisTable":
         """The table with some rows added or replaced."""
         return replace(self, rows={**self.rows, **{r.key: r for r in rows}})
+
+
+def fits(p: float, rules: DecisionRules) -> bool:
+    """True if a test of fit with this p leaves a cause outside the catalogue less than even odds.
+
+    NaN is no test.
+    """
+    return odds_of_something_else(p, rules.something_else) < 1
 
 
 def refined(key: str) -> str:

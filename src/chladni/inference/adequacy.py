@@ -51,6 +51,12 @@ class FitTest:
     where: str
     statistics: tuple[FitStatistic, ...] = ()
     modes_hz: tuple[float, ...] = ()  # natural frequencies nearest to what stands out
+    better: bool = False  # the least likely statistic is smaller than those of right models
+
+    @property
+    def against(self) -> float:
+        """P as evidence against the explanation: one where it fits better than right models do."""
+        return 1.0 if self.passes and self.better else self.p
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +177,8 @@ def adequacy(
     )
     usual = rows[least].median
     what = NAMES[least].format(seen[least], usual, seen[least] / usual)
-    test = FitTest(better or p >= LEAST_P, p, what, where, rows, _modes_near(worst, fit.state))
+    near = _modes_near(worst, fit.state)
+    test = FitTest(better or p >= LEAST_P, p, what, where, rows, near, better)
     if damping is not None:
         test = _evenly_damped(test, damping.above(_first(data, fit.state)))
     return test if coupling is None else _coupled_by_damping(test, coupling)

@@ -252,6 +252,7 @@ class Adequacy:
     what : the result in words
     where : places that do not fit
     statistics : what was compared
+    something_else : largest posterior odds of a cause outside the catalogue, by p
     """
 
     passes: bool
@@ -259,3 +260,4 @@ class Adequacy:
     what: str
     where: tuple[LeftPlace, ...] = ()
     statistics: tuple[FitStatistic, ...] = ()
+    something_else: float | None = None

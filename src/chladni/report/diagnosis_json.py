@@ -132,7 +132,7 @@ def _adequate(found: Adequacy) -> dict[str, Any]:
 def _read_adequate(d: Mapping[str, Any]) -> Adequacy:
     rows = tuple(_known(FitStatistic, row) for row in d.get("statistics") or ())
     where = tuple(_known(LeftPlace, _tuples(place)) for place in d.get("where") or ())
-    return Adequacy(d["passes"], d["p"], d["what"], where, rows)
+    return Adequacy(d["passes"], d["p"], d["what"], where, rows, d.get("something_else"))
 
 
 def from_json(d: Mapping[str, Any]) -> DiagnosisResult:

@@ -234,10 +234,18 @@ def _fits(test: Adequacy) -> str:
     if test.passes:
         return (
             f"passed: {number(100 * test.p, 2)} % of recordings of a right model have a residual "
-            "this large"
+            f"as unusual{_odds(test)}"
         )
     place = "; ".join(_spot(place) for place in test.where)
-    return f"failed: {test.what}{f' ({place})' if place else ''}"
+    return f"failed: {test.what}{f' ({place})' if place else ''}{_odds(test)}"
+
+
+def _odds(test: Adequacy) -> str:
+    """Odds of a cause outside the catalogue, where they are known."""
+    if (odds := test.something_else) is None:
+        return ""
+    ratio = f"{number(odds, 2)} : 1" if odds >= 1 else f"1 : {number(1 / odds, 2)}"
+    return f"; odds of a cause outside the catalogue: at most {ratio}"
 
 
 def _spot(place: LeftPlace) -> str:

@@ -102,7 +102,7 @@ class DecisionWords:
         if test is None:
             return ""
         note = (
-            f"{test.p:.0%} of recordings drawn from the model fit no better than {name}: "
+            f"{test.p:.0%} of recordings drawn from a right model are as unusual with {name}: "
             f"{test.what}"
         )
         if test.passes:

@@ -20,7 +20,7 @@ from ..decision.hypothesis_table import NULL, HypothesisTable, Row, Wanted
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
-from ..inference.adequacy import LEAST_P, FitTest, adequacy
+from ..inference.adequacy import FitTest, adequacy
 from ..inference.discrepancy import MEDIAN
 from ..inference.hypothesis_fit import (
     CLOSE,
@@ -236,8 +236,7 @@ def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
     if fits is None:
         return FitChances(None, np.nan, np.nan)
     both = damping_test_along_effect(fits, winner, damping)
-    p = max(fits.p, LEAST_P) if fits.passes else fits.p  # too good a fit refuses nothing
-    return FitChances(both, p, both.p if both.p != fits.p else np.nan)
+    return FitChances(both, fits.against, both.p if both.p != fits.p else np.nan)
 
 
 def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:

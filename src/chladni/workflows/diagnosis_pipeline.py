@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..case import Case
+from ..decision.decide import RULES
+from ..decision.decision_rules import odds_of_something_else
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
 from ..errors import FileError, LabelError, ModelError
@@ -349,7 +351,8 @@ def _adequate(found: Diagnosis, spot: ResidualLocalisation | None) -> Adequacy |
     if spot is not None:
         place = replace(place, parts=spot.parts, grid=spot.grid, point_m=spot.point_m)
     where = () if test.passes else (place,)
-    return Adequacy(test.passes, test.p, test.what, where, test.statistics)
+    odds = odds_of_something_else(test.against, RULES.something_else)
+    return Adequacy(test.passes, test.p, test.what, where, test.statistics, odds)
 
 
 def _article_mass(question: Question, stages: UpdatedModels, deck: HypothesisFit) -> float:
