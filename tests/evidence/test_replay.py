@@ -50,7 +50,7 @@ def test_a_rule_is_worth_what_it_changes():
     truths = [{"effect": e} for e in ("crack", "point-mass", "nothing")]
     said = decide(made)
     cases = [RecordedCase(t["effect"], t, made, said.verdict, (), said.one_of) for t in truths]
-    (worth,) = [w for w in ablated(cases) if w.name == "fits"]
+    (worth,) = [w for w in ablated(cases) if w.name == "something_else"]
     assert worth.changed == ("crack", "point-mass", "nothing")
     assert (worth.saves, worth.spoils, worth.open) == ((), ("crack",), ())
     quiet = replace(cases[2], table=table(row("crack", 8.0)))
