@@ -19,12 +19,7 @@ from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
 from .interval_evidence import interval_evidence
-from .record import record
-from .recorded_case import read_case
 from .recovery import recovery
-from .replay import case_lines, likelihood_lines, narrower, rule_lines
-from .screening_evidence import TIMES
-from .screening_faults import FAULTS, tally
 from .thesis import SIZE, regenerate
 
 
@@ -48,14 +43,6 @@ def _run(options: argparse.Namespace) -> int:
     make(orders, options.out, purpose(seeds), options.set, options.workers, _say)
     run(options.out, options.workers, _say, options.limit)
     score([options.out], _say)
-    return 0
-
-
-def _screened(options: argparse.Namespace) -> int:
-    """Print the table of the screening: outcomes by fault."""
-    kinds = [k for k in FAULTS if not options.faults or k in options.faults.split(",")]
-    for name, count in tally(_seeds(options), kinds, _say, options.long).items():
-        _say(f"{name:24} " + ", ".join(f"{said} {n}" for said, n in sorted(count.items())))
     return 0
 
 
@@ -83,23 +70,6 @@ def _thesis(options: argparse.Namespace) -> int:
     return 0
 
 
-def _recorded(options: argparse.Namespace) -> int:
-    """Diagnose cases once, and keep the rows of their decisions."""
-    record(options.case, options.out, _say)
-    return 0
-
-
-def _replayed(options: argparse.Namespace) -> int:
-    """Decide recorded cases again, with all rules and without each of them."""
-    cases = [read_case(path) for path in options.file]
-    lines = [*case_lines(cases), "", *rule_lines(cases)]
-    if options.noise != 1.0 or options.floor is not None:
-        lines = likelihood_lines(cases, narrower(options.noise, options.floor))
-    for text in lines:
-        _say(text)
-    return 0
-
-
 def _recovered(asked: argparse.Namespace) -> int:
     """Calibrate articles of known values; print the coverage of the intervals."""
     asked.out.mkdir(parents=True, exist_ok=True)
@@ -114,8 +84,7 @@ def _covered(options: argparse.Namespace) -> int:
 
 
 COMMANDS = {
-    "run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
-    "record": _recorded, "replay": _replayed,
+    "run": _run, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
     "recovery": _recovered, "intervals": _covered,
 }  # fmt: skip
 
@@ -130,10 +99,6 @@ def _seeds(options: argparse.Namespace) -> range:
 def _parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="chladni_evidence", description=__doc__)
     commands = top.add_subparsers(required=True, dest="command")
-    screen = commands.add_parser("screen", help="rates of named faults and of false alarms")
-    screen.add_argument("--seeds", required=True, help="first and last, as 600-649")
-    screen.add_argument("--faults", default="", help="only these, with commas")
-    screen.add_argument("--long", action="store_true", help=f"{TIMES} times as many lines")
     fuzzed = commands.add_parser(
         "fuzz", help="damaged inputs: each must give a sentence or a result"
     )
@@ -163,15 +128,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     covered.add_argument("--seeds", required=True, help="first and last, as 600-607")
     covered.add_argument("--out", type=Path, required=True)
-    kept = commands.add_parser(
-        "record", help="diagnose cases once, and keep the data of their decisions"
-    )
-    kept.add_argument("case", type=Path, nargs="+", help="a case folder")
-    kept.add_argument("--out", type=Path, required=True, help="a folder for one file a case")
-    again = commands.add_parser("replay", help="decide recorded cases again, and without each rule")
-    again.add_argument("--noise", type=float, default=1.0, help="times the noise of the responses")
-    again.add_argument("--floor", type=float, help="unexplained standard deviation [decades]")
-    again.add_argument("file", type=Path, nargs="+", help="files written by record")
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

@@ -1,6 +1,6 @@
 """Every rule between the last fit and the verdict: a number, and its value with the rule off.
 
-``replay`` switches them off one at a time. The numbers are those of ``docs/method.md``.
+The numbers are those of ``docs/method.md``.
 """
 
 import math
