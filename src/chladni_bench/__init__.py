@@ -36,7 +36,6 @@ from .sine_schedule import Stage as Stage
 from .sine_schedule import dwells_of as dwells_of
 from .sine_schedule import stage_lines as stage_lines
 from .sine_schedule import stages_for as stages_for
-from .sine_schedule import stepped_sine_time as stepped_sine_time
 from .sine_sweep import swept as swept
 
 __all__ = [
@@ -73,7 +72,6 @@ __all__ = [
     "recorded",
     "stage_lines",
     "stages_for",
-    "stepped_sine_time",
     "swept",
     "true_places",
     "virtual_test",

@@ -43,11 +43,6 @@ def stage_lines(stages: Sequence[Stage]) -> np.ndarray:
     return np.r_[np.concatenate([s.lines() for s in stages]), float(stages[-1].high)]
 
 
-def stepped_sine_time(stages: Sequence[Stage], sweeps: int = 1) -> float:
-    """Duration Σ (delay + measure) / f over all lines and sweeps [s]."""
-    return float(sweeps * sum(d.seconds for d in dwells_of(stages)))
-
-
 @dataclass(frozen=True)
 class SineLine:
     """One line: frequency [Hz], cycles to wait, cycles to measure, share of the level."""

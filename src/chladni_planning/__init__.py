@@ -33,14 +33,10 @@ from .layouts.exchange import best_layout as best_layout
 from .layouts.exchange import exchange as exchange
 from .layouts.information import Candidates as Candidates
 from .layouts.information import candidates as candidates
-from .layouts.information import expected_posterior as expected_posterior
 from .layouts.information import independence as independence
-from .layouts.information import information_entropy as information_entropy
 from .layouts.information import log_det_fisher as log_det_fisher
-from .layouts.information import sensitivity_rows as sensitivity_rows
 from .layouts.information import value as value
 from .layouts.layout_quality import Move as Move
-from .layouts.layout_quality import kinetic_energy as kinetic_energy
 from .layouts.layout_quality import loaded_frequency as loaded_frequency
 from .layouts.layout_quality import overlap as overlap
 from .layouts.layout_quality import visibility as visibility
@@ -52,13 +48,11 @@ from .layouts.layout_search import evolved as evolved
 from .layouts.layout_walk import Walk as Walk
 from .measurement_lines import burst_random_time as burst_random_time
 from .measurement_lines import delay_at as delay_at
-from .measurement_lines import delay_cycles as delay_cycles
 from .measurement_lines import even_lines as even_lines
 from .measurement_lines import half_bandwidth as half_bandwidth
 from .measurement_lines import lines_for_poles as lines_for_poles
 from .measurement_lines import lines_per_bandwidth as lines_per_bandwidth
 from .measurement_lines import lines_time as lines_time
-from .measurement_lines import transient_left as transient_left
 from .parameter_information import Linearised as Linearised
 from .plan_summary import sensors_csv as sensors_csv
 from .plan_summary import summary as summary
@@ -97,7 +91,6 @@ __all__ = [
     "condition",
     "controllability_gramian",
     "delay_at",
-    "delay_cycles",
     "deletion",
     "distinct",
     "driving_point_residue",
@@ -106,7 +99,6 @@ __all__ = [
     "evolved",
     "excess",
     "exchange",
-    "expected_posterior",
     "find_sensor_candidates",
     "first_max",
     "first_min",
@@ -116,8 +108,6 @@ __all__ = [
     "half_bandwidth",
     "hankel_values",
     "independence",
-    "information_entropy",
-    "kinetic_energy",
     "likeness",
     "lines_for_poles",
     "lines_per_bandwidth",
@@ -136,13 +126,11 @@ __all__ = [
     "ranked_actuators",
     "rattle_margin",
     "seen_at",
-    "sensitivity_rows",
     "sensors_csv",
     "shaking",
     "summary",
     "target_modes",
     "too_near",
-    "transient_left",
     "value",
     "visibility",
     "with_visible_modes",

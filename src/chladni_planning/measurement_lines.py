@@ -73,16 +73,6 @@ def burst_random_time(resolution: float, averages: int) -> float:
     return averages / resolution
 
 
-def delay_cycles(damping: np.ndarray | float, residual: float = 0.01) -> np.ndarray:
-    """Cycles N after which a transient at resonance has decayed to e^(-2πζN) = residual."""
-    return np.ceil(-np.log(residual) / (2 * np.pi * np.asarray(damping)))
-
-
-def transient_left(damping: np.ndarray | float, cycles: np.ndarray | float) -> np.ndarray:
-    """Share e^(-2πζN) of a transient at resonance that is left after N cycles."""
-    return np.exp(-2 * np.pi * np.asarray(damping) * np.asarray(cycles))
-
-
 def delay_at(
     lines: np.ndarray, frequency: np.ndarray, damping: np.ndarray, residual: float = 0.01
 ) -> np.ndarray:

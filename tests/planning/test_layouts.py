@@ -15,13 +15,10 @@ from chladni_planning import (
     deletion,
     effective_independence,
     exchange,
-    expected_posterior,
     greedy,
     independence,
-    information_entropy,
     log_det_fisher,
     qr_ranking,
-    sensitivity_rows,
     too_near,
     value,
 )
@@ -332,13 +329,12 @@ def test_layout_for_parameters():
     """Blocks of FRF sensitivities: the information of a layout is Σ Re JᴴJ, and D-optimal."""
     rng = np.random.default_rng(3)
     J = rng.normal(size=(20, 8, 3)) + 1j * rng.normal(size=(20, 8, 3))
-    c = candidates(sensitivity_rows(J, 0.1))
+    c = candidates(np.moveaxis(np.concatenate([J.real, J.imag]) / 0.1, 1, 0)[None])
     kept = np.array([1, 4])
     direct = sum(np.real(J[:, i].conj().T @ J[:, i]) for i in kept) / 0.01
     np.testing.assert_allclose(c.fisher(kept)[0], direct)
     best = best_of_all(J[0], 2, lambda s: value("D", c.fisher(np.array(s))))
     assert np.isclose(value("D", c.fisher(best_layout(c, 2))), best)
-    np.testing.assert_allclose(expected_posterior(c, kept), np.sqrt(np.diag(np.linalg.inv(direct))))
 
 
 def test_greedy_starts_as_pivoted_qr():
@@ -347,13 +343,6 @@ def test_greedy_starts_as_pivoted_qr():
     equal = shapes / np.linalg.norm(shapes, axis=0)
     np.testing.assert_array_equal(greedy(shapes, 9)[:5], qr_ranking(equal)[:5])
     np.testing.assert_array_equal(greedy(shapes, 9), greedy(equal, 9))
-
-
-def test_entropy_is_that_of_the_normal():
-    F = np.diag([4.0, 0.25])
-    assert np.isclose(
-        information_entropy(F), np.log(2 * np.pi * np.e) - np.log(np.linalg.det(F)) / 2
-    )
 
 
 @settings(max_examples=40, deadline=None)

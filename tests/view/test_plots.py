@@ -30,7 +30,6 @@ PLOTS = {  # name: the drawing, and words that must stand on it
         lambda p: plots.frf_grid(p, {f"{k}:+Z": CURVES for k in range(3)}),
         ("0:+Z", "2:+Z", "frequency [Hz]", *CURVES),
     ),
-    "nyquist": (lambda p: plots.nyquist(p, CURVES, unit="[m/N]"), ("Re H [m/N]", "Im H [m/N]")),
     "frequency_ladder": (
         lambda p: plots.frequency_ladder(p, R, 0.9 * R, R * [1, np.nan, 1.01]), ("30", "%"),
     ),
@@ -58,10 +57,6 @@ PLOTS = {  # name: the drawing, and words that must stand on it
     ),
     "waterfall": (
         lambda p: plots.waterfall(p, {"nominal": 0.2, "with": 0.01}, 0.005), ("nominal", "Q"),
-    ),
-    "deviation_map": (
-        lambda p: plots.deviation_map(p, np.eye(2), ["1:+Z", "2:+Z"], ["0-50", "50-100"]),
-        ("1:+Z", "50-100", "Q"),
     ),
     "sine_schedule": (
         lambda p: bench_plots.sine_schedule(

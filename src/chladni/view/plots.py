@@ -91,20 +91,6 @@ def frf_grid(
     return save(figure, path)
 
 
-def nyquist(path: Path | str, curves: Curves, title: str = "", unit: str = "") -> Path:
-    """Plot imaginary over real part, where a mode is a circle."""
-    figure = Figure(figsize=(5.2, 5.0), layout="constrained")
-    ax = figure.subplots()
-    for k, (name, (_, H)) in enumerate(curves.items()):
-        ax.plot(np.real(H), np.imag(H), label=name, **_style(name, k))
-    ax.axhline(0, color="#999999", lw=0.6)
-    ax.axvline(0, color="#999999", lw=0.6)
-    ax.set(xlabel=f"Re H {unit}", ylabel=f"Im H {unit}", aspect="equal")
-    ax.set_title(title, loc="left", **TITLE)
-    ax.legend(**LEGEND)
-    return save(figure, path)
-
-
 def frequency_ladder(
     path: Path | str, test: np.ndarray, before: np.ndarray, after: np.ndarray | None = None
 ) -> Path:
@@ -224,22 +210,6 @@ def waterfall(
         ax.annotate(of, (len(Q) - 0.5, floor), ha="right", va="bottom", fontsize=8)
     ax.set(ylabel="Q", ylim=(0, 1.22 * float(Q.max(initial=0.0)) or 1.0))
     ax.spines[["top", "right"]].set_visible(False)
-    return save(figure, path)
-
-
-def deviation_map(
-    path: Path | str, Q: np.ndarray, channels: Sequence[str], bands: Sequence[str], title: str = ""
-) -> Path:
-    """Plot the deviation per channel (rows) and band (columns)."""
-    figure = Figure(
-        figsize=(0.7 * len(bands) + 2.4, 0.24 * len(channels) + 1.4), layout="constrained"
-    )
-    ax = figure.subplots()
-    shown = ax.imshow(Q, cmap="magma_r", aspect="auto", vmin=0)
-    ax.set_xticks(range(len(bands)), bands, rotation=45, fontsize=8)
-    ax.set_yticks(range(len(channels)), channels, fontsize=7)
-    ax.set_title(title, loc="left", **TITLE)
-    figure.colorbar(shown, ax=ax, label="Q")
     return save(figure, path)
 
 

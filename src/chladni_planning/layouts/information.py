@@ -292,38 +292,3 @@ def combined(E: np.ndarray) -> np.ndarray:
         return E[0]
     with np.errstate(divide="ignore"):
         return -np.expm1(np.log1p(-np.minimum(E, 1.0)).mean(axis=0))
-
-
-def information_entropy(F: np.ndarray) -> float:
-    """Entropy h = p/2 ln(2πe) - 1/2 ln det F: the remaining uncertainty of p unknowns [nat].
-
-    Papadimitriou (2004), J. Sound and Vibration 278, 923-947.
-    """
-    p = F.shape[-1]
-    return p / 2 * np.log(2 * np.pi * np.e) - value("D", F.reshape(-1, p, p)) / 2
-
-
-def expected_posterior(c: Candidates, kept: np.ndarray) -> np.ndarray:
-    """Standard deviation √diag(F⁻¹) the unknowns will have after the test, worst draw (p,)."""
-    C = np.linalg.inv(_regular(c.fisher(positions_of(kept, len(c)))))
-    return np.sqrt(np.diagonal(C, axis1=1, axis2=2)).max(axis=0)
-
-
-def sensitivity_rows(jacobian: np.ndarray, noise: np.ndarray | float = 1.0) -> np.ndarray:
-    """Rows (1, n_out, min(rows, p), p) of parameter information A_iᵀA_i = Σ Re(Jᴴ Σ⁻¹ J).
-
-    Parameters
-    ----------
-    jacobian : (n_freq, n_out, ..., p) complex or real
-        Sensitivity of the response at each output to each parameter (the parameters scaled by
-        their prior spread, so that they may be compared).
-    noise : standard deviation of real and imaginary part; broadcasts to (n_freq, n_out, ...)
-
-    Notes
-    -----
-    Every block is shrunk to p rows by QR, which keeps A_iᵀA_i.
-    """
-    J = np.moveaxis(jacobian / np.expand_dims(noise, -1), 1, 0)
-    J = J.reshape(J.shape[0], -1, J.shape[-1])
-    J = np.concatenate([J.real, J.imag], axis=1) if np.iscomplexobj(J) else J
-    return np.asarray(np.linalg.qr(J, mode="r") if J.shape[1] > J.shape[2] else J)[None]

@@ -10,12 +10,6 @@ from .information import positions_of
 from .layout_rules import Rules
 
 
-def kinetic_energy(phi: np.ndarray, mass_times_phi: np.ndarray) -> np.ndarray:
-    """Share φ_ir (Mφ)_ir of each mode's kinetic energy at each dof (n, r); columns sum to 1."""
-    energy = np.asarray(phi) * np.asarray(mass_times_phi)
-    return energy / energy.sum(axis=0)
-
-
 def visibility(seen: np.ndarray, largest: np.ndarray) -> np.ndarray:
     """Largest motion the sensors see of each mode over its largest motion anywhere (r,) in [0, 1].
 
