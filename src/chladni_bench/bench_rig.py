@@ -182,8 +182,7 @@ def _hang(m: _Matrices, hangers: np.ndarray, cords: tuple[Cord, ...], first: int
             rows = np.zeros((1 + INNER, len(end)))
             rows[0] = end
             rows[1 + np.arange(INNER), at + np.arange(INNER)] = 1.0
-            found = cord_matrices(one, along=way == 0)
-            m.add(rows, found.M, found.C, found.K)
+            m.add(rows, *cord_matrices(one, along=way == 0))
             at += INNER
 
 

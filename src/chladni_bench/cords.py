@@ -58,21 +58,12 @@ def cords_for(weight: float, number: int, rubber: bool = False) -> tuple[Cord, .
     return tuple(replace(c, damping=RUBBER) if rubber else c for c in bare)
 
 
-@dataclass(frozen=True, eq=False)
-class CordMatrices:
-    """M, C, K (1 + n, 1 + n) of a cord in one direction, over (its end, its inner modes)."""
+def cord_matrices(one: Cord, along: bool, inner: int = INNER) -> tuple[np.ndarray, ...]:
+    """M, C, K (1 + n, 1 + n) of a cord in one direction, over its end and its inner modes.
 
-    M: np.ndarray
-    C: np.ndarray
-    K: np.ndarray
-
-
-def cord_matrices(one: Cord, along: bool, inner: int = INNER) -> CordMatrices:
-    """A line held at the top: its straight shape s/L and sin(nπs/L) (Craig and Bampton 1968).
-
-    Across its axis it is a string (k = T/L), along its axis a bar (k its stiffness). M is m/3 for
-    the end, m/2 for a mode and m (-1)ⁿ⁺¹/(nπ) between them. K is k for the end and k (nπ)²/2 for a
-    mode.
+    A line held at the top has the shapes s/L and sin(nπs/L) (Craig and Bampton 1968). Across its
+    axis it is a string (k = T/L), along its axis a bar (k its stiffness). M is m/3 for the end, m/2
+    for a mode and m (-1)ⁿ⁺¹/(nπ) between them. K is k for the end and k (nπ)²/2 for a mode.
     """
     k = one.stiffness if along else one.tension / one.length
     n = np.arange(1, inner + 1)
@@ -81,4 +72,4 @@ def cord_matrices(one: Cord, along: bool, inner: int = INNER) -> CordMatrices:
     M *= one.mass
     K = k * np.diag(np.r_[1.0, (n * np.pi) ** 2 / 2])
     omega = np.pi * np.sqrt(k / one.mass)  # its first resonance
-    return CordMatrices(M, 2 * one.damping / omega * K, K)
+    return M, 2 * one.damping / omega * K, K

@@ -3,7 +3,7 @@
 import io
 import json
 import wave
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -29,166 +29,14 @@ from chladni.workflows.loaded_model import Model, load_model
 from chladni_specimens import box, plate
 
 Files = Mapping[str, bytes]
-DECKS = {
-    "chain.bdf": """SOL 103
-CEND
-SPC = 1
-METHOD = 3
-BEGIN BULK
-EIGRL,3,,,4
-GRID,1,,0.,0.,0.
-GRID,2,,1.,0.,0.
-GRID,3,,2.,0.,0.
-GRID,4,,2.,1.,0.
-CELAS2,1,4000.,1,1,2,1
-CBUSH,2,7,2,3,,,,0
-PBUSH,7,K,1.+4,2.+4,3.+4,10.,20.,30.
-CDAMP2,3,2.0,2,1,3,1
-CONM2,4,2,,0.1,,,,,1.-4,,1.-4,,,1.-4
-CONM2,5,3,,0.2,,,,,1.-4,,1.-4,,,1.-4
-RBE2,6,3,123456,4
-CONM2,7,4,,0.05
-SPC1,1,123456,1
-SPC1,1,23456,2
-ENDDATA
-""",
-    "frame.bdf": """SOL 103
-CEND
-BEGIN BULK
-MAT1*                  12.1000000000+11                             3.0E-1
-*                  7850.
-PBAR,1,1,1.-4,1.-9,2.-9,2.-9
-PBEAML,2,1,,TUBE
-,.012,.010
-GRID    1               0.      0.      0.
-GRID    2               .2      0.      0.
-GRID    3               .4      0.      0.
-GRID    4               .4      .2      0.
-GRID    5               .4      .4      0.
-CBAR    1       1       1       2       0.      0.      1.
-CBAR    2       1       2       3       0.      0.      1.
-CBEAM   3       2       3       4       0.      0.      1.
-CBEAM   4       2       4       5       0.      0.      1.
-CONROD  5       1       5       1-1-4
-RBE3,7,,9,123456,1.,123,1,3
-,5
-GRID,9,,.2,.1,.1
-CONM2,8,9,,.3
-ENDDATA
-""",
-    "bricks.bdf": """BEGIN BULK
-CORD2R,3,,0.,0.,0.,0.,0.,1.
-,1.,0.,0.
-MAT1,1,7.+10,,.33,2700.
-PSOLID,1,1
-GRID,1,3,0.,0.,0.
-GRID,2,3,.1,0.,0.
-GRID,3,3,.1,.1,0.
-GRID,4,3,0.,.1,0.
-GRID,5,3,0.,0.,.1
-GRID,6,3,.1,0.,.1
-GRID,7,3,.1,.1,.1
-GRID,8,3,0.,.1,.1
-GRID,9,3,.05,.05,.2
-CHEXA,1,1,1,2,3,4,5,6
-,7,8
-CTETRA,2,1,5,6,7,9
-CTETRA,3,1,5,7,8,9
-SPC1,1,123,1,THRU,4
-MPC,2,9,1,1.,8,1,-1.
-ENDDATA
-""",
-    "sets.bdf": """SOL 103
-CEND
-TEMPERATURE(LOAD) = 4
-SPC = 7
-MPC = 8
-METHOD = 3
-BEGIN BULK
-EIGRL,3,,,4
-MAT1,1,7.+10,2.6316+10,.33,2700.
-MATT1,1,5
-TABLEM1,5
-,20.,7.+10,100.,6.5+10,ENDT
-TEMPD,4,80.
-PBARL,1,1,,BOX
-,.03,.02,.002,.003
-PBEAML,2,1,,I
-,.03,.02,.02,.002,.003,.003
-PBAR,3,1,1.-4,1.-9,2.-9,2.-9
-,,,,,,,,
-,,,.5-9
-GRID,1,,0.,0.,0.
-GRID,2,,.2,0.,0.
-GRID,3,,.4,0.,0.
-GRID,4,,.4,.2,0.
-CBAR,1,1,1,2,0.,0.,1.
-CBEAM,2,2,2,3,0.,0.,1.
-CBAR,3,3,3,4,0.,0.,1.
-CONM2,4,4,,.3
-,2.-4,.5-4,2.-4,,,3.-4
-PSOLID,9,1
-GRID,11,,0.,0.,.1
-GRID,12,,.1,0.,.1
-GRID,13,,0.,.1,.1
-GRID,14,,0.,0.,.2
-GRID,15,,.1,0.,.2
-GRID,16,,0.,.1,.2
-CPENTA,9,9,11,12,13,14,15,16
-SPC1,1,123456,1
-SPC1,2,123,11,12,13
-SPCADD,6,2
-SPCADD,7,1,6
-MPC,3,4,3,1.,3,3,-1.
-MPCADD,8,3
-ENDDATA
-""",
-}
+GIVEN = Path(__file__).parent / "sound"  # decks, a case, tables
 _SMALL = 60_000  # bytes of a deck of the user's that is taken
-SENSORS = ("label", "grid", "x", "y", "z", "direction", "role", "mass", "position_sd")
-
-
-CASE = """\
-[model]
-deck = "plate.bdf"
-units = "mm-t-s"
-damping = 0.01
-
-[test]
-recordings = ["frf.npz"]
-quantity = "accelerance"
-gain = "known"
-sensors = "sensors.csv"
-mass = 0.518
-mass_sd = 0.001
-hangers = [1, 49]
-
-[[recording]]
-file = "frf.uff"
-article = "B"
-level = 2.0
-
-[band]
-fit = [25.0, 170.0]
-exclude = [[49.0, 51.0]]
-
-[held_out]
-sensors = 2
-band = [150.0, 180.0]
-
-[[parameter]]
-name = "E of the sheet"
-field = "E"
-sd = 0.05
-low = 0.8
-high = 1.3
-"""
 
 
 @cache
 def sound_files(more: Path | None) -> dict[str, bytes]:
     """Sound files by name; ``more``: a folder whose small decks are taken as well."""
-    found = {name: text.encode() for name, text in DECKS.items()}
+    found = {p.name: p.read_bytes() for p in sorted(GIVEN.iterdir())}
     with TemporaryDirectory() as name:
         folder = Path(name)
         made = plate(0.3, 0.22, 6, 6, 1e-3)
@@ -205,14 +53,9 @@ def sound_files(more: Path | None) -> dict[str, bytes]:
         write_uff(folder / "frf.ufb", frf, places, binary=True)
         _write_meshes(folder, made)
         (folder / "modes.pch").write_text(_punched(model))
-        found |= {p.name: p.read_bytes() for p in folder.iterdir()}
-    found["poles.csv"] = b"mode,frequency_hz,frequency_sd_hz,damping\n" + b"".join(
-        b"%d,%.4f,0.05,0.01\n" % (k + 1, hz) for k, hz in enumerate((58.1, 91.3, 130.2, 155.7))
-    )
+        found |= {p.name: p.read_bytes() for p in sorted(folder.iterdir())}
     found["time.csv"] = _time_table()
-    found["run.wav"], found["run.channels.csv"] = _wav(), _WAV_TABLE.encode()
-    found["sensors.csv"] = _sensor_table(ends).encode()
-    found["case.toml"] = CASE.encode()
+    found["run.wav"] = _wav()
     found["diagnosis.json"] = json.dumps(plain(diagnosis_json(_finished())), indent=1).encode()
     paths = sorted(more.rglob("*")) if more else []
     for path in (p for p in paths if p.suffix in (".bdf", ".dat", ".nas") and p.is_file()):
@@ -315,9 +158,6 @@ def _punched(model: Model) -> str:
     return "".join(f"{line:<72}{k + 1:8d}\n" for k, line in enumerate(lines))
 
 
-_WAV_TABLE = "channel,label,unit,role,scale\n1,1:+Z,N,input,100\n2,2:+Z,m/s^2,output,50\n"
-
-
 def _wav() -> bytes:
     """A hammer blow and its answer in 16 bits, two channels."""
     t = np.arange(2048) / 2048.0
@@ -330,11 +170,6 @@ def _wav() -> bytes:
             file.setframerate(2048)
             file.writeframes((32767 * stereo).astype("<i2").tobytes())
         return out.getvalue()
-
-
-def _sensor_table(ends: Sequence[str]) -> str:
-    rows = [f"{e},{e.split(':')[0]},,,,+Z,output,0.001," for e in ends]
-    return "\n".join([",".join(SENSORS), *rows, "2:+Z,2,,,,+Z,input,,", ""])
 
 
 def _finished() -> DiagnosisResult:

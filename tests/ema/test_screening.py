@@ -7,7 +7,7 @@ import pytest
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.finding import Finding, Screening
-from chladni.ema.screening import homogeneity, levels_checked, roughness, runs, screen
+from chladni.ema.screening import homogeneity, levels_checked, roughness, runs
 from chladni.ema.setup import Recording
 from chladni.errors import ShapeError
 
@@ -27,34 +27,6 @@ def resonance(
     hiss = rng.normal(size=(2, *H.shape)) / np.sqrt(2)
     H = H + sd * (hiss[0] + 1j * hiss[1])
     return FRF(H, F, LABELS, ("9:+Z",), variance=sd**2 if given else None)
-
-
-def test_channels_that_cannot_be_used_are_named_with_the_reason() -> None:
-    H = resonance()
-    values, gamma = H.values.copy(), np.full(H.values.shape, 0.99)
-    values[:, 1] *= 1e-6
-    values[7, 2] = np.nan
-    gamma[:, 3] = 0.2
-    seen = screen(replace(H, values=values, coherence=gamma))
-    assert seen.outputs == ("0:+Z", "4:+Z")
-    assert [why.split()[0].strip(":") for why in seen.dropped.values()] == [
-        "dead",
-        "1",
-        "incoherent",
-    ]
-
-
-def test_bands_come_from_the_coherence_and_antiresonances_stay_in() -> None:
-    gamma = np.ones((400, 5, 1))
-    gamma[:20] = 0.3  # below 21 Hz the exciter gives nothing
-    gamma[199:202] = 0.1  # a narrow dip at 200 Hz
-    gamma[299:340] = 0.3  # a wide one
-    seen = screen(replace(resonance(), coherence=gamma))
-    assert seen.bands == ((21.0, 299.0), (340.0, 400.0)) or seen.bands == (
-        (21.0, 299.0),
-        (341.0, 400.0),
-    )
-    assert seen.lines[200]
 
 
 def test_noise_is_seen_in_the_roughness() -> None:

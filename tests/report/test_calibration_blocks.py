@@ -16,7 +16,8 @@ from chladni.inference.calibration_result import (
     WorstMode,
 )
 from chladni.report.blocks import Code, Table
-from chladni.report.calibration_blocks import read_study, study_json, study_sections
+from chladni.report.calibration_blocks import study_sections
+from chladni.report.typed_fields import as_data, made
 
 SAMPLE = PosteriorSample(
     (SampledParameter("E of a", "Pa", 2.0, 1.9, 2.1, 2.0, 1.9, 2.2, 0.9, 5.0, 900.0),),
@@ -35,7 +36,7 @@ STUDY = CalibrationStudy(sample=SAMPLE, articles=ARTICLES, guidance=NEXT)
 
 @pytest.mark.parametrize("study", [CalibrationStudy(), STUDY])
 def test_a_study_is_read_as_it_was_written(study):
-    assert read_study(json.loads(json.dumps(study_json(study)))) == study
+    assert made(CalibrationStudy, json.loads(json.dumps(as_data(study)))) == study
 
 
 def sections(study):

@@ -17,8 +17,7 @@ from chladni.report.diagnosis_json import diagnosis_json, from_json, read_diagno
 from chladni.report.page import write_page, write_sections
 from chladni.report.sentence import sentence
 from chladni.report.states_table import states_table
-from chladni.report.typed_fields import wrong_field
-from chladni.report.verdict import HEADING
+from chladni.report.verdict import HEADING, sections
 from chladni.view import plots
 from chladni.workflows.diagnosis_result import StateResult
 
@@ -225,18 +224,24 @@ def test_a_damaged_diagnosis_is_read_or_refused_in_a_sentence(tmp_path, bad):
         except FileError:
             refused += 1
         else:
-            assert wrong_field(found) == ""
+            assert sections(found, {}, (), (), "")
+            assert from_json(diagnosis_json(found)) is not None
     assert refused or bad is None
 
 
 def test_a_field_of_another_type_is_named():
-    assert wrong_field(RESULT) == ""
-    effect = replace(RESULT.effects[0], log_evidence="much")
-    found = wrong_field(replace(RESULT, effects=(effect,)))
-    assert found == "effects[0].log_evidence holds 'much'"
-    wrong = replace(RESULT.effects[0].where, parts=("a", 7))
-    found = wrong_field(replace(RESULT, effects=(replace(effect, log_evidence=1, where=wrong),)))
-    assert found == "effects[0].where.parts[1] holds 7"
+    effect = DIAGNOSIS["effects"][0]
+    wrong = {
+        "log_evidence holds 'much'": {"log_evidence": "much"},
+        "where.parts[1] holds 7": {"where": {"parts": ["a", 7]}},
+        "where.band_hz holds 1 values, 2 are due": {"where": {"band_hz": [1.0]}},
+        "where.grids[0] holds True": {"where": {"grids": [True]}},
+        "name is missing": {"name": None},
+    }
+    for said, other in wrong.items():
+        held = {k: v for k, v in (effect | other).items() if k != "name" or v}
+        with pytest.raises(ValueError, match=re.escape(f"effects[0].{said}")):
+            from_json({"effects": [held]})
 
 
 def test_values_that_the_deck_keeps_are_not_called_calibrated(tmp_path):

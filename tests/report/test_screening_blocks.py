@@ -1,12 +1,16 @@
 """What several recordings have in common is told once."""
 
+import json
+
 import numpy as np
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.finding import Check, Finding, Screening, notes_of_all, of_all
 from chladni.ema.setup import Recording
+from chladni.output import plain
 from chladni.report.blocks import Items, Table
-from chladni.report.screening_blocks import lead_of, screening_section
+from chladni.report.screening_blocks import lead_of, screening_json, screening_section
+from chladni.report.typed_fields import made
 from chladni.workflows.identify import _notes
 
 TURNED = Finding("reversed sign", "power comes out.", channels=("1:+Z",), repair="turn it")
@@ -34,6 +38,13 @@ def test_a_finding_of_all_is_one_sentence():
     first, second = notes_of_all(FOUR)
     assert first.endswith("Repair: turn it. (all 4 recordings)")
     assert second.endswith("levels differ. (a)")
+
+
+def test_a_screening_is_read_as_it_was_written():
+    """A check that was not possible among them."""
+    again = made(Screening, json.loads(json.dumps(plain(screening_json(FOUR[0])))))
+    assert again.checks == FOUR[0].checks
+    assert again.notes == FOUR[0].notes
 
 
 def test_one_recording_is_not_named_in_its_notes():

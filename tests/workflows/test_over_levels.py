@@ -13,6 +13,7 @@ from tests.builders.commands import call, ran, refused
 import chladni
 from chladni.dynamics.frf import FRF
 from chladni.ema.describing_functions import micro_slip
+from chladni.ema.level_table import LevelTable
 from chladni.fem.energy import part_energies
 from chladni.fem.modelled import modelled
 from chladni.inference.result import NamedEffect
@@ -20,7 +21,8 @@ from chladni.io.nastran import read_deck, write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.diagnosis_json import diagnosis_json, from_json
-from chladni.report.level_blocks import level_section, read_levels
+from chladni.report.level_blocks import level_section
+from chladni.report.typed_fields import made
 from chladni.search.question import Prepared, Question
 from chladni.workflows.diagnosis_result import DiagnosisResult, UpdatedModels
 from chladni.workflows.over_levels import over_levels
@@ -166,7 +168,7 @@ def test_a_table_holds_every_mode_at_every_level(identified):
             if name in row:
                 assert float(row[name]) == value
         assert float(row["damping_low"]) < float(row["damping"]) < float(row["damping_high"])
-    first, *others = read_levels(study)
+    first, *others = (made(LevelTable, t) for t in study)
     section = level_section([replace(first, rows=first.rows[1:]), *others], {})
     (table,) = [b for b in section.blocks if getattr(b, "columns", ("",))[-1] == "damping, 95 %"]
     assert len(table.rows) == len(LEVELS) * len(study)

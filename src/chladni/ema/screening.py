@@ -1,4 +1,4 @@
-"""Which lines and channels of a recording can be used, and whether the structure is linear."""
+"""Linearity of a structure, by recordings at several levels of excitation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,85 +15,6 @@ from .response_variance import moving_mean
 from .setup import Recording
 
 _LN10 = np.log(10.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Screened:
-    """Usable channels and lines after the screening.
-
-    Attributes
-    ----------
-    outputs : tuple of str     channels to use
-    dropped : {label: why}     channels not to use
-    lines : (n_f,) bool        lines to use
-    bands : ((low, high), ...)  [Hz], the runs of those lines
-    coherence : (n_f,) or None  median over the channels kept
-    """
-
-    outputs: tuple[str, ...]
-    dropped: dict[str, str]
-    lines: np.ndarray
-    bands: tuple[tuple[float, float], ...]
-    coherence: np.ndarray | None
-
-
-def screen(frf: FRF, least: float = 0.8, gap: float = 0.02) -> Screened:
-    """Remove dead, broken and incoherent channels, and lines of low median coherence.
-
-    Parameters
-    ----------
-    least : median coherence a line, or a channel over the lines, must reach
-    gap : runs of poor lines shorter than this share of their frequency stay in (anti-resonances
-        are incoherent by nature)
-    """
-    dropped = _dropped(frf, least)
-    kept = tuple(o for o in frf.outputs if o not in dropped)
-    if not kept or frf.coherence is None:
-        lines = (frf.frequency > 0) & bool(kept)
-        return Screened(kept, dropped, lines, runs(frf.frequency, lines), None)
-    seen = [o not in dropped for o in frf.outputs]
-    median = np.median(frf.coherence[:, seen], axis=(1, 2))
-    lines = _closed(frf.frequency, median >= least, gap) & (frf.frequency > 0)
-    return Screened(kept, dropped, lines, runs(frf.frequency, lines), median)
-
-
-def _dropped(frf: FRF, least: float) -> dict[str, str]:
-    """Why each unusable channel is unusable."""
-    rms = np.sqrt(np.nanmean(np.abs(frf.values) ** 2, axis=(0, 2), where=np.isfinite(frf.values)))
-    alive = rms[np.isfinite(rms) & (rms > 0)]
-    typical = np.median(alive) if len(alive) else 0.0
-    why = {}
-    for k, label in enumerate(frf.outputs):
-        broken = ~np.isfinite(frf.values[:, k])
-        if broken.any():
-            why[label] = f"{int(broken.sum())} values are not numbers"
-        elif rms[k] <= 1e-4 * typical:
-            why[label] = "dead: its level is below 1/10000 of the others'"
-        elif frf.coherence is not None and np.median(frf.coherence[:, k]) < 0.5 * least:
-            why[label] = f"incoherent: median coherence {np.median(frf.coherence[:, k]):.2f}"
-    return why
-
-
-def _closed(f: np.ndarray, good: np.ndarray, gap: float) -> np.ndarray:
-    """Good lines, with short poor runs between good ones filled."""
-    filled = good.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], good, [True]])))
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
-        inner = 0 < a and b < len(f)
-        if inner and f[b] - f[a - 1] <= gap * f[a]:
-            filled[a:b] = True
-    return filled
-
-
-def runs(f: np.ndarray, lines: np.ndarray) -> tuple[tuple[float, float], ...]:
-    """Runs of lines as bands [Hz]; single lines make none.
-
-    >>> runs(np.arange(6.0), np.array([0, 1, 1, 0, 1, 1], bool))
-    ((1.0, 2.0), (4.0, 5.0))
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], lines, [False]])))
-    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
-    return tuple((float(f[a]), float(f[b])) for a, b in pairs if b > a)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +114,17 @@ def _beyond(
     """
     limit = 1 + max(2 * _CHANCE, 5 / np.sqrt(lines))
     return tuple(outputs[k] for k in np.argsort(-moved, kind="stable") if ratio[k] > limit)
+
+
+def runs(f: np.ndarray, lines: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Runs of lines as bands [Hz]; single lines make none.
+
+    >>> runs(np.arange(6.0), np.array([0, 1, 1, 0, 1, 1], bool))
+    ((1.0, 2.0), (4.0, 5.0))
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lines, [False]])))
+    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
+    return tuple((float(f[a]), float(f[b])) for a, b in pairs if b > a)
 
 
 def _bands_beyond(f: np.ndarray, line: np.ndarray) -> tuple[tuple[float, float], ...]:

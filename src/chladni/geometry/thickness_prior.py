@@ -6,7 +6,7 @@ has its own strength from a distribution whose standard deviation is learned too
 errors give the accuracy on an unseen part.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -121,10 +121,3 @@ def predict(assembly: Assembly, model: ThinningModel) -> tuple[np.ndarray, np.nd
     t0 = gauge(assembly)
     sd = np.hypot(model.part_spread * thinning, model.place_spread)
     return t0 * (1 - thinning), t0 * sd
-
-
-def with_predicted(assembly: Assembly, model: ThinningModel) -> Assembly:
-    """Set the predicted thickness on every shell."""
-    t, _ = predict(assembly, model)
-    shells = replace(assembly.shells, thickness=np.repeat(t[:, None], 4, axis=1))
-    return replace(assembly, shells=shells)

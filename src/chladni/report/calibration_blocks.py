@@ -1,9 +1,7 @@
 """Tables of a calibration's page: information, basins, profiles; and ``calibration.json``."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
-from types import UnionType
-from typing import Any, TypeVar, get_args, get_type_hints
+from collections.abc import Sequence
+from typing import Any
 
 from ..inference.calibration_result import (
     ArticleParameter,
@@ -13,9 +11,9 @@ from ..inference.calibration_result import (
 )
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Items, Section, Table, Text
+from .typed_fields import as_data
 from .words import number, percent, quantity
 
-Made = TypeVar("Made")
 _NONE = "–"
 _FAR = 1.0  # standard deviation of ln value from which a parameter counts as unbounded
 _KNOWN = (
@@ -222,40 +220,11 @@ def _within(value: float, low: float, high: float, unit: str) -> str:
 
 
 def calibration_json(result: DiagnosisResult) -> dict[str, Any]:
-    """The contents of ``calibration.json``: values of the parameters, and :func:`study_json`."""
+    """The contents of ``calibration.json``: values of the parameters, and the study."""
     values = [
         {"where": c.where, **vars(c.estimate), "deck_value": c.deck_value,
          "written_value": c.written_value}
         for c in result.calibrated
     ]  # fmt: skip
-    mass = None if result.mass is None else vars(result.mass)
-    return {"values": values, "mass": mass, **(study_json(result.study) or {})}
-
-
-def study_json(study: CalibrationStudy | None) -> dict[str, Any] | None:
-    """Information, basins, covariance and profiles of a calibration; None after a diagnosis."""
-    return None if study is None else asdict(study)
-
-
-def read_study(found: Mapping[str, Any] | None) -> CalibrationStudy | None:
-    """Return the study of :func:`study_json`; missing fields keep their defaults."""
-    return None if found is None else _made(CalibrationStudy, found)
-
-
-def _made(kind: type[Made], found: Mapping[str, Any]) -> Made:
-    hints = get_type_hints(kind)
-    return kind(**{name: _typed(hints[name], v) for name, v in found.items() if name in hints})
-
-
-def _typed(hint: Any, value: Any) -> Any:
-    """A value of JSON in the type of its field: lists become tuples, objects dataclasses."""
-    if isinstance(hint, UnionType):  # a field that may be None
-        hint = get_args(hint)[0]
-    if is_dataclass(hint) and isinstance(value, Mapping):
-        return _made(hint, value)  # type: ignore[arg-type]
-    if not isinstance(value, list):
-        return value
-    inner = get_args(hint)
-    each = inner[:1] * len(value) if inner[-1:] == (Ellipsis,) else inner
-    pairs = zip(each, value, strict=False)
-    return tuple(_typed(h, v) for h, v in pairs) if each else tuple(value)
+    mass, study = as_data(result.mass), as_data(result.study)
+    return {"values": values, "mass": mass, **(study or {})}

@@ -1,15 +1,13 @@
-"""Modes over levels of excitation: tables and pictures of a page, JSON."""
+"""Modes over levels of excitation: tables and pictures of a page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..ema.finding import TINY
 from ..ema.level_study import CALM
-from ..ema.level_table import ElementNumber, LevelRow, LevelTable, TriedElement
+from ..ema.level_table import LevelRow, LevelTable
 from .blocks import Block, Items, Section, Table
 from .words import interval, number
 
@@ -179,23 +177,3 @@ def _columns(
     """Return value, spread and prediction (nan: none), each (k,)."""
     value, sd, foretold = np.array(rows, dtype=float).T
     return value, sd, foretold
-
-
-def level_json(tables: Sequence[LevelTable]) -> list[dict[str, Any]]:
-    """Convert tables to plain data."""
-    return [asdict(t) for t in tables]
-
-
-def read_levels(rows: Sequence[Mapping[str, Any]] | None) -> tuple[LevelTable, ...]:
-    """Read tables from their JSON."""
-    return tuple(_read(d) for d in rows or ())
-
-
-def _read(d: Mapping[str, Any]) -> LevelTable:
-    elements = tuple(
-        TriedElement(**{**e, "numbers": tuple(ElementNumber(**n) for n in e.get("numbers") or ())})
-        for e in d.get("elements") or ()
-    )
-    rows = tuple(LevelRow(**r) for r in d.get("rows") or ())
-    curve = tuple((float(a), float(f), float(z)) for a, f, z in d.get("curve") or ())
-    return LevelTable(**{**d, "rows": rows, "elements": elements, "curve": curve})

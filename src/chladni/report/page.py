@@ -63,7 +63,7 @@ def diagnosis_page(
     hero: Block | None = Picture(shown["where"]) if "where" in shown else None
     if "where" in drawings.by_name:
         hero = live("where", drawings.by_name["where"], shown)
-    return _page(
+    return page_text(
         title or "Diagnosis",
         sections(result, shown, notes, tables, command, drawings),
         lead=sentence(result),
@@ -88,15 +88,10 @@ def write_sections(
 
     ``drawings`` holds the numbers of the ``Live`` blocks.
     """
-    return write_text(path, _page(title, body, lead=lead, drawings=drawings))
+    return write_text(path, page_text(title, body, lead=lead, drawings=drawings))
 
 
-def sections_page(title: str, body: Sequence[Section], lead: str = "") -> str:
-    """One page of titled sections as text."""
-    return _page(title, body, lead=lead)
-
-
-def _page(
+def page_text(
     title: str,
     body: Sequence[Section],
     *,
@@ -108,7 +103,10 @@ def _page(
     steps: Sequence[str] = (),
     drawings: Drawings | None = None,
 ) -> str:
-    """HTML; hero, facts and steps are picture, numbers and next steps of the first screen."""
+    """One page of titled sections as HTML.
+
+    Hero, facts and steps are picture, numbers and next steps of the first screen.
+    """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(

@@ -17,9 +17,9 @@ from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
 from .diagnosis_json import diagnosis_json
-from .level_blocks import level_json
 from .other_modes_page import other_modes_json
 from .screening_blocks import screening_json
+from .typed_fields import as_data
 
 
 @singledispatch
@@ -70,7 +70,7 @@ def _(result: NormalModes) -> dict[str, Any]:
 def _(result: Identification) -> dict[str, Any]:
     held: dict[str, Any] = {"recordings": [_recording(r) for r in result.recordings]}
     if result.levels:
-        held["levels"] = [level_json(level_tables(study)) for study in result.levels]
+        held["levels"] = [as_data(level_tables(study)) for study in result.levels]
     return held
 
 
@@ -111,7 +111,7 @@ def _evaluated(r: RecordingEvaluation) -> dict[str, Any]:
         "band_hz": frf.frequency[[0, -1]],
         "screening": screening_json(r.screening),
         "free_decays": [dict(vars(d)) for d in r.decays],
-        "levels": level_json(level_tables(r.levels)),
+        "levels": as_data(level_tables(r.levels)),
     }
     if e is not None:
         found |= {

@@ -92,10 +92,10 @@ def _text(parts: PageParts) -> str:
 
 
 def _html(title: str, parts: PageParts) -> str:
-    from .page import sections_page
+    from .page import page_text
 
     notes = Section("Steps and reasons", [Items(parts.notes)] if parts.notes else [])
-    return sections_page(title, [*parts.sections, notes], lead=parts.lead)
+    return page_text(title, [*parts.sections, notes], lead=parts.lead)
 
 
 def _stills(parts: PageParts) -> Iterator[Path]:

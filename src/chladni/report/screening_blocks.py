@@ -1,11 +1,12 @@
 """Findings of the screening of a recording, as tables of a page and as JSON."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from ..ema.finding import Check, Finding, Screening, of_all, which
+from ..ema.finding import Finding, Screening, of_all, which
 from ..errors import named
 from .blocks import Block, Items, Section, Table
+from .typed_fields import as_data
 
 _FINDING = ("finding", "channels", "is a", "what", "repair")
 _CHECK = ("check", "result", "is")
@@ -68,30 +69,4 @@ def _found(f: Finding) -> tuple[str, ...]:
 
 def screening_json(s: Screening) -> dict[str, Any]:
     """Findings and checks as plain data."""
-    return {
-        "name": s.name,
-        "sentence": s.sentence,
-        "findings": [{**vars(f), "channels": list(f.channels)} for f in s.findings],
-        "checks": [dict(vars(c)) for c in s.checks],
-    }
-
-
-def read_screening(d: Mapping[str, Any]) -> Screening:
-    """Read a screening from its JSON."""
-    return Screening(
-        str(d.get("name", "")),
-        tuple(_finding(f) for f in _rows(d, "findings")),
-        tuple(Check(str(c["name"]), str(c["result"]), c["passed"]) for c in _rows(d, "checks")),
-    )
-
-
-def _rows(d: Mapping[str, Any], key: str) -> Sequence[Mapping[str, Any]]:
-    return d.get(key) or ()
-
-
-def _finding(f: Mapping[str, Any]) -> Finding:
-    value = f.get("value")
-    return Finding(
-        str(f["kind"]), str(f["text"]), f["severity"], tuple(f.get("channels") or ()),
-        str(f.get("repair") or ""), float("nan") if value is None else float(value),
-    )  # fmt: skip
+    return {**as_data(s), "sentence": s.sentence}

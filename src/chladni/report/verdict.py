@@ -46,7 +46,6 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     ),
     "frf_held_out": ("frf", "A held-out channel."),
     "frf_grid": ("frf", "Channels spread evenly over the list."),
-    "nyquist": ("frf", "Nyquist."),
     "waterfall": ("scores", "Deviation Q on fitted data, step by step."),
     "held_out": ("scores", "Deviation Q on held-out data."),
     "fit_test": (

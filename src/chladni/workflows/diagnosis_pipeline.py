@@ -76,27 +76,15 @@ from .screening_of_case import (
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """A case with its explanation, before anything is written."""
+    """A case whose hypotheses are fitted and, with ``distrust``, decided; nothing is written."""
 
     case: Case
     question: Question
     prepared: Prepared
     found: Diagnosis
-    distrust: tuple[str, ...]
     screening: Screening | None = None
     study: CalibrationStudy | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Searched:
-    """A case whose hypotheses are fitted, before any decision."""
-
-    case: Case
-    question: Question
-    prepared: Prepared
-    found: Diagnosis
-    screening: Screening | None
-    study: CalibrationStudy | None = None
+    distrust: tuple[str, ...] = ()
 
     def refine(self, hypothesis: HypothesisFit) -> Refinement:
         """Fit a hypothesis again on a reduced model that can represent it."""
@@ -106,7 +94,7 @@ class Searched:
 def searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
     settings: CalibrationSettings = FULL,
-) -> Searched:  # fmt: skip
+) -> Explained:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
     Parameters
@@ -144,12 +132,12 @@ def searched(
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
     stage = within(progress, 0.1, 0.85)
     if diagnosing:
-        return Searched(case, question, prepared, compared(prepared.problem, stage), screening)
+        return Explained(case, question, prepared, compared(prepared.problem, stage), screening)
     made = calibration(prepared.problem, stage, settings)
     articles = articles_together(question, prepared, made.diagnosis.null)
     study = replace(made.study, articles=articles)
     prepared = replace(prepared, problem=made.problem)
-    return Searched(case, question, prepared, made.diagnosis, screening, study)
+    return Explained(case, question, prepared, made.diagnosis, screening, study)
 
 
 def explained(
@@ -158,11 +146,11 @@ def explained(
 ) -> Explained:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
     made = searched(case, diagnosing, progress, known, settings)
-    question, prepared, screening = made.question, made.prepared, made.screening
     found, distrust = _apply_held_out(made, diagnosing)
-    if screening is not None and screening.faults and not diagnosing:
-        distrust = (*distrust, f"{screening.sentence}; a fit to it distorts the model")
-    return Explained(case, question, prepared, found, distrust, screening, made.study)
+    seen = made.screening
+    if seen is not None and seen.faults and not diagnosing:
+        distrust = (*distrust, f"{seen.sentence}; a fit to it distorts the model")
+    return replace(made, found=found, distrust=distrust)
 
 
 def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
@@ -199,7 +187,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     )  # fmt: skip
 
 
-def _apply_held_out(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
+def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name

@@ -16,7 +16,7 @@ from ...ema.time_record import TimeRecord
 from ...errors import ChladniError, FileError, named
 from ..damage import DAMAGED
 from ..file_size import refuse_large
-from ..time.read_time import read_mat, read_time_csv, read_time_npz, read_wav
+from ..time.read_time import named_arrays, read_mat, read_time_csv, read_wav
 from ..time.time_channels import is_time, only_known
 from .csv_table import CsvTable, files_next_to, read_table
 
@@ -265,7 +265,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
         why = error.args[0] if error.args else error
         raise FileError(f"{path.name} cannot be read as NPZ: {why}") from error
     if timed:
-        return _timed(path, read_time_npz(path, arrays), quantity)
+        return _timed(path, named_arrays(path, arrays), quantity)
     if missing := [name for name in _NPZ if name not in arrays]:
         raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {named(arrays)}")
     quantity = quantity or (_word(path, arrays, "quantity") if "quantity" in arrays else None)

@@ -112,16 +112,11 @@ def read_mat(path: Path) -> Read:
         if array.dtype.kind == "O":
             array = np.array([str(x) for x in array.ravel()])
         arrays[name] = array
-    return _named(path, arrays)
+    return named_arrays(path, arrays)
 
 
-def read_time_npz(path: Path, arrays: dict[str, np.ndarray]) -> Read:
-    """An NPZ whose arrays are time data (``time_channels.from_arrays``)."""
-    return _named(path, arrays)
-
-
-def _named(path: Path, arrays: dict[str, np.ndarray]) -> Read:
-    """Named arrays, their labels from the table beside the file where there is one."""
+def named_arrays(path: Path, arrays: dict[str, np.ndarray]) -> Read:
+    """Time data as named arrays; labels from the table of channels where there is one."""
     record, notes = from_arrays(path.name, arrays)
     if not described(path).is_file():
         return record, notes

@@ -17,21 +17,9 @@ from ...ema.response_correlations import responses
 from ...ema.setup import Function, Recording, Shapes
 from ...errors import ChladniError, FileError, named
 from .estimate_stamp import read_stamp, with_variance
-from .uff_accumulator import Channel, Pair, Shape, TimeSignal, UffAccumulator, dataset_name
+from .uff_accumulator import Channel, Pair, Shape, TimeSignal, UffAccumulator
 from .uff_frf import frf_matrix
-from .uff_sets import (
-    SILENT,
-    USED,
-    ElementSet,
-    FunctionSet,
-    NodeSet,
-    ShapeSet,
-    SystemSet,
-    TraceSet,
-    UffSet,
-    UnitsSet,
-    typed,
-)
+from .uff_function import FunctionSet, function_set
 from .uff_source import readable
 from .uff_time import time_record
 from .uff_units import Meaning, check_calibrated, file_units, hertz, meaning
@@ -40,6 +28,7 @@ from .write_uff import write_uff as write_uff
 _KINDS = {1: "time", 2: "auto spectrum", 3: "cross spectrum", 9: "psd", 12: "spectrum"}
 _SPECTRA = (2, 3, 9, 12)
 _SAME_PLACE = 1e-4  # of the largest coordinate: dataset 15 keeps six digits
+Dataset = Mapping[Any, Any]  # a dictionary of pyuff
 _REAL = {1: "time history", 6: "coherence", 26: "multiple coherence"}
 
 
@@ -61,17 +50,20 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
     """
     path = Path(path)
     uff = UffAccumulator(path)
-    sets = list(_sets(uff))
-    for one in sets:  # units first: 164 need not be at the top
-        if isinstance(one, UnitsSet):
-            uff.units = file_units(one)
-    for one in sets:
+    for number, d in sorted(_datasets(uff), key=lambda one: int(one[1]["type"]) != _UNITS):
+        where = uff.where(number, int(d["type"]))
         try:
-            _take(uff, one, quantity)
+            if int(d["type"]) == _FUNCTION:
+                _take_function(uff, function_set(d, number), where, quantity)
+            else:
+                _TAKE[int(d["type"])](uff, d, where)
         except ChladniError:
             raise
         except _BROKEN as error:
-            raise _damaged(path, one.number, one.code, error) from error
+            raise FileError(
+                f"{where} is damaged: its lines do not fit together "
+                f"({type(error).__name__}: {error})"
+            ) from error
     frf, (averages, added) = frf_matrix(uff, quantity), read_stamp(uff.title)
     time = time_record(uff) if frf is None else None
     _name_unused(uff, frf is None and time is None)
@@ -95,23 +87,6 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
 _BROKEN = (ValueError, IndexError, KeyError, TypeError, OverflowError, ZeroDivisionError)
 
 
-def _damaged(path: Path, number: int, code: int, error: Exception) -> FileError:
-    """A dataset whose lines do not fit together."""
-    return FileError(
-        f"{dataset_name(path, number, code)} is damaged: its lines do not fit together "
-        f"({type(error).__name__}: {error})"
-    )
-
-
-def _sets(uff: UffAccumulator) -> Iterator[UffSet]:
-    """Every dataset that is of use."""
-    for number, dataset in _datasets(uff):
-        try:
-            yield typed(number, dataset)
-        except _BROKEN as error:
-            raise _damaged(uff.path, number, int(dataset["type"]), error) from error
-
-
 def _datasets(uff: UffAccumulator) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """(number from 1, dataset) of every dataset that is of use; others are noted, not read."""
     import pyuff
@@ -120,13 +95,13 @@ def _datasets(uff: UffAccumulator) -> Iterator[tuple[int, Mapping[str, Any]]]:
     with readable(path) as source:
         file = pyuff.UFF(str(source))
         for k, kind in enumerate(file.get_set_types()):
-            if int(kind) not in USED:
-                idle |= {int(kind)} - SILENT
+            if int(kind) not in (_FUNCTION, *_TAKE):
+                idle |= {int(kind)} - _SILENT
                 continue
             try:
                 dataset: dict[str, Any] = file.read_sets(k)
             except Exception as error:  # pyuff raises nothing narrower
-                where = dataset_name(path, k + 1, int(kind))
+                where = uff.where(k + 1, int(kind))
                 raise FileError(f"{where}: cannot be read ({_why(error)})") from error
             yield k + 1, dataset
     if idle:
@@ -149,25 +124,10 @@ def _dof(node: int, direction: int) -> str:
     return f"{node}:n" if direction == 0 else label(node, abs(direction), direction)
 
 
-def _take(uff: UffAccumulator, one: UffSet, quantity: str | None) -> None:
-    """One dataset put on the pile."""
-    match one:
-        case FunctionSet():
-            _take_function(uff, one, quantity)
-        case NodeSet():
-            _take_nodes(uff, one)
-        case ElementSet():
-            uff.elements += one.elements
-        case TraceSet():
-            _take_lines(uff, one)
-        case SystemSet():
-            _take_systems(uff, one)
-        case ShapeSet():
-            _take_shape(uff, one)
-
-
-def _take_function(uff: UffAccumulator, record: FunctionSet, quantity: str | None) -> None:
-    where, kind = uff.where(record), record.function
+def _take_function(
+    uff: UffAccumulator, record: FunctionSet, where: str, quantity: str | None
+) -> None:
+    kind = record.function
     record = _complete(record, where)
     node, axis = record.reference
     if kind in _REAL and (np.iscomplexobj(record.y) or (kind == 1 and record.abscissa.kind == 18)):
@@ -183,7 +143,7 @@ def _take_function(uff: UffAccumulator, record: FunctionSet, quantity: str | Non
     if kind in (4, 5, 6) and node == 0 and axis != 0:
         input = label(0, abs(axis), axis).replace("0:", "base:")
     if kind in (4, 5) or (kind == 0 and np.iscomplexobj(record.y) and node):
-        _take_frf(uff, record, (output, input), quantity)
+        _take_frf(uff, record, (output, input), where, quantity)
     elif kind in (6, 26):
         pair = output, input if kind == 6 else ""
         if pair in uff.coherence:
@@ -242,8 +202,9 @@ def _complete(record: FunctionSet, where: str) -> FunctionSet:
     return replace(record, x=x, y=y)
 
 
-def _take_frf(uff: UffAccumulator, record: FunctionSet, dofs: Pair, quantity: str | None) -> None:
-    where = uff.where(record)
+def _take_frf(
+    uff: UffAccumulator, record: FunctionSet, dofs: Pair, where: str, quantity: str | None
+) -> None:
     if not np.iscomplexobj(record.y):
         raise FileError(f"{where}: a frequency response needs phase, but these values are real")
     if dofs in uff.frf:
@@ -271,29 +232,40 @@ def _take_frf(uff: UffAccumulator, record: FunctionSet, dofs: Pair, quantity: st
     uff.frf[dofs] = Channel(record.number, f, record.y * said.factor, said.quantity)
 
 
-def _take_nodes(uff: UffAccumulator, one: NodeSet) -> None:
-    xyz = one.places * uff.units.length
+def _take_units(uff: UffAccumulator, d: Dataset, where: str) -> None:
+    uff.units = file_units(int(d["units_code"]), d["length"], d["force"])
+
+
+def _take_nodes(uff: UffAccumulator, d: Dataset, where: str) -> None:
+    nodes, systems = ([int(n) for n in d[k]] for k in ("node_nums", "disp_cs"))
+    xyz = np.column_stack([d["x"], d["y"], d["z"]]) * uff.units.length
     if not np.isfinite(xyz).all():
-        raise FileError(f"{uff.where(one)}: a coordinate is not a number")
+        raise FileError(f"{where}: a coordinate is not a number")
     apart = _SAME_PLACE * np.abs(xyz).max(initial=0.0)
-    for node, place, system in zip(one.nodes, xyz, one.systems, strict=True):
-        other = uff.nodes.get(int(node), place)
+    for node, place, system in zip(nodes, xyz, systems, strict=True):
+        other = uff.nodes.get(node, place)
         if np.abs(other - place).max() > apart:
             raise FileError(
-                f"{uff.where(one)}: node {node} occurs twice, at {_at(other)} and {_at(place)} m"
+                f"{where}: node {node} occurs twice, at {_at(other)} and {_at(place)} m"
             )
-        uff.nodes[int(node)] = place
-        uff.turned[int(node)] = int(system)
+        uff.nodes[node] = place
+        uff.turned[node] = system
 
 
 def _at(place: np.ndarray) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in place) + ")"
 
 
-def _take_lines(uff: UffAccumulator, one: TraceSet) -> None:
+def _take_elements(uff: UffAccumulator, d: Dataset, where: str) -> None:
+    families = [elements for family, elements in d.items() if isinstance(family, int)]
+    each = [e["nodes_nums"] for elements in families for e in elements]
+    uff.elements += [tuple(int(n) for n in nodes) for nodes in each]
+
+
+def _take_lines(uff: UffAccumulator, d: Dataset, where: str) -> None:
     """Trace lines; a zero lifts the pen."""
     line: list[int] = []
-    for node in [*one.nodes, 0]:
+    for node in [*map(int, d["nodes"]), 0]:
         if node:
             line.append(node)
         elif line:
@@ -301,28 +273,46 @@ def _take_lines(uff: UffAccumulator, one: TraceSet) -> None:
             line = []
 
 
-def _take_systems(uff: UffAccumulator, one: SystemSet) -> None:
-    for system, kind, axes in one.systems:
-        if kind == 0:
-            uff.systems[system] = axes
+def _take_systems(uff: UffAccumulator, d: Dataset, where: str) -> None:
+    rows = zip(d["CS_sys_labels"], d["CS_types"], d["CS_matrices"], strict=True)
+    for system, kind, axes in rows:
+        if int(kind) == 0:
+            uff.systems[int(system)] = np.asarray(axes)[:3]
         else:
-            uff.notes.append(f"coordinate system {system} is not Cartesian: read as global")
+            uff.notes.append(f"coordinate system {int(system)} is not Cartesian: read as global")
 
 
-def _take_shape(uff: UffAccumulator, one: ShapeSet) -> None:
-    if one.analysis == 2:
-        f, zeta = one.frequency, one.viscous or one.hysteretic / 2
-    elif one.analysis in (3, 7):
-        size = abs(one.pole)
-        f, zeta = size / (2 * np.pi), -one.pole.real / max(size, 1e-300)
+def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
+    """A normal mode (analysis type 2) or a complex one (3 and 7); others are no modes."""
+    analysis = int(d["analysis_type"])
+    if analysis == 2:
+        f = d.get("freq", 0.0)
+        zeta = d.get("modal_damp_vis", 0.0) or d.get("modal_damp_his", 0.0) / 2
+    elif analysis in (3, 7):
+        pole = d.get("eig", 0j)
+        f, zeta = abs(pole) / (2 * np.pi), -pole.real / max(abs(pole), 1e-300)
     else:
         return
+    components = [d[f"r{k}"] for k in range(1, 7) if f"r{k}" in d]
     values = {
         label(int(node), k + 1): component[i]
-        for i, node in enumerate(one.nodes)
-        for k, component in enumerate(one.components)
+        for i, node in enumerate(d["node_nums"])
+        for k, component in enumerate(components)
     }
     uff.shapes.append(Shape(f, zeta, values))
+
+
+_UNITS, _FUNCTION = 164, 58
+_TAKE = {
+    15: _take_nodes,
+    55: _take_shape,
+    82: _take_lines,
+    _UNITS: _take_units,
+    2411: _take_nodes,
+    2412: _take_elements,
+    2420: _take_systems,
+}
+_SILENT = frozenset({151, 1858})  # header; channel settings that come with every function
 
 
 def _axes(uff: UffAccumulator) -> dict[int, np.ndarray]:

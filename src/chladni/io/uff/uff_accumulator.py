@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from ...ema.setup import Function
-from .uff_sets import UffSet
 from .uff_units import FileUnits
 
 Pair = tuple[str, str]  # output, input
@@ -58,9 +57,9 @@ class UffAccumulator:
     notes: list[str] = field(default_factory=list)
     title: str = ""  # first line of the first FRF
 
-    def where(self, one: UffSet) -> str:
+    def where(self, number: int, code: int) -> str:
         """A dataset as a sentence names it."""
-        return dataset_name(self.path, one.number, one.code)
+        return dataset_name(self.path, number, code)
 
 
 def dataset_name(path: Path, number: int, code: int) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import FileError
-from .uff_sets import FunctionSet, UnitsSet
+from .uff_function import FunctionSet
 
 # code of dataset 164: (metre per file length, newton per file force)
 _POUND, _KILOGRAM_FORCE = 4.4482216152605, 9.80665
@@ -62,12 +62,12 @@ class Meaning:
     factor: float
 
 
-def file_units(header: UnitsSet) -> FileUnits:
+def file_units(system: int, length: float, force: float) -> FileUnits:
     """Dataset 164: the named system, or for a user's own (code 9) the factors written there."""
-    known = _SYSTEMS.get(header.system)
+    known = _SYSTEMS.get(system)
     if known:
         return FileUnits(*known)
-    return FileUnits(1 / (header.length or 1.0), 1 / (header.force or 1.0))
+    return FileUnits(1 / (length or 1.0), 1 / (force or 1.0))
 
 
 def _bare(label: str) -> str:

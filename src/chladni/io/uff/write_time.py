@@ -10,7 +10,7 @@ import numpy as np
 
 from ...ema.time_record import TimeRecord
 from ...errors import FileError
-from .uff_sets import Axis, FunctionSet
+from .uff_function import Axis, FunctionSet
 from .write_uff import MOTION, NEWTON, binary_set, head_records, uff_code, write_sets
 
 

@@ -9,6 +9,7 @@ and readers by blanks both find the numbers.
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ...dofs import parse
 from ...dynamics.frf import FRF
 from ...errors import FileError, LabelError
 from ...output import atomic
-from .uff_sets import Axis, FunctionSet, HeaderSet, NodeSet, UnitsSet, for_pyuff
+from .uff_function import Axis, FunctionSet
 
 NEWTON = Axis(13, "N")
 MOTION = {
@@ -70,12 +71,19 @@ def _write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None
     """Header, units and nodes, in pyuff's hand."""
     import pyuff
 
-    sets: list[HeaderSet | UnitsSet | NodeSet]
-    sets = [HeaderSet(model=title, program="chladni"), UnitsSet()]
+    program = {"db_app": "chladni", "program": "chladni"}
+    degrees = {"temp_mode": 1, "temp": 1.0, "temp_offset": 273.15}
+    sets: list[dict[str, Any]] = [
+        {"type": 151, "model_name": title, "description": "NONE", **program},
+        {"type": 164, "units_code": 1, "units_description": "SI", "length": 1.0, "force": 1.0,
+         **degrees},
+    ]  # fmt: skip
     if nodes:
-        ids, places = np.array(list(nodes)), np.array(list(nodes.values()), float)
-        sets.append(NodeSet(nodes=ids, places=places, systems=np.zeros(len(ids), int)))
-    pyuff.UFF(str(path)).write_sets([for_pyuff(one) for one in sets], mode="add")
+        (x, y, z), zero = np.array(list(nodes.values()), float).T, np.zeros(len(nodes), int)
+        frame = {"def_cs": zero, "disp_cs": zero, "color": zero + 1}
+        sets.append({"type": 2411, "node_nums": np.array(list(nodes)), "x": x, "y": y, "z": z,
+                     **frame})  # fmt: skip
+    pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
 
 def _blocks(frf: FRF, title: str, binary: bool) -> Iterator[bytes]:

@@ -1,7 +1,6 @@
 """Static loads: FORCE, MOMENT, GRAV, SLOAD, pressures, and their combinations."""
 
 from collections import defaultdict
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,40 +10,32 @@ from . import pressure
 from .context import Context
 from .supports import enforced, prescribed
 
-
-@dataclass
-class _Sum:
-    """Point loads being collected: rows, components, values; gravity."""
-
-    rows: list[np.ndarray] = field(default_factory=list)
-    components: list[np.ndarray] = field(default_factory=list)
-    values: list[np.ndarray] = field(default_factory=list)
-    gravity: np.ndarray = field(default_factory=lambda: np.zeros(3))
-
-    def add(self, rows: np.ndarray, vectors: np.ndarray, first: int) -> None:
-        """Vectors (n, 3) on components first, first + 1, first + 2."""
-        self.rows.append(np.repeat(rows, 3))
-        self.components.append(np.tile(np.arange(first, first + 3), len(rows)))
-        self.values.append(vectors.ravel())
-
-    def load(self) -> Load:
-        """Equal dofs added up, zeros dropped."""
-        rows, components = (
-            np.concatenate([np.zeros(0, np.int64), *x]) for x in (self.rows, self.components)
-        )
-        values = np.concatenate([np.zeros(0), *self.values])
-        key, inverse = np.unique(8 * rows + components, return_inverse=True)
-        total = np.bincount(inverse, values, len(key)) if len(key) else np.zeros(0)
-        keep = total != 0
-        return Load(key[keep] // 8, key[keep] % 8, total[keep], self.gravity)
+Parts = dict[int, list[Load]]  # what each set adds up
 
 
-Sums = dict[int, _Sum]
+def _on(rows: np.ndarray, vectors: np.ndarray, first: int) -> Load:
+    """Vectors (n, 3) on components first, first + 1, first + 2."""
+    components = np.tile(np.arange(first, first + 3), len(rows))
+    return Load(np.repeat(rows, 3), components, vectors.ravel())
+
+
+def _total(parts: list[tuple[float, Load]]) -> Load:
+    """Σ S_i L_i: equal dofs added up, zeros dropped."""
+    rows, components = (
+        np.concatenate([np.zeros(0, np.int64), *(getattr(one, name) for _, one in parts)])
+        for name in ("rows", "components")
+    )
+    values = np.concatenate([np.zeros(0), *(one.values * factor for factor, one in parts)])
+    key, inverse = np.unique(8 * rows + components, return_inverse=True)
+    total = np.bincount(inverse, values, len(key)) if len(key) else np.zeros(0)
+    gravity = sum((factor * one.gravity for factor, one in parts), np.zeros(3))
+    keep = total != 0
+    return Load(key[keep] // 8, key[keep] % 8, total[keep], gravity)
 
 
 def loads(ctx: Context) -> dict[int, Load]:
     """Every load set, LOAD combinations resolved."""
-    sums: Sums = defaultdict(_Sum)
+    sums: Parts = defaultdict(list)
     for cards in ctx.deck.present("FORCE", "MOMENT"):
         _vectors(ctx, cards, sums)
     for cards in ctx.deck.present("FORCE1", "MOMENT1"):
@@ -54,8 +45,8 @@ def loads(ctx: Context) -> dict[int, Load]:
     for cards in ctx.deck.present("SLOAD"):
         _scalar(ctx, cards, sums)
     for sid, rows, forces in pressure.forces(ctx):
-        sums[sid].add(rows, forces, 1)
-    out = {sid: s.load() for sid, s in sums.items()}
+        sums[sid].append(_on(rows, forces, 1))
+    out = {sid: _total([(1.0, one) for one in parts]) for sid, parts in sums.items()}
     return {**out, **_combined(ctx, out)}
 
 
@@ -65,7 +56,7 @@ def _unit(ctx: Context, cards: Cards) -> tuple[float, int]:
     return ctx.scale.force * (ctx.scale.length if turn else 1.0), 4 if turn else 1
 
 
-def _vectors(ctx: Context, cards: Cards, sums: Sums) -> None:
+def _vectors(ctx: Context, cards: Cards, sums: Parts) -> None:
     """FORCE, MOMENT: F N in system CID."""
     rows, cid = ctx.rows(cards, cards.integers(2)), cards.integers(3, 0)
     N = cards.block(5, 3, 0.0) * cards.reals(4)[:, None]
@@ -77,13 +68,13 @@ def _vectors(ctx: Context, cards: Cards, sums: Sums) -> None:
     _spread(cards, sums, rows, N * unit, first)
 
 
-def _spread(cards: Cards, sums: Sums, rows: np.ndarray, vectors: np.ndarray, first: int) -> None:
+def _spread(cards: Cards, sums: Parts, rows: np.ndarray, vectors: np.ndarray, first: int) -> None:
     sid = cards.integers(1)
     for s in np.unique(sid):
-        sums[int(s)].add(rows[sid == s], vectors[sid == s], first)
+        sums[int(s)].append(_on(rows[sid == s], vectors[sid == s], first))
 
 
-def _along(ctx: Context, cards: Cards, sums: Sums) -> None:
+def _along(ctx: Context, cards: Cards, sums: Parts) -> None:
     """FORCE1, MOMENT1: along the way from grid G1 to G2."""
     rows = ctx.rows(cards, cards.integers(2))
     ends = ctx.places[ctx.rows(cards, cards.ids(4, 2))]
@@ -95,23 +86,24 @@ def _along(ctx: Context, cards: Cards, sums: Sums) -> None:
     _spread(cards, sums, rows, span / size[:, None] * cards.reals(3)[:, None] * unit, first)
 
 
-def _gravity(ctx: Context, cards: Cards, sums: Sums) -> None:
+def _gravity(ctx: Context, cards: Cards, sums: Parts) -> None:
     """GRAV: acceleration A N of all masses, N in system CID."""
     acceleration = ctx.scale.length / ctx.scale.time**2
     for i, sid in enumerate(cards.integers(1).tolist()):
         axes = ctx.system_at(cards, i, cards.integer(i, 2, 0), np.zeros(3))
         N = cards.single(i).block(4, 3, 0.0)[0] @ axes
-        sums[sid].gravity = sums[sid].gravity + cards.real(i, 3) * acceleration * N
+        g = cards.real(i, 3) * acceleration * N
+        sums[sid].append(Load(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), g))
 
 
-def _scalar(ctx: Context, cards: Cards, sums: Sums) -> None:
+def _scalar(ctx: Context, cards: Cards, sums: Parts) -> None:
     """SLOAD: forces on scalar points."""
     for i, sid in enumerate(cards.integers(1).tolist()):
         for k in (2, 4, 6):
             if cards.word(i, k):
                 row = ctx.row(cards, i, cards.integer(i, k))
                 value = cards.real(i, k + 1) * ctx.scale.force
-                sums[sid].add(np.array([row]), np.array([[value, 0.0, 0.0]]), 1)
+                sums[sid].append(_on(np.array([row]), np.array([[value, 0.0, 0.0]]), 1))
 
 
 def _combined(ctx: Context, simple: dict[int, Load]) -> dict[int, Load]:
@@ -119,15 +111,13 @@ def _combined(ctx: Context, simple: dict[int, Load]) -> dict[int, Load]:
     out = {}
     for cards in ctx.deck.present("LOAD"):
         for i, sid in enumerate(cards.unique().tolist()):
-            total = _Sum()
+            parts = []
             for factor, part in terms(cards, i):
                 if part not in simple:
                     there = ", ".join(map(str, sorted(simple)[:8])) or "none"
                     raise cards.refuse(i, f"load {part} does not exist; there are {there}")
-                _added(total, simple[part], factor)
-            if sid in simple:
-                _added(total, simple[sid], 1.0)
-            out[sid] = total.load()
+                parts.append((factor, simple[part]))
+            out[sid] = _total([*parts, *([(1.0, simple[sid])] if sid in simple else [])])
     return out
 
 
@@ -139,13 +129,6 @@ def terms(cards: Cards, i: int) -> list[tuple[float, int]]:
         for k in range(3, len(words) + 1, 2)
         if words[k - 1]
     ]
-
-
-def _added(total: _Sum, load: Load, factor: float) -> None:
-    total.rows.append(load.rows)
-    total.components.append(load.components)
-    total.values.append(load.values * factor)
-    total.gravity = total.gravity + factor * load.gravity
 
 
 def motions(ctx: Context) -> dict[int, Motion]:
