@@ -16,7 +16,7 @@ from chladni.decision.reasons import Decision
 from chladni.errors import ChladniError
 from chladni.parallel import one_blas_thread
 from chladni.search.deciding import Measured, begun, decided_by
-from chladni.workflows.diagnosis_pipeline import Searched, searched
+from chladni.workflows.diagnosis_pipeline import Explained, searched
 from chladni.workflows.output_only import with_natural_frequencies
 
 from .recorded_case import RecordedCase, write_case
@@ -57,7 +57,7 @@ def recorded_case(folder: Path) -> RecordedCase:
     return kept(folder, made, found, known)
 
 
-def kept(folder: Path, made: Searched, found: Decision, known: Measured) -> RecordedCase:
+def kept(folder: Path, made: Explained, found: Decision, known: Measured) -> RecordedCase:
     """A decided case with its rows and its reduced problem."""
     mass, arrays = made.prepared.problem.mass_measurement, dict[str, np.ndarray]()
     for key, row in rows_kept(known, made.found, mass, NULL):
