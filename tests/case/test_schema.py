@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.builders.identification import identified_once
+from tests.builders.quick_runs import identified_once
 
 from chladni.case import load_case
 from chladni.case.schema import COLUMNS, COMMANDS, PLANNED, SCHEMA, known, sections, unread
