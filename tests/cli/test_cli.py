@@ -249,11 +249,11 @@ def copied(case, tmp_path):
 def test_frf_of_a_case_is_what_its_recording_holds(case, tmp_path):
     """Of the same model: its lines, labels and values; the function gives the same arrays."""
     ran("frf", case, "--out", tmp_path / "out")
-    here, there = np.load(tmp_path / "out" / "frf.npz"), np.load(case / "frf.npz")
-    assert here["outputs"].tolist() == there["outputs"].tolist()
     (same,) = chladni.frf(load_case(case)).frfs
-    np.testing.assert_array_equal(here["values"], same.to("accelerance").values)
-    H, due = here["values"], there["values"]
+    with np.load(tmp_path / "out" / "frf.npz") as here, np.load(case / "frf.npz") as there:
+        assert here["outputs"].tolist() == there["outputs"].tolist()
+        H, due = here["values"], there["values"]
+    np.testing.assert_array_equal(H, same.to("accelerance").values)
     np.testing.assert_allclose(H, due, atol=1e-4 * np.abs(due).max())
 
 
