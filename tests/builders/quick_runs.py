@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -14,6 +15,8 @@ from chladni.ema.identification import Identified, identify
 from chladni.progress import Progress, silent
 from chladni.search.calibration import CalibrationSettings
 from chladni.view import canvas
+from chladni.view.camera import Camera
+from chladni.view.surface import Surface
 
 CALLERS = (  # names under which modules hold the function that identifies
     "chladni.ema.recording_screening.identify",
@@ -32,10 +35,12 @@ _KNOWN: dict[bytes, Identified] = {}
 def identified_once() -> Iterator[None]:
     """The same recording with the same arguments is identified once."""
 
+    found: Any = identify
+
     def once(frf: FRF, *given: Any, progress: Progress = silent, **named: Any) -> Identified:
         key = pickle.dumps((frf, given, sorted(named.items())))
         if key not in _KNOWN:
-            _KNOWN[key] = identify(frf, *given, progress=progress, **named)
+            _KNOWN[key] = found(frf, *given, progress=progress, **named)
         return _KNOWN[key]
 
     with pytest.MonkeyPatch.context() as patch:
@@ -58,10 +63,13 @@ def coarse_pictures() -> Iterator[None]:
     """Pictures of a quarter of the pixels each way: they are most of the work of a command."""
     photo, save = canvas._photo, Figure.savefig
 
+    def coarse(seen: Surface, camera: Camera, paint: canvas.Paint, width: int) -> np.ndarray:
+        return photo(seen, camera, paint, width // 4)
+
     def small(self: Figure, path: Any, **look: Any) -> None:
         save(self, path, **{**look, "dpi": 40})
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(canvas, "_photo", lambda *given: photo(*given[:-1], given[-1] // 4))
+        patch.setattr(canvas, "_photo", coarse)
         patch.setattr(Figure, "savefig", small)
         yield
