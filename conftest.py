@@ -8,6 +8,22 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 import pytest
 
+LONG = ("tests/evidence/", "tests/workflows/", "tests/effects/", "tests/search/", "tests/cli/")
+
+
+def pytest_configure(config):
+    """Processes take files in the order below, and not those with the most tests first."""
+    config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items):
+    """Rooms whose files take longest come first: no process waits for one of them at the end."""
+
+    def place(item):
+        return next((k for k, room in enumerate(LONG) if item.nodeid.startswith(room)), len(LONG))
+
+    items.sort(key=place)
+
 
 @pytest.fixture(autouse=True)
 def _plain_printing():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.builders.quick_runs import coarse_pictures
 
 from chladni_bench.accelerometers import AccelerometerType
 from chladni_bench.bench_article import BenchArticle
@@ -10,6 +11,12 @@ from chladni_bench.front_end import FrontEnd
 from chladni_bench.shaker import ForceGauge, Shaker
 
 R = 16  # modes, six of them rigid
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _coarse_pictures():
+    with coarse_pictures():
+        yield
 
 
 @pytest.fixture

@@ -13,11 +13,17 @@ deck = "plate.bdf"
 units = "SI"
 damping = 0.01
 [test]
-recordings = ["frf.npz"]
-mass = {mass}
+recordings = ["{recording}"]
+{mass}
 [band]
-fit = [20.0, {top}]
+fit = [{low}, {top}]
 """
+
+
+def case_text(low, top, mass=None, recording="frf.npz"):
+    """The words of a case of plate.bdf in SI, a weighed mass among them where one is given."""
+    weighed = "" if mass is None else f"mass = {mass}"
+    return CASE.format(recording=recording, mass=weighed, low=low, top=top)
 
 
 def write_case(folder, shells, sensors, frequency, top):
@@ -32,4 +38,4 @@ def write_case(folder, shells, sensors, frequency, top):
     made = chladni.frf(article, [f"{g}:+Z" for g in sensors], ["2:+Z"], frequency).frfs[0]
     write_npz(folder / "frf.npz", made.to("accelerance"))
     mass = round(chladni.modes(article, 7).mass, 5)
-    (folder / "case.toml").write_text(CASE.format(mass=mass, top=top))
+    (folder / "case.toml").write_text(case_text(20.0, top, mass))

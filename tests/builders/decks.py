@@ -1,4 +1,4 @@
-"""A structure as a deck; the deck with another structure's values, read again."""
+"""Cards of a sheet; a structure as a deck; the deck with other values, read again."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +18,17 @@ class Rewritten(NamedTuple):
     found: Assembly
     gone: list[str]
     fresh: list[str]
+
+
+def flat_sheet(nx: int, ny: int, a: float, b: float) -> list[str]:
+    """Cards of nx by ny CQUAD4 of property 1 over a by b in z = 0; numbers go along y first."""
+    n, cards = ny + 1, []
+    for i, j in np.ndindex(nx + 1, n):
+        cards.append(f"GRID,{1 + n * i + j},,{a * i / nx},{b * j / ny},0.")
+    for k, (i, j) in enumerate(np.ndindex(nx, ny), start=1):
+        g = 1 + n * i + j
+        cards.append(f"CQUAD4,{k},1,{g},{g + n},{g + n + 1},{g + 1}")
+    return cards
 
 
 def opened(

@@ -1,18 +1,16 @@
 """A case is resolved once; whatever is wrong with it is said in one sentence."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.builders.decks import flat_sheet
 
 from chladni.case import load_case
 from chladni.dynamics.frf import FRF
 from chladni.errors import ChladniError
 from chladni.io.tables.write_tables import write_csv, write_npz
 from chladni.io.uff.read_uff import write_uff
-
-NX, NY, SIZE = 6, 4, (600.0, 300.0)  # [mm]
 
 CASE = """\
 [model]
@@ -51,7 +49,7 @@ label,grid,x,y,z,direction,role,mass,position_sd
 """
 
 
-def deck(held: bool = False) -> str:
+def deck(held=False):
     """A flat steel plate of 24 quads in mm, t, s."""
     cards = [
         "SOL 103",
@@ -61,19 +59,11 @@ def deck(held: bool = False) -> str:
         "$ANSA_NAME_COMMENT;1;PSHELL;sheet;;NO;NO;NO;NO",
     ]
     cards += ["MAT1,1,210000.,,.3,7.85-9", "PSHELL,1,1,1.0,1,,1"]
-    for i in range(NX + 1):
-        for j in range(NY + 1):
-            x, y = SIZE[0] * i / NX, SIZE[1] * j / NY
-            cards.append(f"GRID,{1 + i * (NY + 1) + j},,{x},{y},0.")
-    corner = [(i * (NY + 1) + j + 1) for i in range(NX) for j in range(NY)]
-    for n, a in enumerate(corner, start=1):
-        cards.append(f"CQUAD4,{n},1,{a},{a + NY + 1},{a + NY + 2},{a + 1}")
+    cards += flat_sheet(6, 4, 600.0, 300.0)
     return "\n".join([*cards, *["SPC1,1,123456,1,2"] * held, "ENDDATA"]) + "\n"
 
 
-def a_frf(
-    outputs: tuple[str, ...] = ("12:+Z", "13:n", "14:-Z"), inputs: tuple[str, ...] = ("1:+Z",)
-) -> FRF:
+def a_frf(outputs=("12:+Z", "13:n", "14:-Z"), inputs=("1:+Z",)):
     rng = np.random.default_rng(0)
     f = np.arange(5.0, 100.5, 0.5)
     shape = (len(f), len(outputs), len(inputs))
@@ -82,7 +72,7 @@ def a_frf(
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     (tmp_path / "plate.bdf").write_text(deck())
     (tmp_path / "case.toml").write_text(CASE)
     (tmp_path / "sensors.csv").write_text(SENSORS)
@@ -90,7 +80,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_everything_is_resolved(folder: Path) -> None:
+def test_everything_is_resolved(folder):
     case = load_case(folder)
     assert case.units.name == "mm-t-s"
     np.testing.assert_allclose(np.ptp(case.assembly.points, axis=0), [0.6, 0.3, 0.0])
@@ -114,7 +104,7 @@ def test_everything_is_resolved(folder: Path) -> None:
     )
 
 
-def test_a_case_needs_little(folder: Path) -> None:
+def test_a_case_needs_little(folder):
     """The file itself may be named; sensors at grids, band, held-out and parameters may lack."""
     write_uff(folder / "b.uff", a_frf(("12:+Z", "13:-X")))
     text = '[model]\ndeck = "plate.bdf"\nunits = "SI"\n[test]\nrecordings = ["b.uff"]\n'
@@ -126,7 +116,7 @@ def test_a_case_needs_little(folder: Path) -> None:
     assert not case.gain_known
 
 
-def test_several_recordings_take_the_order_of_the_first(folder: Path) -> None:
+def test_several_recordings_take_the_order_of_the_first(folder):
     H = a_frf()
     again = replace(H, values=1.01 * H.values)
     write_npz(folder / "b.npz", again.sel(H.outputs[::-1]))
@@ -136,7 +126,7 @@ def test_several_recordings_take_the_order_of_the_first(folder: Path) -> None:
     np.testing.assert_allclose(1.01 * first.values, second.values)
 
 
-def test_the_base_moves_where_the_deck_holds_it(folder: Path) -> None:
+def test_the_base_moves_where_the_deck_holds_it(folder):
     H = a_frf(("12:+Z",), ("base:+Z",))
     change(folder, 'sensors = ["12:+Z"]', "")
     write_npz(folder / "a.npz", FRF(H.values, H.frequency, H.outputs, H.inputs, "transmissibility"))
@@ -148,7 +138,7 @@ def test_the_base_moves_where_the_deck_holds_it(folder: Path) -> None:
     np.testing.assert_array_equal(case.inputs.directions, [[0, 0, 1]])
 
 
-def test_directions_of_a_label_are_those_of_its_grid(folder: Path) -> None:
+def test_directions_of_a_label_are_those_of_its_grid(folder):
     """A grid with a displacement frame turned by 90 degrees about Z: its X is the basic Y."""
     turned = deck().replace("GRID,20,,300.0,300.0,0.", "GRID,20,,300.0,300.0,0.,7")
     frame = "CORD2R,7,,0.,0.,0.,0.,0.,1.,+\n+,0.,1.,0.\nENDDATA"
@@ -158,7 +148,7 @@ def test_directions_of_a_label_are_those_of_its_grid(folder: Path) -> None:
     np.testing.assert_allclose(case.outputs.directions[[0, 2]], [[0, 1, 0], [1, 0, 0]], atol=1e-12)
 
 
-def change(folder: Path, old: str, new: str, name: str = "case.toml") -> None:
+def change(folder, old, new, name="case.toml"):
     text = (folder / name).read_text()
     assert old in text
     (folder / name).write_text(text.replace(old, new))
@@ -197,7 +187,7 @@ def change(folder: Path, old: str, new: str, name: str = "case.toml") -> None:
         ("fit = [", "fit = [[", "case.toml is not TOML: .*line 15"),
     ],
 )  # fmt: skip
-def test_faults_of_a_case(folder: Path, old: str, new: str, said: str) -> None:
+def test_faults_of_a_case(folder, old, new, said):
     change(folder, old, new)
     with pytest.raises(ChladniError, match=said) as error:
         load_case(folder)
@@ -213,31 +203,31 @@ def test_faults_of_a_case(folder: Path, old: str, new: str, said: str) -> None:
         (("12:+Z", "14:up"), r"direction '14:up'; write \+X"),
     ],
 )
-def test_labels_without_a_place(folder: Path, outputs: tuple[str, ...], said: str) -> None:
+def test_labels_without_a_place(folder, outputs, said):
     write_npz(folder / "a.npz", a_frf(outputs))
     with pytest.raises(ChladniError, match=said):
         load_case(folder)
 
 
-def test_a_place_in_millimetres_is_noticed(folder: Path) -> None:
+def test_a_place_in_millimetres_is_noticed(folder):
     change(folder, "0.25,0.1,0.002", "250,100,2", "sensors.csv")
     with pytest.raises(ChladniError, match=r"269 m from .* places are in metres"):
         load_case(folder)
 
 
-def test_recordings_that_disagree_on_labels(folder: Path) -> None:
+def test_recordings_that_disagree_on_labels(folder):
     write_csv(folder / "b.csv", a_frf(("12:+Z", "15:+Z")))
     change(folder, '"a.npz"]', '"a.npz", "b.csv"]\nquantity = "accelerance"')
     with pytest.raises(ChladniError, match=r"a.npz and b.csv disagree on outputs: .*15:.Z"):
         load_case(folder)
 
 
-def test_no_case_at_all(tmp_path: Path) -> None:
+def test_no_case_at_all(tmp_path):
     with pytest.raises(ChladniError, match=r"no case\.toml in the folder .*chladni init"):
         load_case(tmp_path)
 
 
-def test_a_band_a_little_too_wide_is_cut_and_noted(folder: Path) -> None:
+def test_a_band_a_little_too_wide_is_cut_and_noted(folder):
     change(folder, "[10.0, 90.0]", "[1.0, 120.0]")
     case = load_case(folder)
     assert case.band == (5.0, 100.0)

@@ -20,43 +20,36 @@ from .test_case import a_frf, deck
 OUT = ("12:+Z", "16:+Z", "22:+Z")
 
 
-def told(**values: object) -> TomlSection:
+def told(**values):
     return TomlSection(Path("case.toml"), "recording", dict(values), {}, 1)
 
 
-def one(name: str, input: str, **more: object) -> Recording:
-    return Recording(name, frf=a_frf(OUT, (input,)), **more)  # type: ignore[arg-type]
+def one(name, input, **more):
+    return Recording(name, frf=a_frf(OUT, (input,)), **more)
 
 
-def test_other_shaker_places_are_columns() -> None:
+def test_other_shaker_places_are_columns():
     a, b = one("a.npz", "8:+Z"), one("b.npz", "3:+Z")
     (both,) = stacked([a, b])
-    assert both.frf is not None
-    assert a.frf is not None
-    assert b.frf is not None
     assert both.frf.inputs == ("8:+Z", "3:+Z")
     np.testing.assert_array_equal(both.frf.values[:, :, :1], a.frf.values)
     np.testing.assert_array_equal(both.frf.values[:, :, 1:], b.frf.values)
     assert "b.npz: stacked with a.npz as one test with 2 inputs" in both.notes
 
 
-def test_lines_and_outputs_that_one_has_alone_are_left_out_and_named() -> None:
+def test_lines_and_outputs_that_one_has_alone_are_left_out_and_named():
     a, b = one("a.npz", "8:+Z"), one("b.npz", "3:+Z")
-    assert a.frf is not None
-    assert b.frf is not None
     f, values = b.frf.frequency, b.frf.values
     fewer = FRF(values[1:, :2], f[1:], OUT[:2], ("3:+Z",), b.frf.quantity)
     (both,) = stacked([a, replace(b, frf=fewer)])
-    assert both.frf is not None
     assert both.frf.outputs == OUT[:2]
     np.testing.assert_array_equal(both.frf.values[:, :, 0], a.frf.values[1:, :2, 0])
     assert "22:+Z" in both.notes[-1]
     assert "1 lines in only one of them" in both.notes[-1]
 
 
-def test_a_test_at_other_lines_is_refused() -> None:
+def test_a_test_at_other_lines_is_refused():
     a, b = one("a.npz", "8:+Z"), one("b.npz", "3:+Z")
-    assert b.frf is not None
     other = replace(b.frf, frequency=b.frf.frequency + 0.013)
     with pytest.raises(FileError, match=r"a.npz and b.npz drive one article .* only 0 of"):
         stacked([a, replace(b, frf=other)])
@@ -72,17 +65,16 @@ def test_a_test_at_other_lines_is_refused() -> None:
         ({}, "repeat"),
     ],
 )
-def test_what_differs_keeps_recordings_apart(more: dict, what: str) -> None:
+def test_what_differs_keeps_recordings_apart(more, what):
     a = one("a.npz", "8:+Z", level=1.0)
     b = one("b.npz", "3:+Z" if more else "8:+Z", **more)
     assert relation(a, b) == what
     assert len(stacked([a, b])) == 2
 
 
-def test_the_same_numbers_are_no_repeat() -> None:
+def test_the_same_numbers_are_no_repeat():
     """Two measurements never agree to the digits of a text; a copy does, whatever it is called."""
     a, b = one("a.npz", "8:+Z", level=1.0), one("b.npz", "8:+Z")
-    assert a.frf is not None
     noisy = replace(b, frf=replace(a.frf, values=a.frf.values * (1 + 1e-3j)))
     rounded = replace(b, frf=replace(a.frf, values=a.frf.values.astype(np.complex64)))
     refuse_copies([a, noisy], "[test] recordings")
@@ -94,7 +86,7 @@ def test_the_same_numbers_are_no_repeat() -> None:
     assert any("b.npz (article B; the same numbers: a copy" in note for note in said)
 
 
-def test_a_file_is_listed_once(tmp_path: Path) -> None:
+def test_a_file_is_listed_once(tmp_path):
     (tmp_path / "plate.bdf").write_text(deck())
     (tmp_path / "poles.csv").write_text("mode,frequency_hz\n1,20\n")
     head = '[model]\ndeck = "plate.bdf"\nunits = "mm-t-s"\n'
@@ -104,7 +96,7 @@ def test_a_file_is_listed_once(tmp_path: Path) -> None:
         load_case(tmp_path)
 
 
-def test_a_word_is_said_once_and_not_against_the_file() -> None:
+def test_a_word_is_said_once_and_not_against_the_file():
     a = one("a.npz", "8:+Z", level=1.0, article="A")
     (named,) = described([told(file="a.npz", state="cold")], "a.npz", [a])
     assert (named.state, named.article, named.level) == ("cold", "A", 1.0)
@@ -118,7 +110,7 @@ def test_a_word_is_said_once_and_not_against_the_file() -> None:
         described([told(file="p.csv", state="x")], "p.csv", [Recording("p.csv", poles=table)])
 
 
-def test_a_case_with_two_shakers_is_one_test(tmp_path: Path) -> None:
+def test_a_case_with_two_shakers_is_one_test(tmp_path):
     (tmp_path / "plate.bdf").write_text(deck())
     for name, input in (("a.npz", "8:+Z"), ("b.npz", "3:+Z")):
         H = a_frf(OUT, (input,))

@@ -19,11 +19,11 @@ from chladni.units import UNITS
 from .test_case import a_frf, deck
 
 
-def section(**values: object) -> TomlSection:
+def section(**values):
     return TomlSection(Path("case.toml"), "test", dict(values), {}, 1)
 
 
-def poles(*states: str) -> PoleTable:
+def poles(*states):
     n = len(states)
     nothing = np.full(n, np.nan)
     return PoleTable(np.arange(1.0, n + 1), nothing, nothing, np.arange(n), states)
@@ -34,29 +34,28 @@ SECOND = Recording("b.npz", frf=a_frf(), article="B")
 TABLE = Recording("p.csv", poles=poles("bare", "loaded", "bare"))
 
 
-def test_the_first_with_responses_is_compared() -> None:
+def test_the_first_with_responses_is_compared():
     assert compared_first(section(), [TABLE, FIRST, SECOND])[0] is FIRST
 
 
 @pytest.mark.parametrize("name", ["b.npz", "B"])
-def test_the_one_that_is_named_is_compared(name: str) -> None:
+def test_the_one_that_is_named_is_compared(name):
     assert compared_first(section(use=name), [FIRST, SECOND])[0] is SECOND
 
 
-def test_a_state_is_named() -> None:
+def test_a_state_is_named():
     first = compared_first(section(use="loaded"), [FIRST, TABLE])[0]
-    assert first.poles is not None
     assert first.poles.states == ("loaded", "bare")
     assert first.poles.of("loaded").frequency.tolist() == [2.0]
     assert any("'loaded' are compared; not used: 'bare'" in n for n in notes_of([first]))
 
 
-def test_a_name_nobody_has_is_refused_with_those_there_are() -> None:
+def test_a_name_nobody_has_is_refused_with_those_there_are():
     with pytest.raises(ChladniError, match=r"no recording is so named; there are .*b.npz, B"):
         compared_first(section(use="c.npz"), [FIRST, SECOND])
 
 
-def test_the_others_are_measured_against_it() -> None:
+def test_the_others_are_measured_against_it():
     """Twice the response is log10(2) decades away on every line."""
     a = a_frf()
     double = FRF(2 * a.values, a.frequency, a.outputs, a.inputs, "accelerance")
@@ -65,7 +64,7 @@ def test_the_others_are_measured_against_it() -> None:
     assert any("d.npz (repeat; 0.3 decades rms apart)" in note for note in said)
 
 
-def test_what_else_a_file_holds_is_named() -> None:
+def test_what_else_a_file_holds_is_named():
     extra = Recording(
         "t.uff",
         frf=a_frf(),
@@ -75,18 +74,17 @@ def test_what_else_a_file_holds_is_named() -> None:
     assert "1 mode shapes are not used" in said
 
 
-def test_dead_channels_are_left_out_and_named() -> None:
+def test_dead_channels_are_left_out_and_named():
     frf = a_frf()
     values = frf.values.copy()
     values[:, 1] = 0
     dead = Recording("a.npz", frf=FRF(values, frf.frequency, frf.outputs, frf.inputs, "mobility"))
     kept = without_dead_channels(dead)
-    assert kept.frf is not None
     assert kept.frf.outputs == (frf.outputs[0], frf.outputs[2])
     assert frf.outputs[1] in kept.notes[0]
 
 
-def test_nodes_and_axes_of_a_recording_are_used(tmp_path: Path) -> None:
+def test_nodes_and_axes_of_a_recording_are_used(tmp_path):
     """A turned node measures along its own axes; a node that is no grid sits where it is."""
     (tmp_path / "plate.bdf").write_text(deck())
     made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
@@ -106,7 +104,7 @@ def test_nodes_and_axes_of_a_recording_are_used(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("factor", [1.0, 1e3])
-def test_places_count_where_numbers_coincide_by_chance(tmp_path: Path, factor: float) -> None:
+def test_places_count_where_numbers_coincide_by_chance(tmp_path, factor):
     """In metres or in millimetres."""
     (tmp_path / "plate.bdf").write_text(deck())
     made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
@@ -121,7 +119,7 @@ def test_places_count_where_numbers_coincide_by_chance(tmp_path: Path, factor: f
 
 
 @pytest.mark.parametrize("nodes", [{}, {k: np.zeros(3) for k in (1, 2, 3)}])
-def test_labels_that_count_are_channels(tmp_path: Path, nodes: dict[int, np.ndarray]) -> None:
+def test_labels_that_count_are_channels(tmp_path, nodes):
     """Unless coordinates say that they are grids; those that a lab leaves at zero say nothing."""
     (tmp_path / "plate.bdf").write_text(deck())
     made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
@@ -145,14 +143,12 @@ def test_labels_that_count_are_channels(tmp_path: Path, nodes: dict[int, np.ndar
         (("base:+Z", "1:+Z"), "transmissibility", "cannot both be inputs"),
     ],
 )
-def test_base_and_quantity_belong_together(
-    tmp_path: Path, inputs: tuple[str, ...], quantity: str, said: str
-) -> None:
+def test_base_and_quantity_belong_together(tmp_path, inputs, quantity, said):
     from chladni.io.tables.write_tables import write_npz
 
     (tmp_path / "plate.bdf").write_text(deck(held=True))
     H = a_frf(("12:+Z",), inputs)
-    write_npz(tmp_path / "a.npz", FRF(H.values, H.frequency, H.outputs, inputs, quantity))  # type: ignore[arg-type]
+    write_npz(tmp_path / "a.npz", FRF(H.values, H.frequency, H.outputs, inputs, quantity))
     (tmp_path / "case.toml").write_text(
         '[model]\ndeck = "plate.bdf"\nunits = "mm-t-s"\n[test]\nrecordings = ["a.npz"]\n'
     )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.builders.quick_runs import identified_once
 
 from chladni.case import load_case
 from chladni.case.schema import COLUMNS, COMMANDS, PLANNED, SCHEMA, known, sections, unread
@@ -160,6 +161,12 @@ DRIVEN = {  # column: the row of the shaker with another cell
     "gain": "8:+Z,8,,,,+Z,,,,input,,,1.1,",
     "use": "8:+Z,8,,,,+Z,,,,input,,,,no",
 }
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _identified_once():
+    with identified_once():
+        yield
 
 
 @pytest.fixture(scope="module")

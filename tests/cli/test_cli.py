@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.builders.cases import case_text
 from tests.builders.commands import call, ran, refused
+from tests.builders.decks import flat_sheet
 
 import chladni
 from chladni.case import load_case
@@ -48,17 +50,7 @@ ENDDATA
 def deck_text(n=2, side=0.3, t=1e-3, width=None):
     """A free steel plate of n by n CQUAD4, square unless told, SI."""
     lines = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,2.1+11,,0.3,7850.", f"PSHELL,1,1,{t},1,,1"]
-    x, y = np.linspace(0, side, n + 1), np.linspace(0, width or side, n + 1)
-    lines += [
-        f"GRID,{1 + j + (n + 1) * i},,{x[i]:.5f},{y[j]:.5f},0.0"
-        for i in range(n + 1)
-        for j in range(n + 1)
-    ]
-    for i in range(n):
-        for j in range(n):
-            a = 1 + j + (n + 1) * i
-            lines.append(f"CQUAD4,{1 + j + n * i},1,{a},{a + n + 1},{a + n + 2},{a + 1}")
-    return "\n".join([*lines, "ENDDATA", ""])
+    return "\n".join([*lines, *flat_sheet(n, n, side, width or side), "ENDDATA", ""])
 
 
 @pytest.fixture
@@ -224,18 +216,6 @@ def test_one_plate_has_no_clearance(tmp_path):
     assert "no two parts" in refused("render", deck, "--clearance", "--out", out)
 
 
-CASE = """
-[model]
-deck = "plate.bdf"
-units = "SI"
-damping = 0.01
-[test]
-recordings = ["frf.npz"]
-[band]
-fit = [25.0, 180.0]
-"""
-
-
 SENSORS = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
 RECORDED = ["--input", "2:+Z", *SENSORS, "--band", "20:200", "--units", "SI"]
 
@@ -247,7 +227,7 @@ def case(tmp_path_factory):
     deck = folder / "plate.bdf"
     deck.write_text(deck_text(6, width=0.22))  # no two modes alike, none with a node at the shaker
     ran("frf", deck, *RECORDED, "--out", folder)
-    (folder / "case.toml").write_text(CASE)
+    (folder / "case.toml").write_text(case_text(25.0, 180.0))
     return folder
 
 
@@ -266,26 +246,14 @@ def copied(case, tmp_path):
     return Path(shutil.copytree(case, tmp_path / "case"))
 
 
-def test_a_model_correlates_with_itself(case, tmp_path):
-    """Every mode finds itself, Q is nothing; MAC is 1 but for faintly driven modes."""
-    ran("correlate", case, "--out", tmp_path / "out")
-    found = json.loads((tmp_path / "out" / "correlation.json").read_text())
-    assert len(found["modes"]) >= 4
-    assert found["alone_test_hz"] == []
-    assert max(abs(m["deviation"]) for m in found["modes"]) < 1e-3
-    assert min(m["mac"] for m in found["modes"]) > 0.95
-    assert np.median([m["mac"] for m in found["modes"]]) > 0.999
-    assert found["Q"]["mean"] < 1e-6
-    names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert {"correlation.json", "mac.png", "frequencies.png", "frf.png"} < names
-
-
 def test_frf_of_a_case_is_what_its_recording_holds(case, tmp_path):
-    """The recording was made of the same model: its lines, its labels, its values."""
+    """Of the same model: its lines, labels and values; the function gives the same arrays."""
     ran("frf", case, "--out", tmp_path / "out")
-    here, there = np.load(tmp_path / "out" / "frf.npz"), np.load(case / "frf.npz")
-    assert here["outputs"].tolist() == there["outputs"].tolist()
-    H, due = here["values"], there["values"]
+    (same,) = chladni.frf(load_case(case)).frfs
+    with np.load(tmp_path / "out" / "frf.npz") as here, np.load(case / "frf.npz") as there:
+        assert here["outputs"].tolist() == there["outputs"].tolist()
+        H, due = here["values"], there["values"]
+    np.testing.assert_array_equal(H, same.to("accelerance").values)
     np.testing.assert_allclose(H, due, atol=1e-4 * np.abs(due).max())
 
 
@@ -326,7 +294,8 @@ def test_how_to_estimate_is_known_and_told_where_nothing_is_estimated(case, tmp_
 
 def test_a_recording_of_the_model_itself_lacks_nothing(copied, tmp_path):
     """The model's own responses are explained by the model; the answer is whole and readable."""
-    (copied / "case.toml").write_text(CASE.replace("fit = [25.0, 180.0]", "fit = [20.0, 170.0]"))
+    few = '[search]\neffects = ["point-mass", "sensor-mass"]\n'
+    (copied / "case.toml").write_text(case_text(20.0, 170.0) + few)
     ran("diagnose", copied, "--out", tmp_path / "answer")
     d = json.loads((tmp_path / "answer" / "diagnosis.json").read_text())
     assert d["verdict"] in ("nothing missing", "calibration only")

@@ -126,8 +126,8 @@ def test_cards_and_rules_are_listed(reference):
     assert not [n for n in DecisionRules.__dataclass_fields__ if f"| `{n}` |" not in rules]
 
 
-def test_an_effect_states_claim_formula_prior_and_what_it_is_mistaken_for(reference):
-    text = reference._effect(registry.family("point-mass"), reference._Grounds())
+def test_an_effect_states_claim_formula_prior_and_what_it_is_mistaken_for(reference, grounds):
+    text = reference._effect(registry.family("point-mass"), grounds)
     for part in ("M + m Σ bᵀb", "`CONM2`", "[mass-patch](#mass-patch)", "| M | kg |", "weigh"):
         assert part in text, part
 

@@ -1,11 +1,7 @@
 import numpy as np
 import pytest
 
-from chladni.dynamics.damping import (
-    DampingTable,
-    modal_damping,
-    with_table,
-)
+from chladni.dynamics.damping import DampingTable, modal_damping, with_table
 from chladni.dynamics.eigen import normal_modes
 from chladni.errors import ShapeError
 

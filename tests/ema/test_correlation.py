@@ -6,15 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chladni.dynamics.frf import FRF
-from chladni.ema.correlation import (
-    auto_mac,
-    comac,
-    deviation,
-    mac,
-    quality,
-    subspace_mac,
-    wrapped,
-)
+from chladni.ema.correlation import auto_mac, comac, deviation, mac, quality, subspace_mac, wrapped
 from chladni.ema.mode_pairing import pair
 from chladni.errors import LabelError, ShapeError
 

@@ -300,7 +300,7 @@ def test_a_neighbour_that_is_rung_into_is_no_sign():
 
 @pytest.mark.parametrize(
     ("control", "kind"),
-    [("force", "share"), ("response", "share"), ("force", "floor"), ("force", "share, unsaid")],
+    [("force", "share"), ("response", "floor"), ("force", "share, unsaid")],
 )
 def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control, kind):
     """95 of 100 of the table's rows, three standard deviations of such a share granted.

@@ -1,6 +1,7 @@
 """What every case of the evidence was called, in one table at the end of the run."""
 
 import pytest
+from tests.builders.quick_runs import coarse_pictures
 
 from chladni.report.diagnosis_json import diagnosis_json
 from chladni_evidence.blind_diagnosis import Answer
@@ -12,6 +13,12 @@ UNKNOWN = {  # of articles others made
     "mesh": "as built", "values": {}, "part_mass_kg": {}, "mass_kg": float("nan"),
     "unweighed_kg": 0.0,
 }  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _coarse_pictures():
+    with coarse_pictures():
+        yield
 
 
 @pytest.fixture

@@ -4,8 +4,6 @@ The recording stays in the folder of recordings; what a user has is read here: f
 and phase at the drive point, line by line.
 """
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 
@@ -67,7 +65,6 @@ def test_damping_goes_with_amplitude_as_the_recording_says(mode):
 
 def test_friction_is_its_signature(mode):
     assert mode.signature == "friction"
-    assert mode.explained is not None
     assert "micro-slip" in mode.explained.element.name
     assert mode.fits[-1].p < 1e-6  # linear, or a spring alone, explains nothing
 
@@ -79,10 +76,10 @@ def test_two_levels_are_foretold_from_the_other_three(mode):
     assert f < f_linear
 
 
-def test_damping_is_foretold_better_whatever_two_are_held_out(mode):
-    for held in combinations(range(5), 2):
-        _, zeta, _, zeta_linear = foretold(mode.mode, held).misses(mode.mode)
-        assert zeta < zeta_linear
+@pytest.mark.parametrize("held", [(0, 1), (0, 4), (3, 4)])
+def test_damping_is_foretold_better_below_between_and_above(mode, held):
+    _, zeta, _, zeta_linear = foretold(mode.mode, held).misses(mode.mode)
+    assert zeta < zeta_linear
 
 
 def test_diagnosis_says_nonlinear_and_names_friction(beam):

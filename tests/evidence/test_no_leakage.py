@@ -27,6 +27,8 @@ def write_case(folder):
     folder.mkdir(parents=True)
     plate_case(folder, 4, (2, 4, 7, 18), np.linspace(15, 150, 200), 130.0)
     (folder / "article.bdf").unlink()
+    with (folder / "case.toml").open("a") as text:
+        text.write('[search]\neffects = ["point-mass"]\n')
 
 
 @pytest.fixture(scope="module")

@@ -90,12 +90,7 @@ def test_the_grain_of_a_spruce_plate(name, tmp_path, evidence):
 
     truth = json.loads((RECORDINGS / f"truth_{name}.json").read_text())
     moduli = {modulus: truth[f"{modulus}_Pa"] for modulus in WITHIN}
-    sealed = {
-        "effect": "orthotropic-material",
-        "structure": f"spruce {name}",
-        "seed": 0,
-        **moduli,
-    }
+    sealed = {"effect": "orthotropic-material", "structure": f"spruce {name}", "seed": 0, **moduli}
     evidence(read_diagnosis(out), sealed)
     found = {p["name"]: p["value"] for p in d["effects"][0]["parameters"]}
     for modulus, most in WITHIN.items():

@@ -3,7 +3,6 @@
 import re
 import wave
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,7 +52,7 @@ GOOD = {
         ),
     ],
 )
-def test_npz(tmp_path: Path, name: str, value: np.ndarray, said: str) -> None:
+def test_npz(tmp_path, name, value, said):
     path = tmp_path / "a.npz"
     np.savez(path, **{**GOOD, name: value})
     with pytest.raises(ChladniError, match=rf"a\.npz.*{said}"):
@@ -61,18 +60,15 @@ def test_npz(tmp_path: Path, name: str, value: np.ndarray, said: str) -> None:
 
 
 @pytest.mark.parametrize("made", [str, lambda text: [text], str.encode])
-def test_a_text_of_an_npz_may_be_the_only_one_of_a_row(tmp_path: Path, made) -> None:
+def test_a_text_of_an_npz_may_be_the_only_one_of_a_row(tmp_path, made):
     path = tmp_path / "a.npz"
     words = {"inputs": [b"1:+Z"], "quantity": made("mobility"), "article": made("B")}
     np.savez(path, **{**GOOD, **words})
     found = read_npz(path)
-    assert found.frf is not None
     assert (found.frf.inputs, found.frf.quantity, found.article) == (("1:+Z",), "mobility", "B")
 
 
-def test_an_unknown_array_is_refused_before_it_is_unpacked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_unknown_array_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
     path = tmp_path / "a.npz"
     np.savez_compressed(path, **GOOD, huge=np.zeros(1000))
     opened: list[str] = []
@@ -95,7 +91,7 @@ def test_an_unknown_array_is_refused_before_it_is_unpacked(
         ("a = 1\na = 2\nb = 3", "is not TOML: a key occurs twice"),
     ],
 )
-def test_toml_beyond_any_use(tmp_path: Path, text: str, said: str) -> None:
+def test_toml_beyond_any_use(tmp_path, text, said):
     path = tmp_path / "case.toml"
     path.write_text(f"[model]\n{text}\n")
     with pytest.raises(ChladniError, match=said) as error:
@@ -103,7 +99,7 @@ def test_toml_beyond_any_use(tmp_path: Path, text: str, said: str) -> None:
     assert len(str(error.value)) < 300
 
 
-def test_numbers_of_hundreds_of_digits_are_not_repeated(tmp_path: Path) -> None:
+def test_numbers_of_hundreds_of_digits_are_not_repeated(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(f"[test]\nmass = {'1' * 400}\nhangers = [{'1' * 30}]\nuse = {'1' * 100}\n")
     section = read_keys(path, ("test",)).section("test", ("mass", "hangers", "use"))
@@ -117,31 +113,24 @@ def test_numbers_of_hundreds_of_digits_are_not_repeated(tmp_path: Path) -> None:
         assert len(str(error.value)) < 200
 
 
-def test_a_cell_without_end(tmp_path: Path) -> None:
+def test_a_cell_without_end(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text('frequency_hz,output,input,real,imag\n1,"' + "x" * 200_000 + "\n")
     with pytest.raises(ChladniError, match=r"a\.csv is not a table"):
         read_csv(path, "mobility")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("         1   3", "         1   9", "direction 9 of node 1"),
-        ("         6         1", "       -20         1", "it states -20 values"),
-    ],
-)
-def test_universal_files(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_count_below_zero(tmp_path):
     path = tmp_path / "a.uff"
     write_uff(path, FRF(np.ones((6, 1, 1), complex), F, ("1:+Z",), ("1:+Z",), "mobility"))
-    text = path.read_text()
+    text, old = path.read_text(), "         6         1"
     assert old in text
-    path.write_text(text.replace(old, new, 1))
-    with pytest.raises(ChladniError, match=rf"a\.uff, dataset \d+ \(type 58\).*{said}"):
+    path.write_text(text.replace(old, "       -20         1", 1))
+    with pytest.raises(ChladniError, match=r"a\.uff, dataset \d+ \(type 58\).*states -20 values"):
         read_uff(path, "mobility")
 
 
-def written(path: Path, coherence: np.ndarray | None = None, lines: int = 61) -> list[str]:
+def written(path, coherence=None, lines=61):
     """The lines of a universal file of three channels."""
     f = np.linspace(10.0, 70.0, lines)
     values = np.linspace(1, 2, 3 * lines).reshape(lines, 3, 1) * (1 + 0.5j)
@@ -156,7 +145,7 @@ def written(path: Path, coherence: np.ndarray | None = None, lines: int = 61) ->
      ("furlong/s", "is not known"), ("mV", "no calibration")],
 )  # fmt: skip
 @pytest.mark.parametrize("axis", ["m/s^2               ", "N                   "])
-def test_units_nobody_knows_are_refused(tmp_path: Path, unit: str, said: str, axis: str) -> None:
+def test_units_nobody_knows_are_refused(tmp_path, unit, said, axis):
     """Not read as if they were m/s² or N, unless the user says what they are; then it is noted."""
     path = tmp_path / "a.uff"
     text = "\n".join(written(path))
@@ -170,18 +159,16 @@ def test_units_nobody_knows_are_refused(tmp_path: Path, unit: str, said: str, ax
 
 
 @pytest.mark.parametrize(("unit", "newton"), [("daN", 10.0), ("kip", 4448.2216), ("kN", 1e3)])
-def test_units_of_force_count(tmp_path: Path, unit: str, newton: float) -> None:
+def test_units_of_force_count(tmp_path, unit, newton):
     path = tmp_path / "a.uff"
     text = "\n".join(written(path))
     SI = read_uff(path).frf
     path.write_text(text.replace("N                   ", unit.ljust(20)))
     found = read_uff(path).frf
-    assert SI is not None
-    assert found is not None
     np.testing.assert_allclose(found.values * newton, SI.values, rtol=1e-6)
 
 
-def test_a_doubled_or_lost_line_is_refused(tmp_path: Path) -> None:
+def test_a_doubled_or_lost_line_is_refused(tmp_path):
     """Its values would move all later ones along the frequency axis."""
     path = tmp_path / "a.uff"
     lines = written(path)
@@ -196,7 +183,7 @@ def test_a_doubled_or_lost_line_is_refused(tmp_path: Path) -> None:
             read_uff(path)
 
 
-def with_function(path: Path, number: int, kind: int) -> Path:
+def with_function(path, number, kind):
     """The file with another function type in the head of one of its datasets 58."""
     lines = path.read_text().split("\n")
     at = [k for k, line in enumerate(lines) if line.strip() == "58"][number] + 6
@@ -206,20 +193,17 @@ def with_function(path: Path, number: int, kind: int) -> Path:
 
 
 @pytest.mark.parametrize("kind", [2, 3, 9, 12, 19, 99])
-def test_a_record_that_is_read_as_no_frf_is_named(tmp_path: Path, kind: int) -> None:
+def test_a_record_that_is_read_as_no_frf_is_named(tmp_path, kind):
     path = tmp_path / "a.uff"
     written(path)
     found = read_uff(with_function(path, 1, kind))
-    assert found.frf is not None
     assert found.frf.outputs == ("1:+Z", "3:+Z")
     (note,) = (note for note in found.notes if "not used" in note)
     assert re.search(rf"1 records .*: 2:\+Z / 1:\+Z \((function type {kind}|[a-z ]+)\)$", note)
 
 
 @pytest.mark.parametrize(("kind", "said"), [(1, "time history"), (6, "coherence")])
-def test_a_real_function_with_complex_values_is_refused(
-    tmp_path: Path, kind: int, said: str
-) -> None:
+def test_a_real_function_with_complex_values_is_refused(tmp_path, kind, said):
     path = tmp_path / "a.uff"
     written(path)
     with pytest.raises(
@@ -228,7 +212,7 @@ def test_a_real_function_with_complex_values_is_refused(
         read_uff(with_function(path, 1, kind))
 
 
-def test_coherence_of_no_frf_is_named_and_twice_it_is_refused(tmp_path: Path) -> None:
+def test_coherence_of_no_frf_is_named_and_twice_it_is_refused(tmp_path):
     path = tmp_path / "a.uff"
     written(path, np.full((61, 3, 1), 0.9))
     found = read_uff(with_function(path, 2, 99))  # 0: FRF, 1: its coherence, 2: the next FRF
@@ -240,7 +224,7 @@ def test_coherence_of_no_frf_is_named_and_twice_it_is_refused(tmp_path: Path) ->
         read_uff(path)
 
 
-def test_a_node_at_two_places_is_refused(tmp_path: Path) -> None:
+def test_a_node_at_two_places_is_refused(tmp_path):
     for second, good in (((1.0, 2.0, 0.5), True), ((1.0, 2.5, 0.5), False)):
         path = tmp_path / "a.uff"
         first = foreign_uff.nodes({7: (1.0, 2.0, 0.5)})
@@ -266,8 +250,8 @@ def test_a_node_at_two_places_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_the_first_line_of_a_binary_dataset_is_held_against_it(
-    tmp_path: Path, column: int, width: int, value: str, said: str
-) -> None:
+    tmp_path, column, width, value, said
+):
     path = tmp_path / "a.ufb"
     H = np.linspace(1, 2, 6).reshape(6, 1, 1) * (1 + 2j)
     write_uff(path, FRF(H, F, ("1:+Z",), ("1:+Z",), "mobility"), binary=True)
@@ -279,18 +263,15 @@ def test_the_first_line_of_a_binary_dataset_is_held_against_it(
             read_uff(path)
     else:
         frf = read_uff(path).frf
-        assert frf is not None
         np.testing.assert_array_equal(frf.values, H)
 
 
-def test_coherence_in_percent_is_refused(tmp_path: Path) -> None:
+def test_coherence_in_percent_is_refused(tmp_path):
     path = tmp_path / "a.npz"
     for factor, good in ((1.0, True), (1.005, True), (100.0, False), (-1.0, False)):
         np.savez(path, **{**GOOD, "coherence": factor * np.full((6, 2, 1), 0.999)})
         if good:
             frf = read_npz(path).frf
-            assert frf is not None
-            assert frf.coherence is not None
             assert frf.coherence.max() <= 1
         else:
             with pytest.raises(
@@ -299,21 +280,21 @@ def test_coherence_in_percent_is_refused(tmp_path: Path) -> None:
                 read_npz(path)
 
 
-def test_text_that_is_none_says_where(tmp_path: Path) -> None:
+def test_text_that_is_none_says_where(tmp_path):
     path = tmp_path / "a.csv"
     path.write_bytes(b"frequency_hz,output,input,real,imag\n1,1:+Z,\xe9,1,1\n")
     with pytest.raises(ChladniError, match=r"a\.csv is not UTF-8 text: byte 44 is 0xe9"):
         read_csv(path, "mobility")
 
 
-def test_a_number_no_structure_has(tmp_path: Path) -> None:
+def test_a_number_no_structure_has(tmp_path):
     path = tmp_path / "a.bdf"
     path.write_text("BEGIN BULK\nGRID,1,,1.+308,0.,0.\nENDDATA\n")
     with pytest.raises(ChladniError, match=r"GRID 1: X1 is '1\.\+308', not a number of any"):
         assembly(read_deck(path), UNITS["SI"])
 
 
-def test_a_header_of_an_npz_that_breaks_off_is_a_sentence(tmp_path: Path) -> None:
+def test_a_header_of_an_npz_that_breaks_off_is_a_sentence(tmp_path):
     """A bracket that is never closed ends in the tokenizer of Python itself."""
     header = b"{'descr': ('<f8', 'shape': (3L,\n"
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
@@ -325,7 +306,7 @@ def test_a_header_of_an_npz_that_breaks_off_is_a_sentence(tmp_path: Path) -> Non
     assert "('" not in str(caught.value)
 
 
-def test_a_wav_without_channels_is_a_sentence(tmp_path: Path) -> None:
+def test_a_wav_without_channels_is_a_sentence(tmp_path):
     path = tmp_path / "a.wav"
     with wave.open(str(path), "wb") as file:
         file.setnchannels(1)

@@ -1,7 +1,6 @@
 """Tables: round trips to the last digit; one sentence for each kind of fault."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from chladni.io.tables.write_tables import write_csv, write_npz, write_poles
 
 
 @pytest.fixture
-def H() -> FRF:
+def H():
     rng = np.random.default_rng(1)
     f = np.geomspace(7.0, 300.0, 20)
     values = rng.normal(size=(20, 3, 2)) + 1j * rng.normal(size=(20, 3, 2))
@@ -25,41 +24,38 @@ def H() -> FRF:
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz"])
-def test_every_digit_comes_back(tmp_path: Path, H: FRF, ending: str) -> None:
+def test_every_digit_comes_back(tmp_path, H, ending):
     path = tmp_path / f"a.{ending}"
     {"csv": write_csv, "npz": write_npz}[ending](path, H)
     (back,) = read_recordings(path, quantity="mobility")
-    assert back.frf is not None
     for name in ("values", "frequency", "variance", "coherence"):
         np.testing.assert_array_equal(getattr(back.frf, name), getattr(H, name))
     assert (back.frf.outputs, back.frf.inputs) == (H.outputs, H.inputs)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
-def test_order_of_rows_and_columns_is_free(tmp_path: Path, H: FRF) -> None:
+def test_order_of_rows_and_columns_is_free(tmp_path, H):
     write_csv(tmp_path / "a.csv", H)
     head, *rows = (tmp_path / "a.csv").read_text().splitlines()
     turned = [",".join(reversed(line.split(","))) for line in [head, *rows[::-1]]]
     (tmp_path / "b.csv").write_text("\ufeff" + "\n\n".join(turned), encoding="utf-8")
     back = read_recordings(tmp_path / "b.csv", "mobility")[0].frf
-    assert back is not None
     again = back.sel(H.outputs, H.inputs)
     np.testing.assert_array_equal(again.values, H.values)
 
 
-def test_levels_and_articles_are_recordings_of_their_own(tmp_path: Path) -> None:
+def test_levels_and_articles_are_recordings_of_their_own(tmp_path):
     """Each level may have its own frequencies, as a stepped sine has."""
     lines = ["frequency_hz,output,input,real,imag,level,article"]
     lines += [f"{f},1:+Z,2:+Z,{f},1,{a},{n}" for n in "AB" for a in (1, 2) for f in (a, a + 1.5)]
     (tmp_path / "a.csv").write_text("\n".join(lines))
     read = read_recordings(tmp_path / "a.csv", "accelerance")
     assert [(r.article, r.level) for r in read] == [("A", 1), ("A", 2), ("B", 1), ("B", 2)]
-    assert read[1].frf is not None
     np.testing.assert_array_equal(read[1].frf.frequency, [2.0, 3.5])
     assert read[3].name == "a.csv, article B, level 2"
 
 
-def test_poles_come_back(tmp_path: Path) -> None:
+def test_poles_come_back(tmp_path):
     nan = np.nan
     poles = PoleTable(
         np.array([10.1, 20.2, 9.9]), np.array([0.1, nan, nan]), np.array([nan, 0.01, nan]),
@@ -74,7 +70,7 @@ def test_poles_come_back(tmp_path: Path) -> None:
     assert read_recordings(tmp_path / "p.csv")[0].poles is not None
 
 
-def test_sensors_of_every_kind(tmp_path: Path) -> None:
+def test_sensors_of_every_kind(tmp_path):
     (tmp_path / "s.csv").write_text(
         "label,grid,x,y,z,direction,nx,ny,nz,role,mass,position_sd\n"
         "1:+Z,,0.1,0.2,0,,,,,input,,0.025\n"
@@ -98,9 +94,7 @@ HEAD = "frequency_hz,output,input,real,imag\n"
 
 
 @pytest.mark.parametrize(("phase", "in_a_turn"), [("phase_deg", 360), ("phase_rad", 2 * np.pi)])
-def test_magnitude_and_phase_are_real_and_imaginary_part(
-    tmp_path: Path, phase: str, in_a_turn: float
-) -> None:
+def test_magnitude_and_phase_are_real_and_imaginary_part(tmp_path, phase, in_a_turn):
     H = np.array([2.0 - 3j, -1e-3j, -4.0])
     turns = np.angle(H) / (2 * np.pi) + 1  # a phase may have been unwrapped
     rows = zip((1, 2, 3), np.abs(H).tolist(), (turns * in_a_turn).tolist(), strict=True)
@@ -109,7 +103,6 @@ def test_magnitude_and_phase_are_real_and_imaginary_part(
         + "".join(f"{angle},{f},{size},1:+Z,2:+Z\n" for f, size, angle in rows)
     )
     (read,) = read_recordings(tmp_path / "a.csv", "mobility")
-    assert read.frf is not None
     np.testing.assert_allclose(read.frf.values.ravel(), H, rtol=1e-12, atol=1e-12)
 
 
@@ -137,7 +130,7 @@ def test_magnitude_and_phase_are_real_and_imaginary_part(
         (HEAD + "1,1:+Z,1:+Z,0,0\n", "the FRF is empty"),
     ],
 )
-def test_faults_of_a_table(tmp_path: Path, text: str, said: str) -> None:
+def test_faults_of_a_table(tmp_path, text, said):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(FileError, match=said) as error:
         read_recordings(tmp_path / "a.csv", "mobility")
@@ -157,22 +150,20 @@ def test_faults_of_a_table(tmp_path: Path, text: str, said: str) -> None:
         ("2:+Z,,,,,,,\n2:+Z,,,,,,,", "line 3: output 2:.Z is already in line 2"),
     ],
 )
-def test_faults_of_the_sensors(tmp_path: Path, row: str, said: str) -> None:
+def test_faults_of_the_sensors(tmp_path, row, said):
     (tmp_path / "s.csv").write_text(f"label,grid,x,y,z,direction,role,mass\n{row}\n")
     with pytest.raises(FileError, match=said):
         read_sensors(tmp_path / "s.csv")
 
 
-def test_faults_of_an_archive(tmp_path: Path, H: FRF) -> None:
+def test_faults_of_an_archive(tmp_path, H):
     path = tmp_path / "a.npz"
     write_npz(path, H)
     arrays = dict(np.load(path, allow_pickle=False))
     for change, said in (
         ({"outputs": np.array(["1:+Z"])}, r"labels and frequencies say \(20, 1, 2\)"),
-        ({"values": np.where(np.arange(20)[:, None, None] == 3, np.nan, H.values)}, "not a number"),
         ({"values": np.where(np.arange(20)[:, None, None] == 3, 1e280, H.values)}, "not a number"),
         ({"outputs": np.array([{}], dtype=object)}, "cannot be read"),
-        ({"gain": np.ones(2)}, "unknown array gain"),
         ({"frequency_hz": np.ones(20)}, "frequencies must increase"),
     ):
         np.savez(path, **(arrays | change))
@@ -183,7 +174,7 @@ def test_faults_of_an_archive(tmp_path: Path, H: FRF) -> None:
         read_recordings(path)
 
 
-def test_the_quantity_must_be_known(tmp_path: Path, H: FRF) -> None:
+def test_the_quantity_must_be_known(tmp_path, H):
     write_csv(tmp_path / "a.csv", replace(H, variance=None))
     with pytest.raises(FileError, match="does not say its quantity: one of receptance"):
         read_recordings(tmp_path / "a.csv")

@@ -1,7 +1,6 @@
 """One test as WAV, MAT, CSV, NPZ and universal file; what is wrong is one sentence."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,14 +18,14 @@ CHANNELS = "channel,label,unit,scale\n1,7:+Z,lbf,2\n2,7:+Z,g,4\n3,9:-X,m/s^2,1\n
 POUND, GRAVITY = 4.4482216152605, 9.80665
 
 
-def csv(path: Path, unit: str = "m/s^2") -> Path:
+def csv(path, unit="m/s^2"):
     head = f"time_s,7:+Z [N],7:+Z [g],9:-X [{unit}]"
     rows = np.column_stack([np.arange(N) / RATE, FORCE.T, MOTION.T])
     np.savetxt(path, rows, delimiter=",", header=head, comments="", fmt="%.17g")
     return path
 
 
-def universal(path: Path, blocks: int = 1) -> Path:
+def universal(path, blocks=1):
     file = pyuff.UFF(str(path))
     channels = [
         (FORCE[0], 13, "N", 7, 3),
@@ -49,13 +48,13 @@ def universal(path: Path, blocks: int = 1) -> Path:
     return path
 
 
-def the_record(path: Path):
+def the_record(path):
     (found,) = read_recordings(path)
     assert found.time is not None, found.notes
     return found.time
 
 
-def test_csv_says_labels_and_units_in_its_head(tmp_path: Path) -> None:
+def test_csv_says_labels_and_units_in_its_head(tmp_path):
     found = the_record(csv(tmp_path / "a.csv"))
     assert (found.inputs, found.outputs) == (LABELS[:1], LABELS[1:])
     assert found.quantity == "accelerance"
@@ -64,7 +63,7 @@ def test_csv_says_labels_and_units_in_its_head(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.response[0], MOTION * [[GRAVITY], [1.0]])
 
 
-def test_wav_gets_units_from_the_table_beside_it(tmp_path: Path) -> None:
+def test_wav_gets_units_from_the_table_beside_it(tmp_path):
     """16 bits: shares of full scale to 2⁻¹⁶, times the scale of each channel."""
     numbers = np.round(np.vstack([FORCE, MOTION]).T * 32767).astype(np.int16)
     wavfile.write(tmp_path / "hit.wav", int(RATE), numbers)
@@ -83,7 +82,7 @@ def test_wav_gets_units_from_the_table_beside_it(tmp_path: Path) -> None:
     )
 
 
-def test_both_layouts_of_mat(tmp_path: Path) -> None:
+def test_both_layouts_of_mat(tmp_path):
     plain = {"fs": RATE, "force": FORCE.T, "acceleration": MOTION, "inputs": ["7:+Z"],
              "outputs": ["7:+Z", "9:-X"]}  # fmt: skip
     savemat(tmp_path / "plain.mat", plain)
@@ -91,7 +90,7 @@ def test_both_layouts_of_mat(tmp_path: Path) -> None:
     assert (found.inputs, found.outputs) == (LABELS[:1], LABELS[1:])
     np.testing.assert_allclose(found.response[0], MOTION)
 
-    def signal(y: np.ndarray, unit: str, name: str) -> dict:
+    def signal(y, unit, name):
         axis = {"start_value": 0.0, "increment": 1 / RATE, "number_of_values": N}
         values = {"values": y, "quantity": {"label": unit}}
         return {"x_values": axis, "y_values": values, "function_record": {"name": name}}
@@ -108,10 +107,9 @@ def test_both_layouts_of_mat(tmp_path: Path) -> None:
     np.testing.assert_allclose(other.response[0, 0], GRAVITY * MOTION[0])
 
 
-def test_rows_of_both_arrays_are_blocks(tmp_path: Path) -> None:
+def test_rows_of_both_arrays_are_blocks(tmp_path):
     np.savez(tmp_path / "a.npz", force=np.ones((5, N)), acceleration=np.ones((5, N)), fs=RATE)
     (found,) = read_recordings(tmp_path / "a.npz")
-    assert found.time is not None
     assert found.time.force.shape == (5, 1, N)
     said = " ".join(found.notes)
     assert "5 rows in both arrays are 5 blocks" in said
@@ -123,7 +121,7 @@ def test_rows_of_both_arrays_are_blocks(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.response[0], 1e-3 * MOTION)
 
 
-def test_a_universal_file_of_time_histories(tmp_path: Path) -> None:
+def test_a_universal_file_of_time_histories(tmp_path):
     """Blocks where dofs repeat; direction, data type and unit of each channel."""
     found = the_record(universal(tmp_path / "a.uff", 3))
     assert (found.inputs, found.outputs) == (LABELS[:1], LABELS[1:])
@@ -131,7 +129,7 @@ def test_a_universal_file_of_time_histories(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.response[1, 1], 1e-3 * MOTION[1], rtol=1e-4)
 
 
-def test_a_base_that_moves_makes_a_transmissibility(tmp_path: Path) -> None:
+def test_a_base_that_moves_makes_a_transmissibility(tmp_path):
     csv(tmp_path / "a.csv")
     table = "channel,label,unit,role\n2,base:+Z,m/s^2,input\n3,9:-X,m/s^2,output\n"
     (tmp_path / "a.channels.csv").write_text(table)
@@ -139,14 +137,13 @@ def test_a_base_that_moves_makes_a_transmissibility(tmp_path: Path) -> None:
     assert (found.inputs, found.quantity) == (("base:+Z",), "transmissibility")
 
 
-def test_a_quantity_that_is_asked_for_counts(tmp_path: Path) -> None:
+def test_a_quantity_that_is_asked_for_counts(tmp_path):
     (found,) = read_recordings(csv(tmp_path / "a.csv"), "receptance")
-    assert found.time is not None
     assert found.time.quantity == "receptance"
     assert "read as receptance as requested" in found.notes[-1]
 
 
-def test_responses_without_a_force_are_time_histories(tmp_path: Path) -> None:
+def test_responses_without_a_force_are_time_histories(tmp_path):
     """Of a CSV, a WAV of a microphone, an NPZ of two blocks, a universal file: SI, no FRF."""
     head = "time_s,7:+Z [g],9:-X [m/s^2]"
     rows = np.column_stack([np.arange(N) / RATE, MOTION.T])
@@ -167,7 +164,7 @@ def test_responses_without_a_force_are_time_histories(tmp_path: Path) -> None:
         np.testing.assert_allclose(found.functions[0].x, np.arange(N) / RATE, atol=1e-9)
 
 
-def test_sound_has_no_frequency_response(tmp_path: Path) -> None:
+def test_sound_has_no_frequency_response(tmp_path):
     path = csv(tmp_path / "a.csv", "Pa")
     path.write_text(path.read_text().replace("[g]", "[Pa]"))
     with pytest.raises(ChladniError, match=r"a\.csv: .*1 inputs and 2 outputs"):
@@ -185,7 +182,7 @@ BAD_CSV = {
 
 
 @pytest.mark.parametrize("name", BAD_CSV)
-def test_what_is_wrong_with_a_table_is_said(tmp_path: Path, name: str) -> None:
+def test_what_is_wrong_with_a_table_is_said(tmp_path, name):
     change, said = BAD_CSV[name]
     path = csv(tmp_path / "a.csv")
     path.write_text(change(path.read_text()))
@@ -204,13 +201,13 @@ def test_what_is_wrong_with_a_table_is_said(tmp_path: Path, name: str) -> None:
         ({"force": FORCE, "acceleration": np.full((1, N), np.nan), "fs": RATE}, "not a number"),
     ],
 )
-def test_what_is_wrong_with_arrays_is_said(tmp_path: Path, arrays: dict, said: str) -> None:
+def test_what_is_wrong_with_arrays_is_said(tmp_path, arrays, said):
     np.savez(tmp_path / "a.npz", **arrays)
     with pytest.raises(ChladniError, match=rf"a\.npz: .*{said}"):
         read_recordings(tmp_path / "a.npz")
 
 
-def test_damaged_and_new_files_are_refused(tmp_path: Path) -> None:
+def test_damaged_and_new_files_are_refused(tmp_path):
     savemat(tmp_path / "a.mat", {"fs": RATE, "force": FORCE, "acceleration": MOTION})
     data = (tmp_path / "a.mat").read_bytes()
     (tmp_path / "b.mat").write_bytes(data[: len(data) // 2])
@@ -231,7 +228,7 @@ def test_damaged_and_new_files_are_refused(tmp_path: Path) -> None:
             read_recordings(tmp_path / name)
 
 
-def test_the_table_of_channels_is_held_to_its_words(tmp_path: Path) -> None:
+def test_the_table_of_channels_is_held_to_its_words(tmp_path):
     csv(tmp_path / "a.csv")
     for table, said in (
         ("channel,label,unit\n8,7:+Z,N\n", r"a\.channels\.csv, line 2: no channel '8'"),
@@ -244,7 +241,7 @@ def test_the_table_of_channels_is_held_to_its_words(tmp_path: Path) -> None:
             read_recordings(tmp_path / "a.csv")
 
 
-def test_a_wav_that_is_shorter_than_it_says_is_refused(tmp_path: Path) -> None:
+def test_a_wav_that_is_shorter_than_it_says_is_refused(tmp_path):
     """The chunk of samples states its bytes; all ones there: a recorder that never came to it."""
     path = tmp_path / "a.wav"
     wavfile.write(path, int(RATE), np.vstack([FORCE, MOTION]).T.astype(np.float32))
@@ -258,7 +255,7 @@ def test_a_wav_that_is_shorter_than_it_says_is_refused(tmp_path: Path) -> None:
             read_recordings(path)
 
 
-def test_channels_said_twice_are_refused_and_those_not_said_named(tmp_path: Path) -> None:
+def test_channels_said_twice_are_refused_and_those_not_said_named(tmp_path):
     path = csv(tmp_path / "a.csv")
     table = tmp_path / "a.channels.csv"
     table.write_text(CHANNELS + "2,12:+Z,g,4\n")
@@ -266,7 +263,6 @@ def test_channels_said_twice_are_refused_and_those_not_said_named(tmp_path: Path
         read_recordings(path)
     table.write_text(CHANNELS.rpartition("3,")[0])
     (found,) = read_recordings(path)
-    assert found.time is not None
     assert found.time.outputs == ("7:+Z",)
     assert any("a.channels.csv has no line for channel 9:-X" in note for note in found.notes)
     table.write_text(CHANNELS)

@@ -14,13 +14,7 @@ from chladni.inference.map_fit import Fit, MassMeasurement, Status, fit
 from chladni.inference.result import Agreement, MassComparison, Scores
 from chladni.progress import silent
 from chladni.reduced.reduced_model import evaluate
-from chladni.search.calibration import (
-    PROFILED,
-    _basins,
-    _without,
-    latin_hypercube,
-    profiles,
-)
+from chladni.search.calibration import PROFILED, _basins, _without, latin_hypercube, profiles
 from chladni.search.compensation import compensating
 from chladni.search.deciding import _leaves_the_scales
 from chladni.search.posterior import bands, gaussian_draws, posterior_sample, with_frozen

@@ -15,6 +15,7 @@ from chladni_specimens.plates import plate
 
 MADE = plate(0.3, 0.22, 6, 6, 1e-3)
 SENSORS = (2, 4, 7, 18, 30, 43)
+PREDICTED = ["point-mass", "stiffness-patch", "thickness-distribution"]
 
 
 def dofs(*grids):
@@ -81,7 +82,7 @@ def test_what_is_found_is_named_by_a_diagnosis(found, tmp_path):
 
 
 def a_case(folder, article):
-    """The article's own responses with 1 % of noise, and its deck without the mass."""
+    """The article's own responses with 1 % of noise, its deck without the mass, three families."""
     from chladni.io.nastran import write_assembly
     from chladni.io.tables.write_tables import write_npz
 
@@ -95,6 +96,6 @@ def a_case(folder, article):
     mass = chladni.modes(model, 7).mass
     (folder / "case.toml").write_text(
         '[model]\ndeck = "plate.bdf"\nunits = "SI"\n[test]\nrecordings = ["frf.npz"]\n'
-        f"mass = {mass:.5f}\n[band]\nfit = [20.0, 170.0]\n"
+        f"mass = {mass:.5f}\n[band]\nfit = [20.0, 170.0]\n[search]\neffects = {PREDICTED}\n"
     )
     return folder

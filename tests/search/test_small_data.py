@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.builders.decks import flat_sheet
 
 from chladni.case import load_case
 from chladni.dynamics.eigen import normal_modes
@@ -23,19 +24,12 @@ from chladni.workflows.correlate import correlate
 from chladni.workflows.diagnose import diagnose
 from chladni.workflows.identify import identify
 
-NX, NY = 6, 4
-
 
 def plate_deck(held: bool = False) -> str:
     """A flat steel plate of 24 quads, 0.6 x 0.3 m, in SI."""
     cards = ["SOL 103", "CEND", *["SPC = 1"] * held, "BEGIN BULK", "MAT1,1,210.+9,,.3,7850."]
     cards += ["PSHELL,1,1,.001,1,,1"]
-    for i in range(NX + 1):
-        for j in range(NY + 1):
-            cards.append(f"GRID,{1 + i * (NY + 1) + j},,{0.6 * i / NX},{0.3 * j / NY},0.")
-    corner = [(i * (NY + 1) + j + 1) for i in range(NX) for j in range(NY)]
-    for n, a in enumerate(corner, start=1):
-        cards.append(f"CQUAD4,{n},1,{a},{a + NY + 1},{a + NY + 2},{a + 1}")
+    cards += flat_sheet(6, 4, 0.6, 0.3)
     return "\n".join([*cards, *["SPC1,1,123456,1,2,3,4,5"] * held, "ENDDATA"]) + "\n"
 
 

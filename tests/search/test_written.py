@@ -180,32 +180,30 @@ DUE = threshold(object.__new__(Responses), 1)  # of one family
 NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
 
 
-def test_calibration_alone_is_written_without_scatter(reduced, responses):
+@pytest.fixture(scope="module")
+def scattered(reduced, responses):
+    """A null of E and a scatter of t."""
+    E, t = calibration_parameter(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05)
+    start = np.array([p.mean for e in (E, t) for p in e.parameters])
+    found = fit(reduced.model, [E, t], responses.rebased(reduced.model), None, start)
+    return HypothesisFit(Effect(), found, reduced.model)
+
+
+def test_calibration_alone_is_written_without_scatter(scattered):
     """What the null has beside E stays out of the deck, and E is fitted anew."""
-    effects = [
-        calibration_parameter(reduced.groups, "E", [0]),
-        random_field(reduced.groups, "t", 0.05),
-    ]
-    start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
-    fitted = fit(reduced.model, effects, responses.rebased(reduced.model), None, start)
-    deck = as_written(HypothesisFit(Effect(), fitted, reduced.model), None)
+    deck = as_written(scattered, None)
     assert [e.name for e in deck.fit.effects] == ["part-scale"]
     assert deck.fit.x[0] == pytest.approx(0.04, abs=2e-3)
 
 
-def test_numbers_as_they_were_found_are_those_of_the_null(reduced, responses):
+def test_numbers_as_they_were_found_are_those_of_the_null(scattered):
     """The scatter beside them is gone; values and what is known of them stay."""
-    effects = [
-        calibration_parameter(reduced.groups, "E", [0]),
-        random_field(reduced.groups, "t", 0.05),
-    ]
-    start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
-    fitted = fit(reduced.model, effects, responses.rebased(reduced.model), None, start)
-    found = as_found(HypothesisFit(Effect(), fitted, reduced.model))
-    assert found.fit.effects == (effects[0],)
-    assert found.fit.of(effects[0]) == fitted.of(effects[0])
-    assert found.fit.sd(effects[0]) == fitted.sd(effects[0])
-    due = evaluate(reduced.model, [effects[0]], fitted.of(effects[0]), False)
+    found, fitted = as_found(scattered), scattered.fit
+    E = fitted.effects[0]
+    assert found.fit.effects == (E,)
+    assert found.fit.of(E) == fitted.of(E)
+    assert found.fit.sd(E) == fitted.sd(E)
+    due = evaluate(scattered.model, [E], fitted.of(E), False)
     assert found.fit.state.lam[6:] == pytest.approx(due.lam[6:])
 
 

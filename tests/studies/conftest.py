@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.builders.quick_runs import coarse_pictures
 
 import chladni
 from chladni.io.nastran import write_assembly
@@ -9,6 +10,12 @@ from chladni_specimens.plates import plate
 from chladni_studies import StudySettings
 
 THREE = ("t=90%:110%", "E=80%:120%", "rho=85%:115%")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _coarse_pictures():
+    with coarse_pictures():
+        yield
 
 
 @pytest.fixture(scope="session")

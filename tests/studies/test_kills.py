@@ -170,7 +170,7 @@ def study(request, deck):
 @pytest.mark.parametrize(
     ("study", "kills", "seed"),
     [
-        (("plate", 150, 1), 2, 7),
+        (("plate", 60, 1), 2, 7),
         pytest.param(("plate", 600, 2), 25, 8, marks=pytest.mark.slow),
         pytest.param(("plate", 600, 2), 25, 9, marks=pytest.mark.slow),
         pytest.param(("tailgate", 60, 2), 12, 10, marks=pytest.mark.slow),

@@ -1,6 +1,7 @@
 """A study's folder: how it goes on where it stopped, and that nothing is run twice."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -14,6 +15,19 @@ from chladni_studies.study_store import BEGUN, ROWS
 from .conftest import THREE
 
 SETTINGS = StudySettings(samples=12, modes=2)
+
+
+@pytest.fixture(scope="module")
+def whole(model, tmp_path_factory):
+    """A finished study: its result and folder, which is copied before anything changes in it."""
+    folder = tmp_path_factory.mktemp("study") / "whole"
+    return chladni.study(model, THREE, SETTINGS, out=folder), folder
+
+
+@pytest.fixture
+def out(whole, tmp_path):
+    """A copy of the folder of a finished study."""
+    return shutil.copytree(whole[1], tmp_path / "out")
 
 
 def rows(folder):
@@ -40,32 +54,27 @@ def results(found):
 
 
 @pytest.mark.parametrize("torn", [b"", b'{"sample": 5, "st', b"{"])
-def test_it_goes_on_where_it_stopped(model, tmp_path, calls, torn):
-    whole = chladni.study(model, THREE, SETTINGS, out=tmp_path / "whole")
-    part = chladni.study(model, THREE, SETTINGS, out=tmp_path / "part")
-    kept = (tmp_path / "part" / ROWS).read_bytes().splitlines(keepends=True)[:5]
-    (tmp_path / "part" / ROWS).write_bytes(b"".join(kept) + torn)
-    calls.clear()
-    part = chladni.study(model, THREE, SETTINGS, out=tmp_path / "part")
+def test_it_goes_on_where_it_stopped(model, whole, out, calls, torn):
+    kept = (out / ROWS).read_bytes().splitlines(keepends=True)[:5]
+    (out / ROWS).write_bytes(b"".join(kept) + torn)
+    part = chladni.study(model, THREE, SETTINGS, out=out)
     assert calls == [-1, *range(5, 12)]
     assert part.kept == 5
-    for name, values in results(whole).items():
+    for name, values in results(whole[0]).items():
         np.testing.assert_array_equal(results(part)[name], values)
     calls.clear()
-    again = chladni.study(model, THREE, SETTINGS, out=tmp_path / "part")
+    again = chladni.study(model, THREE, SETTINGS, out=out)
     assert calls == [-1]
     assert again.rows == part.rows
-    assert sorted(r["sample"] for r in rows(tmp_path / "part")) == list(range(12))
+    assert sorted(r["sample"] for r in rows(out)) == list(range(12))
 
 
-def test_a_failed_sample_is_finished_too(model, tmp_path, calls):
-    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
-    text = (tmp_path / "out" / ROWS).read_text().splitlines()
+def test_a_failed_sample_is_finished_too(model, out, calls):
+    text = (out / ROWS).read_text().splitlines()
     failed = {"sample": 3, "status": "failed", "why": "no", "seconds": 0.0}
     text[3] = json.dumps(failed)
-    (tmp_path / "out" / ROWS).write_text("\n".join([*text, ""]))
-    calls.clear()
-    found = chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+    (out / ROWS).write_text("\n".join([*text, ""]))
+    found = chladni.study(model, THREE, SETTINGS, out=out)
     assert calls == [-1]
     assert found.failed == [(3, "no")]
 
@@ -81,30 +90,22 @@ def test_a_failed_sample_is_finished_too(model, tmp_path, calls):
         ({"settings": StudySettings(samples=12, modes=3)}, "the results of a sample"),
     ],
 )
-def test_another_study_is_refused(model, tmp_path, change, named):
-    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
-    before = (tmp_path / "out" / ROWS).read_bytes()
+def test_another_study_is_refused(model, out, change, named):
+    before = (out / ROWS).read_bytes()
     given = {"vary": THREE, "settings": SETTINGS} | change
     with pytest.raises(FileError, match="another study") as caught:
-        chladni.study(model, **given, out=tmp_path / "out")
+        chladni.study(model, **given, out=out)
     assert named in str(caught.value)
-    assert (tmp_path / "out" / ROWS).read_bytes() == before
+    assert (out / ROWS).read_bytes() == before
 
 
-def test_another_deck_is_another_study(deck, tmp_path):
-    thicker = tmp_path / "plate.bdf"
-    text = deck.read_text()
-    assert "2.1+11" in text or "2.1E" in text
-    thicker.write_text(text)
-    first = chladni.load(thicker, "SI")
-    chladni.study(first, THREE, SETTINGS, out=tmp_path / "out")
-    same = chladni.load(deck, "SI")  # the same structure under another name
-    assert chladni.study(same, THREE, SETTINGS, out=tmp_path / "out").kept == 12
-    made = first.assembly
-    parts = tuple(p.with_section(nonstructural=0.1) for p in made.parts)
-    other = type(first)(first.source, made.with_parts(parts))
+def test_another_deck_is_another_study(deck, out, tmp_path):
+    same = chladni.load(shutil.copy(deck, tmp_path / "copy.bdf"), "SI")
+    assert chladni.study(same, THREE, SETTINGS, out=out).kept == 12
+    parts = tuple(p.with_section(nonstructural=0.1) for p in same.assembly.parts)
+    other = type(same)(same.source, same.assembly.with_parts(parts))
     with pytest.raises(FileError, match="the deck, the case or the recording differs"):
-        chladni.study(other, THREE, SETTINGS, out=tmp_path / "out")
+        chladni.study(other, THREE, SETTINGS, out=out)
 
 
 def test_files_that_are_no_study_are_left_alone(model, tmp_path):
@@ -127,11 +128,10 @@ def test_files_that_are_no_study_are_left_alone(model, tmp_path):
         (BEGUN, b'{"identity": 3}', "is damaged"),
     ],
 )
-def test_damage_is_said(model, tmp_path, file, content, named):
-    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
-    (tmp_path / "out" / file).write_bytes(content)
+def test_damage_is_said(model, out, file, content, named):
+    (out / file).write_bytes(content)
     with pytest.raises(FileError, match=named):
-        chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+        chladni.study(model, THREE, SETTINGS, out=out)
 
 
 def test_a_second_process_is_refused(model, tmp_path):
@@ -171,8 +171,7 @@ def test_whole_responses_are_there_before_their_row(model, tmp_path):
     assert found.store == tmp_path / "out"
 
 
-def test_rows_are_written_as_json_alone(model, tmp_path):
+def test_rows_are_written_as_json_alone(out):
     """A lost mode is null, never NaN, which is no JSON."""
-    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
-    write_json(tmp_path / "x.json", rows(tmp_path / "out"))
-    assert "NaN" not in (tmp_path / "out" / ROWS).read_text()
+    write_json(out / "x.json", rows(out))
+    assert "NaN" not in (out / ROWS).read_text()

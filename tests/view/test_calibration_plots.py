@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.view.calibration_plots import (
-    corner,
-    likelihood_profiles,
-    response_bands,
-    unit_places,
-)
+from chladni.view.calibration_plots import corner, likelihood_profiles, response_bands, unit_places
 
 
 @pytest.mark.parametrize("count", [1, 2, 11])

@@ -5,10 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.builders.cases import SENSORS, write_case
+from tests.builders.quick_runs import coarse_pictures, few_starts, identified_once
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem import modelled as fem_modelled
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _quick():
+    with coarse_pictures(), identified_once():
+        yield
+
+
+@pytest.fixture(scope="module")
+def few():
+    """Calibrations begin at two points, as that of ``calibrated`` does."""
+    with few_starts():
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -44,7 +58,8 @@ def diagnosed(diagnosis):
 
 @pytest.fixture(scope="session")
 def calibrated(case):
-    return chladni.calibrate(case)
+    with few_starts():
+        return chladni.calibrate(case)
 
 
 @pytest.fixture

@@ -40,6 +40,8 @@ def test_a_planned_test_of_the_model_finds_the_model(planned, tmp_path):
     ran("correlate", tmp_path / "case", "--out", tmp_path / "out")
     found = json.loads((tmp_path / "out" / "correlation.json").read_text())
     assert found["Q"]["mean"] < 1e-8
+    assert found["alone_test_hz"] == []
+    assert max(abs(pair["deviation"]) for pair in found["modes"]) < 1e-3
     assert [pair["mac"] > 0.999 for pair in found["modes"]][:5] == [True] * 5, "the planned modes"
     sensors = json.loads((plan / "plan.json").read_text())["sensors"]
     assert set(found["comac"]) == {s["label"] for s in sensors}

@@ -3,9 +3,8 @@
 import json
 from importlib import import_module
 
-import numpy as np
 import pytest
-from tests.builders.commands import call, ran
+from tests.builders.commands import call
 
 import chladni
 from chladni.cli.app import commands
@@ -14,6 +13,7 @@ from chladni.report.diagnosis_json import read_diagnosis
 from chladni.report.result_json import to_json
 from chladni_planning import PlanSettings
 
+pytestmark = pytest.mark.usefixtures("few")
 WORKFLOW = {  # command: the function it calls
     "diagnose": "chladni.workflows.diagnose.diagnose",
     "demo": "chladni.workflows.diagnose.diagnose",
@@ -116,14 +116,6 @@ def test_json_of_a_diagnosis_is_the_result_of_its_function(
     due = plain(to_json(diagnosed))
     assert due.pop("files") == {}
     assert found == due
-
-
-def test_arrays_of_frf_are_the_result_of_its_function(case, folder, tmp_path):
-    out = tmp_path / "out"
-    ran("frf", folder, "--out", out)
-    (due,) = chladni.frf(case).frfs
-    with np.load(out / "frf.npz", allow_pickle=False) as held:
-        np.testing.assert_array_equal(held["values"], due.to("accelerance").values)
 
 
 def test_progress_is_a_callback_that_only_rises(case):

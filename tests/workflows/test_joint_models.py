@@ -1,6 +1,7 @@
 """Models of joints compared: the one the article has predicts held-out data best."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +24,7 @@ BAND = (20.0, 220.0)
 TRUTH = "screws on RBE3"
 
 
-def write_case(folder, deck, article, more=""):
+def write_case(folder, deck, article):
     """A deck and the responses of an article on the same grids, with 1 % noise."""
     write_assembly(deck, folder / "panel.bdf")
     write_assembly(article, folder / "article.bdf")
@@ -38,16 +39,16 @@ def write_case(folder, deck, article, more=""):
     (folder / "case.toml").write_text(
         '[model]\ndeck = "panel.bdf"\nunits = "SI"\n[test]\nrecordings = ["frf.npz"]\n'
         f"[band]\nfit = [{BAND[0]}, {BAND[1]}]\n[held_out]\nband = [220.0, 290.0]\n"
-        '[[parameter]]\nfield = "E"\nparts = ["lower", "upper"]\nname = "E sheets"\n' + more
+        '[[parameter]]\nfield = "E"\nparts = ["lower", "upper"]\nname = "E sheets"\n'
     )
     return folder
 
 
-@pytest.fixture
-def welded(tmp_path):
+@pytest.fixture(scope="module")
+def welded(tmp_path_factory):
     deck = panel(0.04)
     made = {v.name: v.assembly for v in joint_variants(deck)}
-    return write_case(tmp_path, deck, made[TRUTH])
+    return write_case(tmp_path_factory.mktemp("welded"), deck, made[TRUTH])
 
 
 def test_the_model_of_the_article_is_the_best(welded, monkeypatch):
@@ -76,12 +77,13 @@ def test_parts_keep_their_names_and_parameters(welded):
     assert E[0] == E[1]
 
 
-def test_a_parameter_of_a_joint_that_is_gone_refuses_the_row(tmp_path):
+def test_a_parameter_of_a_joint_that_is_gone_refuses_the_row(welded, tmp_path):
     """Springs have no E: that row says so, the others are fitted."""
-    more = '[[parameter]]\nfield = "adhesive-stiffness"\nparts = ["glue"]\n'
-    deck = panel(0.04)
-    made = {v.name: v.assembly for v in joint_variants(deck)}
-    case = load_case(write_case(tmp_path, deck, deck, more))
+    shutil.copytree(welded, tmp_path / "case")
+    with (tmp_path / "case" / "case.toml").open("a") as text:
+        text.write('[[parameter]]\nfield = "adhesive-stiffness"\nparts = ["glue"]\n')
+    case = load_case(tmp_path / "case")
+    made = {v.name: v.assembly for v in joint_variants(case.assembly)}
     with pytest.raises(LabelError, match="no part 'glue'"):
         with_joints(case, made["adhesive as springs"])
 

@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.cases import case_text
 from tests.builders.commands import refused
+from tests.builders.plate_recordings import at
 
 import chladni
 from chladni.effects.points import with_masses
@@ -22,17 +24,6 @@ from chladni_specimens.plates import plate
 SENSORS = [(0.09, 0.05), (0.12, 0.2), (0.15, 0.1), (0.18, 0.025), (0.21, 0.15), (0.24, 0.0),
            (0.3, 0.05), (0.3, 0.175)]  # fmt: skip
 PLACE = (0.24, 0.15)  # of 20 g that the deck does not have
-CASE = """
-[model]
-deck = "plate.bdf"
-units = "SI"
-damping = 0.01
-[test]
-recordings = ["table.npz"]
-mass = {mass}
-[band]
-fit = [15.0, 420.0]
-"""
 
 
 def clamped(t=1.2e-3, finer=1):
@@ -40,12 +31,6 @@ def clamped(t=1.2e-3, finer=1):
     made = plate(0.3, 0.2, 10 * finer, 8 * finer, t)
     edge = np.flatnonzero(made.points[:, 0] == 0)
     return replace(made, supports=np.array([(k, c) for k in edge for c in range(1, 7)]))
-
-
-def at(assembly, places):
-    """Grids at places in the plane."""
-    away = np.linalg.norm(assembly.points[None, :, :2] - np.asarray(places)[:, None], axis=2)
-    return tuple(int(assembly.ids[k]) for k in away.argmin(axis=1))
 
 
 def a_case(folder, article, seed):
@@ -61,7 +46,7 @@ def a_case(folder, article, seed):
     labels = tuple(f"{g}:+Z" for g in at(clamped(), SENSORS))
     write_npz(folder / "table.npz", replace(T, values=values, outputs=labels))
     mass = round(chladni.modes(model, 3).mass, 5)
-    (folder / "case.toml").write_text(CASE.format(mass=mass))
+    (folder / "case.toml").write_text(case_text(15.0, 420.0, mass, "table.npz"))
     return chladni.load_case(folder)
 
 

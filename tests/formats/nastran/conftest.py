@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from chladni.io.nastran import read_deck
+from chladni.io.nastran import assembly, read_deck
+from chladni.units import UNITS
 
 ANCHORS = Path(__file__).resolve().parents[3] / "../shared/anchors"
 
@@ -41,6 +42,15 @@ def bulk(tmp_path):
         return read_deck(path, **options)
 
     return read
+
+
+@pytest.fixture
+def deck(request, tmp_path):
+    """(deck, its assembly) of the text DECK of a module, in mm, t, s."""
+    path = tmp_path / "deck.bdf"
+    path.write_text(request.module.DECK)
+    found = read_deck(path)
+    return found, assembly(found, UNITS["mm-t-s"])
 
 
 def real_decks():

@@ -57,14 +57,6 @@ ENDDATA
 """
 
 
-@pytest.fixture
-def deck(tmp_path):
-    path = tmp_path / "deck.bdf"
-    path.write_text(DECK)
-    found = read_deck(path)
-    return found, assembly(found, UNITS["mm-t-s"])
-
-
 def position(made, id):
     return next(k for k, p in enumerate(made.parts) if p.id == id)
 

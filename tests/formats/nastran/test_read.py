@@ -214,14 +214,6 @@ def test_part_names_in_comments(bulk, comment):
     assert deck.names == {101: "Inner Panel"}
 
 
-@pytest.mark.parametrize("card", ["CGAP", "CWELD", "CFAST", "CQUAD8", "CTRIA6", "GENEL", "CPYRAM"])
-def test_unknown_stiffness_is_refused_unless_allowed(bulk, card):
-    text = PLATE + f"{card},900,1,1,2,3,4\n"
-    with pytest.raises(FileError, match=rf"deck.bdf:8: {card} .*--allow {card}"):
-        bulk(text)
-    assert len(bulk(text, allow=(card.lower(),))[card]) == 1
-
-
 def test_harmless_cards_are_kept(bulk):
     deck = bulk(PLATE + "MDLPRM,HDF5,0\nCREEP,1\nDTI,4,,text\n")
     assert deck["DTI"].fields(0) == ["4", "", "TEXT"]

@@ -41,14 +41,6 @@ ENDDATA
 """
 
 
-@pytest.fixture
-def deck(tmp_path):
-    path = tmp_path / "deck.bdf"
-    path.write_text(DECK)
-    found = read_deck(path)
-    return found, assembly(found, UNITS["mm-t-s"])
-
-
 def written(deck, made, tmp_path):
     read, before = deck
     write_deck(read, tmp_path / "new.bdf", changes(read, before, made, UNITS["mm-t-s"]))
