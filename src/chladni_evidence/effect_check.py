@@ -238,10 +238,11 @@ def in_words(error: Exception, family: Family) -> str:
     """An error of a rule or of the code of an effect, in one sentence."""
     if isinstance(error, BrokenRule):
         return str(error)
-    file = getattr(sys.modules.get(family.effect.__module__), "__file__", "") or ""
+    given = (family.effect, family.placed, family.candidates, family.conceal)
+    names = {getattr(one, "__module__", "") for one in given}
+    files = {getattr(sys.modules.get(name), "__file__", None) for name in names}
     frames: Sequence[traceback.FrameSummary] = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if frame.filename == file] or frames
-    at = own[-1]
+    at = ([frame for frame in frames if frame.filename in files] or frames)[-1]
     said = " ".join(str(error).split())
     return (
         f"{type(error).__name__} in {at.name} ({Path(at.filename).name}, line {at.lineno}): {said}"

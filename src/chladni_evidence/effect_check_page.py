@@ -24,8 +24,16 @@ def in_words(found: EffectCheck) -> PageParts:
     sections = [Section("Rules", [rules])]
     if found.visibility is not None:
         sections.append(Section("Visibility", [_table(found.visibility)]))
-    unseen = [f"the change of the responses was not computed: {found.unseen}"]
-    return PageParts(lead(found), sections, unseen if found.unseen else ())
+    return PageParts(lead(found), sections, _notes(found))
+
+
+def _notes(found: EffectCheck) -> list[str]:
+    """A sentence where the effect is invisible, or its change was not computed."""
+    if found.unseen:
+        return [f"the change of the responses was not computed: {found.unseen}"]
+    if found.visibility is None or found.visibility.seen:
+        return []
+    return ["no draw is visible: conceal larger ones, or expect no diagnosis to name the effect"]
 
 
 def lead(found: EffectCheck) -> str:

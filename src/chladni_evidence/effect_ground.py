@@ -36,7 +36,8 @@ TOP = 300.0  # Hz; six flexible modes of the generated plates lie below
 MODES = 6  # flexible modes that are compared
 SENSORS = 6
 ABOVE = 1.05  # times the sixth flexible mode of a given deck: highest frequency of interest
-CORNERS = (1, 7, 57, 63, 25, 39)  # grids of the sensors of a plate of 8 x 6 elements
+CORNERS = (1010, 1070, 1570, 1630, 1250, 1390)  # sensors of a plate of 8 x 6 elements
+HELD = (1570, 1100, 1630, 1400, 1250, 1390)  # those of the plate in a clamp
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,12 @@ def _damped_at_beads(reduced: ReducedProblem, flexible: slice) -> IdentifiedDamp
 
 def plain_plate(times: int = 1) -> Assembly:
     """A free steel plate of 400 x 300 x 1.5 mm of 8 x 6 elements, or more on each side."""
-    return plate(0.4, 0.3, 8 * times, 6 * times, 1.5e-3)
+    return spaced(plate(0.4, 0.3, 8 * times, 6 * times, 1.5e-3))
+
+
+def spaced(made: Assembly) -> Assembly:
+    """The structure with ids of grids 1010, 1020, ...: a row of points is never an id."""
+    return replace(made, ids=1000 + 10 * made.ids)
 
 
 def clamped_plate(times: int = 1) -> Assembly:
@@ -151,6 +157,7 @@ def clamped_plate(times: int = 1) -> Assembly:
 
 def _of_plates(deck: Assembly, fine: Assembly) -> EffectGround:
     """Ground on two plates, with sensors on the lower one."""
+    deck, fine = spaced(deck), spaced(fine)
     lower = np.unique(deck.shells.nodes[deck.shells.part == 0])
     spread = lower[farthest_point_sample(deck.points[lower], SENSORS)]
     return ground(deck, fine, deck.ids[spread].tolist())
@@ -158,7 +165,7 @@ def _of_plates(deck: Assembly, fine: Assembly) -> EffectGround:
 
 GROUNDS: Mapping[str, Callable[[], EffectGround]] = {
     "plate": lambda: ground(plain_plate(), plain_plate(2), CORNERS),
-    "clamped plate": lambda: ground(clamped_plate(), clamped_plate(2), (57, 10, 63, 40, 25, 39)),
+    "clamped plate": lambda: ground(clamped_plate(), clamped_plate(2), HELD),
     "two plates with joints": lambda: _of_plates(jointed_plates(), jointed_plates(0.03)),
     "two plates with joints and a rigid element": lambda: _of_plates(
         tied_plates(), tied_plates(0.03)

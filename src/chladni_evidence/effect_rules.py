@@ -210,15 +210,16 @@ def positive_matrices(acting: ActingEffect) -> str:
         except (ModelError, np.linalg.LinAlgError) as error:
             raise BrokenRule(
                 f"at {_values(acting.effect, x)}, within the prior, the matrices are not positive "
-                f"({error}); use a log parameter, a smaller sd, or coefficients that stay above -1"
+                f"({error}); correct the unit (SI) or the sd of the prior, or keep coefficients "
+                "above -1"
             ) from error
         share = float(lam[0] / lam[acting.flexible][0])
         lowest = min(lowest, share)
         if share <= -1e-6:
             raise BrokenRule(
                 f"at {_values(acting.effect, x)}, within the prior, the lowest ω² is "
-                f"{lam[0]:.3g} rad²/s²: K is not positive; use a log parameter, a smaller sd, or "
-                "coefficients that stay above -1"
+                f"{lam[0]:.3g} rad²/s²: K is not positive; correct the unit (SI) or the sd of the "
+                "prior, or keep coefficients above -1"
             )
     return f"lowest ω² {lowest:.1e} of the first flexible one"
 

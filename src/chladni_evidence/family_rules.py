@@ -272,8 +272,8 @@ def writes_its_cards(case: TriedFamily) -> str:
         )
     if beyond := sorted(touched - set(family.cards)):
         raise BrokenRule(
-            f"the deck with it has other {named(beyond)} as well; Family.cards are "
-            f"{named(family.cards)}, so name {named(beyond)} there"
+            f"the deck with it has {named(beyond)}, which Family.cards ({named(family.cards)}) "
+            "lacks; name them there"
         )
     off = float(np.abs(found / due - 1).max())
     if off > READ:

@@ -9,13 +9,14 @@ import scipy.sparse as sp
 from tests.builders.commands import ran, refused
 
 import chladni
-from chladni.effects import Weight, registry
+from chladni.effects import Weight, registry, strength
 from chladni.errors import AccuracyError, LabelError
 from chladni.io.nastran import write_assembly
 from chladni.model.point_masses import with_masses
+from chladni.model.properties import BeamSection
 from chladni_evidence.effect_check import PROPOSES, RULES, checked_rules
 from chladni_evidence.effect_ground import GROUNDS
-from chladni_specimens import folded_panel
+from chladni_specimens import STEEL, folded_panel
 
 from .conftest import example
 
@@ -121,6 +122,13 @@ def without_seed(article, rng):
     return registry.family("stringer").conceal(article, np.random.default_rng())
 
 
+def along_rows(where):
+    """Rows of points in place of the ids of grids."""
+    a = strength("a", "m", 3e-3, 0.5, (0.0,))
+    kind = registry.family("stringer").effect
+    return [kind.along(where, [0, 1, 2], BeamSection(STEEL, 1e-5), a, "along an edge")]
+
+
 def nothing_concealed(article, rng):
     return article.with_hidden(article.assembly, {"a": 4e-3})
 
@@ -135,6 +143,7 @@ def breakages(stringer):
             (replace(stringer, placed=lambda where: []), "proposes no candidate"),
             (replace(stringer, placed=lambda where: 1 / 0), "ZeroDivisionError in <lambda>"),
             (replace(stringer, effect=registry.family("crack").effect), "the family is of Crack"),
+            (replace(stringer, placed=along_rows), "LabelError in along_rows"),
             (broken(stringer, starts=lambda self: [np.zeros(2)]), "begins at 2 numbers"),
         ],
         "describes itself": [
@@ -158,7 +167,7 @@ def breakages(stringer):
         "applies what its terms say": [(broken(stringer, terms=twice), "the same physics")],
         "weighs what it writes": [(broken(stringer, weight=weightless), "from weight(x)")],
         "writes its cards": [
-            (replace(stringer, cards=("CBAR",)), "name MAT1, PBAR there"),
+            (replace(stringer, cards=("CBAR",)), "has MAT1, PBAR, which"),
             (broken(stringer, apply=applies_nothing), "leaves the frequencies"),
         ],
         "reports plain numbers": [(broken(stringer, reported=infinite), "what JSON does not")],
@@ -218,6 +227,8 @@ def test_an_invisible_effect_is_said_to_be_so(on_plate, stringer):
     assert loud.scatter == faint.scatter > 0
     assert faint.seen == 0 < loud.seen
     assert max(faint.moved) < 0.01 * loud.scatter
+    found = replace(chladni.check_effect(stringer), visibility=faint)
+    assert "note: no draw is visible" in found.summary()
 
 
 def test_the_command_says_every_rule_and_ends_by_them(stringer, tmp_path, monkeypatch):

@@ -106,19 +106,19 @@ def test_candidates_begin_at_the_nominal_and_at_the_calibrated_model(by_response
 def test_begins_anew_where_it_moved_to(reduced, by_responses, kind):
     """Half a patch off its start it stays; a grid off, it begins at the grid it moved to."""
     where = by_responses.where
-    effect = kind.near(where, where.grids.position(25))
+    effect = kind.near(where, where.grids.position(1250))
     rest = np.zeros(len(effect.parameters) - 3)
     closer = next(f.closer for f in registry.BUILT_IN if f.effect is kind)
     assert closer(by_responses, effect, np.array([0.3, 0.5, -0.5, *rest])) is None
     size = effect.patch.size
     step = (
-        where.grids.point[where.grids.position(26)] - effect.patch.origin
+        where.grids.point[where.grids.position(1260)] - effect.patch.origin
     ) @ effect.patch.plane.T
     x = np.array([0.3, *(step / size), *rest])
     found = closer(by_responses, effect, x)
     again, start = found.effect, found.start
     assert found.base is by_responses.bases[-1]
-    assert again.grids == (26,)
+    assert again.grids == (1260,)
     assert again.trials_factor == len(where.places)
     model = reduced.model_for(effect, x)
     moved, anew, old = (
