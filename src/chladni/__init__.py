@@ -72,6 +72,7 @@ _LATER = {  # of the packages that build on this one: loaded at the first use
     "BenchSettings": "chladni_bench",
     "PlanSettings": "chladni_planning",
     "StudySettings": "chladni_studies",
+    "check_effect": "chladni_evidence",
     "plan": "chladni_planning",
     "study": "chladni_studies",
     "virtual_test": "chladni_bench",
@@ -79,6 +80,7 @@ _LATER = {  # of the packages that build on this one: loaded at the first use
 if _typing.TYPE_CHECKING:
     from chladni_bench import BenchSettings as BenchSettings
     from chladni_bench import virtual_test as virtual_test
+    from chladni_evidence import check_effect as check_effect
     from chladni_planning import PlanSettings as PlanSettings
     from chladni_planning import plan as plan
     from chladni_studies import StudySettings as StudySettings
@@ -114,6 +116,7 @@ __all__ = [
     "WorkingModel",
     "calibrate",
     "check",
+    "check_effect",
     "correlate",
     "diagnose",
     "evaluate_recordings",

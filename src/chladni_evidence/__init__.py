@@ -1,1 +1,7 @@
-"""Blind evidence: make cases with concealed effects, diagnose them blindly, score them."""
+"""Evidence: concealed cases made, diagnosed blindly and scored; effects against their contract."""
+
+from . import effect_check_views as effect_check_views
+from .effect_check import EffectCheck as EffectCheck
+from .effect_check import check_effect as check_effect
+
+__all__ = ["EffectCheck", "check_effect"]

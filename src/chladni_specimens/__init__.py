@@ -7,6 +7,9 @@ from .forms.mesh_pieces import of_pieces as of_pieces
 from .forms.mesh_pieces import rectangle as rectangle
 from .forms.mesh_pieces import stops as stops
 from .holed_plate import holed_plate as holed_plate
+from .jointed_plates import bushed_plates as bushed_plates
+from .jointed_plates import jointed_plates as jointed_plates
+from .jointed_plates import tied_plates as tied_plates
 from .joints.bolts import grip as grip
 from .joints.bolts import screw as screw
 from .joints.builders import STEEL as STEEL
@@ -31,11 +34,13 @@ __all__ = [
     "TailgateDesign",
     "adhesive_bead",
     "box",
+    "bushed_plates",
     "folded_panel",
     "formed_panel",
     "forming_mesh",
     "grip",
     "holed_plate",
+    "jointed_plates",
     "of_pieces",
     "plate",
     "rectangle",
@@ -44,4 +49,5 @@ __all__ = [
     "stops",
     "tailgate",
     "tailgate_specimen",
+    "tied_plates",
 ]

@@ -94,15 +94,57 @@ def renumbered(frf, places, shift):
     return one, {n: places[n - shift] for n in used}
 
 
+CHANNELS = {  # outputs and input of a recording whose labels count channels
+    "two": (("1:+Z", "2:+Z"), "1:+Z"),
+    "the force first": (("2:+Z", "3:+Z"), "1:+Z"),
+    "three": (("1:+Z", "2:+Z", "3:+Z"), "3:+Z"),
+}
+
+
 @pytest.mark.parametrize("placed", [False, True])
-def test_numbers_that_no_coordinates_confirm_are_said(deck, frf, places, tmp_path, placed):
-    """Two channels, 1 and 2, of another structure have the numbers of two grids."""
-    two = replace(frf, values=frf.values[:, :2], outputs=("1:+Z", "2:+Z"))
-    uff = tmp_path / "two.uff"
-    write_uff(uff, two, {n: places[n] for n in (1, 2)} if placed else {})
-    made = draft(deck, [uff])
-    assert {d.matched_by for d in made.dofs} == {"grid"}
-    assert any("no coordinates that confirm" in n for n in made.notes) is not placed
+@pytest.mark.parametrize("channels", CHANNELS)
+def test_channel_numbers_are_missing_until_coordinates_confirm_grids(
+    deck, frf, places, tmp_path, placed, channels
+):
+    """They are numbers of grids as well; neither the draft nor its case uses these."""
+    outputs, drive = CHANNELS[channels]
+    few = replace(frf, values=frf.values[:, : len(outputs)], outputs=outputs, inputs=(drive,))
+    uff, out = tmp_path / "few.uff", tmp_path / "case"
+    write_uff(uff, few, {n: places[n] for n in (1, 2, 3)} if placed else {})
+    done = ran("init", deck, uff, "--out", out)
+    kinds = {d.matched_by for d in draft(deck, [uff]).dofs}
+    assert kinds == ({"grid"} if placed else {"missing"})
+    assert (f"MISSING places of {outputs[0]}" in (out / "case.toml").read_text()) is not placed
+    assert ("channel numbers" in done.output) is not placed
+    if placed:
+        assert chladni.load_case(out).outputs.labels == outputs
+    else:
+        with pytest.raises(ChladniError, match=r"sensors\.csv has a header but no rows"):
+            chladni.load_case(out)
+        table = out / "sensors.csv"
+        table.write_text(f"{table.read_text()}{drive},30,,,,+Z,,,,input,,\n")
+        with pytest.raises(ChladniError, match="are taken as channel numbers"):
+            chladni.load_case(out)
+
+
+def test_numbers_of_grids_without_coordinates_are_said(deck, frf, tmp_path):
+    write_npz(tmp_path / "a.npz", frf)
+    assert any("no coordinates that confirm" in n for n in draft(deck, [tmp_path / "a.npz"]).notes)
+
+
+def test_a_number_is_not_used_where_the_places_say_otherwise(deck, frf, places, tmp_path):
+    """One node of another place than its grid; a node without place among other numbers."""
+    moved = {**places, 3: places[30]}
+    used = {int(text.split(":")[0]) for text in (*frf.outputs, *frf.inputs)}
+    write_uff(tmp_path / "a.uff", frf, {n: moved[n] for n in used})
+    found = {d.label: (d.matched_by, d.grid) for d in draft(deck, [tmp_path / "a.uff"]).dofs}
+    assert found["3:+Z"] == ("place", 30)
+    assert found["8:+Z"] == ("grid", 8)
+    one, nodes = renumbered(frf, places, 2)
+    write_uff(tmp_path / "b.uff", one, {n: x for n, x in nodes.items() if n != 10})
+    found = {d.label: (d.matched_by, d.grid) for d in draft(deck, [tmp_path / "b.uff"]).dofs}
+    assert found["10:+Z"] == ("missing", None)
+    assert found["5:+Z"] == ("place", 3)
 
 
 @pytest.mark.parametrize("shift", [1000, 2])

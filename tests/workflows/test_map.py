@@ -76,6 +76,27 @@ def test_a_file_that_lies_elsewhere_is_brought_or_refused(deck, tmp_path):
     assert part["coverage"] > 0.99
 
 
+def points_of(path, points):
+    """A table of points with thickness, without cells."""
+    rows = [f"{x:.6g},{y:.6g},{z:.6g},{1e3 * T:g}" for x, y, z in 1e3 * points]
+    path.write_text("\n".join(["x,y,z,thickness", *rows, ""]))
+    return path
+
+
+def test_points_without_cells_are_refused_with_the_reason(deck, tmp_path):
+    """Too far apart, they leave the shells bare; elsewhere, they cannot be aligned."""
+    words = ("--units", "mm-t-s", "--out", tmp_path / "out")
+    coarse, fine = plate(*SIZE, 6, 6, T).points, plate(*SIZE, 60, 60, T).points
+    said = refused("map", deck, points_of(tmp_path / "coarse.csv", coarse), *words)
+    assert "have no cells and are 36.7 mm apart" in said
+    assert "points at most 6 mm apart" in said
+    said = refused(
+        "map", deck, points_of(tmp_path / "away.csv", fine + np.array([0, 0, 1.0])), *words
+    )
+    assert "points without cells cannot be aligned" in said
+    ran("map", deck, points_of(tmp_path / "fine.csv", fine), *words)
+
+
 def wedge(folder, name, off=0.0, open_=False):
     """A solid plate of thickness ``field`` as a scan of both faces, its middle ``off`` [m]."""
     made = plate(*SIZE, 12, 12, T)

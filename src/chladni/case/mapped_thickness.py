@@ -4,11 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from scipy.spatial import cKDTree
+
 from ..errors import FileError
 from ..geometry.formed_mesh import FormedMesh
+from ..geometry.nearest import ShellSurface
 from ..geometry.scan_alignment import align_scan, as_sheet
 from ..geometry.thickness_alignment import Alignment, align, moved
-from ..geometry.thickness_mapping import Mapped, map_thickness, shell_area
+from ..geometry.thickness_mapping import Mapped, default_reach, map_thickness, shell_area
 from ..geometry.thickness_of_scan import thickness_of_scan
 from ..io.formed_files import read_formed
 from ..io.scanned_surface import SUFFIXES, read_scan
@@ -83,23 +87,51 @@ def formed_thickness(
         return _of_scan(made, path, units, place)
     formed = read_formed(path, units)
     fit = _fitted(made, formed, place)
-    mapped = map_thickness(made, formed if fit is None else moved(formed, fit), pairs=pairs)
-    _refuse_elsewhere(path, mapped, place)
+    there = formed if fit is None else moved(formed, fit)
+    mapped = map_thickness(made, there, pairs=pairs)
+    _refuse_sparse(path, made, there, mapped)
+    _refuse_elsewhere(path, mapped, place, bool(len(formed.cells)))
     return FormedThickness(path, mapped, fit)
 
 
-def _refuse_elsewhere(path: Path, mapped: Mapped, place: str) -> None:
-    """Refuse a file whose sheets hardly lie on those of the deck."""
+def _refuse_sparse(path: Path, made: Assembly, formed: FormedMesh, mapped: Mapped) -> None:
+    """Refuse points without cells on the deck that are too far apart for its shells."""
+    reach, covered = default_reach(made), _covered(mapped)
+    if len(formed.cells) or covered >= LEAST_COVERED or len(formed.points) < 2:
+        return
+    spacing = float(np.median(cKDTree(formed.points).query(formed.points, k=2)[0][:, 1]))
+    off = ShellSurface.whole(made).closest_points(formed.points).distance
+    if spacing > reach and float(np.median(off)) <= reach:
+        raise FileError(
+            f"{path}: its points have no cells and are {1e3 * spacing:.3g} mm apart, and a corner "
+            f"of a shell takes the thickness of points within {1e3 * reach:.2g} mm alone, so "
+            f"{100 * covered:.2g} % of the area has one; give the cells as well (VTU, PLY or an "
+            f"LS-DYNA keyword file), or points at most {1e3 * reach:.2g} mm apart"
+        )
+
+
+def _covered(mapped: Mapped) -> float:
+    """Share of the area of the mapped parts that has a thickness of the file."""
     area, part = shell_area(mapped.assembly), mapped.assembly.shells.part
     size = [float(area[part == mapped.assembly.part(p.part)].sum()) for p in mapped.parts]
-    found = sum(s * p.coverage for s, p in zip(size, mapped.parts, strict=True)) / sum(size)
-    if found < LEAST_COVERED:
-        lies = place == PLACES[0]
-        raise FileError(
-            f"{path}: {100 * found:.2g} % of the area of {len(mapped.parts)} parts has a matching "
-            "sheet in it; "
-            f"{'move it onto the deck (aligned)' if lies else 'it may belong to another part'}"
-        )
+    return sum(s * p.coverage for s, p in zip(size, mapped.parts, strict=True)) / sum(size)
+
+
+def _refuse_elsewhere(path: Path, mapped: Mapped, place: str, cells: bool) -> None:
+    """Refuse a file whose sheets, or points without cells, hardly lie on those of the deck."""
+    found = _covered(mapped)
+    if found >= LEAST_COVERED:
+        return
+    if not cells:
+        advice = "points without cells cannot be aligned, so give them in the deck's frame and unit"
+    elif place == PLACES[0]:
+        advice = "move it onto the deck (aligned)"
+    else:
+        advice = "it may belong to another part"
+    raise FileError(
+        f"{path}: {100 * found:.2g} % of the area of {len(mapped.parts)} parts has a matching "
+        f"sheet in it; {advice}"
+    )
 
 
 def _holds_thickness(path: Path) -> bool:

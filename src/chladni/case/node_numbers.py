@@ -4,7 +4,7 @@ Numbers that coincide prove nothing: decks and recordings both begin at 1. Coord
 the recording has them. Without them, labels that count 1, 2, 3, ... number channels.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -65,11 +65,34 @@ def numbers_agree(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
     return bool(np.median(away) <= OFF * size_of(made))
 
 
-def count_channels(labels: Sequence[str]) -> bool:
-    """True if labels of outputs number channels: their nodes are 1, 2, 3, ... to the last.
+def off_its_grid(made: Assembly, node: int, nodes: Mapping[int, np.ndarray]) -> bool:
+    """True if a node [m] lies elsewhere than the grid of its number."""
+    row = np.flatnonzero(made.ids == node)
+    if node not in nodes or not len(row):
+        return False
+    return float(np.linalg.norm(made.points[row[0]] - nodes[node])) > OFF * size_of(made)
+
+
+def count_channels(labels: Iterable[str], least: int = _ENOUGH) -> bool:
+    """True if labels number channels: their nodes are 1, 2, 3, ... to the last.
+
+    Parameters
+    ----------
+    least : number of nodes from which they count
 
     >>> count_channels(["1:+Z", "2:+Z", "3:+Z"]), count_channels(["2:+Z", "4:+Z", "7:+Z"])
     (True, False)
+    >>> count_channels(["1:+Z", "2:+Z"]), count_channels(["1:+Z", "2:+Z"], 1)
+    (False, True)
     """
-    nodes = {label.partition(":")[0].strip() for label in labels}
-    return len(nodes) >= _ENOUGH and nodes == {str(k + 1) for k in range(len(nodes))}
+    nodes = {label.partition(":")[0].strip() for label in labels} - {"base"}
+    return len(nodes) >= least and nodes == {str(k + 1) for k in range(len(nodes))}
+
+
+def number_channels(outputs: Sequence[str], inputs: Sequence[str]) -> bool:
+    """True if the labels of a recording, or of its outputs, count 1, 2, 3, ... to the last.
+
+    >>> number_channels(["2:+Z", "3:+Z"], ["1:+Z"]), number_channels(["2:+Z", "4:+Z"], ["2:+Z"])
+    (True, False)
+    """
+    return count_channels([*outputs, *inputs], 1) or count_channels(outputs, 1)

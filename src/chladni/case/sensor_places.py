@@ -14,7 +14,15 @@ from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
 from ..units import UNITS
 from .label_directions import ways_said
-from .node_numbers import OFF, count_channels, numbers_agree, on_structure, scaled, size_of
+from .node_numbers import (
+    OFF,
+    count_channels,
+    number_channels,
+    numbers_agree,
+    on_structure,
+    scaled,
+    size_of,
+)
 from .toml_sections import TomlSection
 
 ROLES: tuple[Role, ...] = ("output", "input")
@@ -45,7 +53,9 @@ def places(
     spoken = [label for label in labels if label not in table]
     seated = on_structure(made, nodes)
     elsewhere = seated and not numbers_agree(made, nodes)
-    if not seated and count_channels(spoken):
+    frf = recorded[0].frf if recorded and "sensors" in test else None
+    counted = frf is not None and number_channels(frf.outputs, frf.inputs)
+    if not seated and spoken and (counted or count_channels(spoken)):
         raise LabelError(
             f"{test.at('recordings')}: the labels {named(spoken, 3)} are taken as channel "
             "numbers, because no coordinates show that they are grids; give each its grid or "

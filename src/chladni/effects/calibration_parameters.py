@@ -169,11 +169,11 @@ def scaled(part: Part, quantity: str, factor: float) -> Part:
         return part.with_section(thickness=section.thickness * factor)
     materials = {n: m for n, m in vars(section).items() if isinstance(m, Material)}
     return part.with_section(
-        **{n: _scaled_material(m, quantity, factor) for n, m in materials.items()}
+        **{n: scaled_material(m, quantity, factor) for n, m in materials.items()}
     )
 
 
-def _scaled_material(material: Material, quantity: str, factor: float) -> Material:
+def scaled_material(material: Material, quantity: str, factor: float) -> Material:
     """Multiply the numbers that a material has of a field."""
     names = MODULI if quantity == "E" else (quantity,)
     known = {n: v for n in names if (v := getattr(material, n, None)) is not None}

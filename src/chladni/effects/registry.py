@@ -9,7 +9,7 @@ A package adds a family by an entry point, without any change of chladni::
 from collections.abc import Sequence
 from functools import cache
 
-from ..errors import ExtensionError, LabelError
+from ..errors import ExtensionError, LabelError, did_you_mean
 from ..extensions import installed
 from . import (
     compliant_support,
@@ -87,7 +87,9 @@ def family(name: str) -> Family:
     for known in families():
         if known.name == name:
             return known
-    raise LabelError(f"no effect {name!r}; there are {', '.join(names())}")
+    raise LabelError(
+        f"no effect {name!r}; {did_you_mean(name, names())}there are {', '.join(names())}"
+    )
 
 
 def register(family: Family) -> None:

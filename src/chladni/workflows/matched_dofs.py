@@ -6,7 +6,14 @@ from typing import Literal
 
 import numpy as np
 
-from ..case.node_numbers import count_channels, numbers_agree, on_structure, scaled, size_of
+from ..case.node_numbers import (
+    number_channels,
+    numbers_agree,
+    off_its_grid,
+    on_structure,
+    scaled,
+    size_of,
+)
 from ..ema.setup import Recording, Role, Sensor
 from ..errors import named
 from ..geometry.nearest import ShellSurface
@@ -74,8 +81,9 @@ def matched(
     sides: tuple[tuple[Role, Sequence[str]], ...] = (
         ("output", recording.frf.outputs), ("input", recording.frf.inputs),
     )  # fmt: skip
-    rest = [label for label in recording.frf.outputs if (label, "output") not in own]
-    channels = not on_structure(made, nodes) and count_channels(rest)
+    rest = [label for role, labels in sides for label in labels if (label, role) not in own]
+    counted = number_channels(recording.frf.outputs, recording.frf.inputs)
+    channels = bool(rest) and counted and not on_structure(made, nodes)
     if channels:
         notes.append(
             f"labels {named(rest, 3)} of {recording.name} are taken as channel numbers: no "
@@ -124,7 +132,9 @@ def _one(
         axis = axis @ recording.axes[id]
     elif axis is not None and is_grid and by_number and made.axes is not None:
         axis = axis @ made.axes[row]
-    if is_grid and (by_number or id not in nodes):
+    if id not in nodes and nodes and not by_number:  # its number proves nothing here
+        return MatchedDof(label, role, "missing", axis=axis)
+    if is_grid and by_number and not off_its_grid(made, id, nodes):
         away = float(np.linalg.norm(made.points[row] - nodes[id])) if id in nodes else np.nan
         return MatchedDof(label, role, "grid", id, distance=away, axis=axis)
     if id not in nodes:
