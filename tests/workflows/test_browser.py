@@ -413,6 +413,21 @@ def test_samples_and_curves_hold_at_every_width_and_run_no_name(sampled):
     assert not [m for m in sampled.complaints() if "readback" not in m and "GPU stall" not in m]
 
 
+# of the room next to the colour bar that the mesh takes, seen along the camera
+SHARE_OF_WIDTH = (
+    PLOT
+    + """const {scene, _size} = plot._fullLayout, {eye, up} = scene.camera;
+    const axes = ['x', 'y', 'z'], e = axes.map(k => eye[k]), u = axes.map(k => up[k]);
+    const r = [0, 1, 2].map(k => u[(k + 1) % 3] * e[(k + 2) % 3] - u[(k + 2) % 3] * e[(k + 1) % 3]);
+    const long = Math.hypot(...r), ranges = axes.map(k => scene[k + 'axis'].range);
+    const size = axes.map((k, n) => scene.aspectratio[k] / (ranges[n][1] - ranges[n][0]));
+    const mesh = plot.data.find(trace => trace.type == 'mesh3d' && trace.intensity);
+    const seen = Array.from(mesh.x, (_, n) => Math.abs(axes.reduce((sum, k, a) =>
+      sum + r[a] / long * size[a] * (mesh[k][n] - (ranges[a][0] + ranges[a][1]) / 2), 0)));
+    return Math.max(...seen) / (_size.w / _size.h);"""
+)
+
+
 @pytest.mark.parametrize(
     ("command", "names"),
     [
@@ -481,6 +496,8 @@ def test_every_command_draws_its_page(window, folder, tmp_path, command, names):
         assert sorted(seen) == names
         for one in seen:
             see(window, one)
+            if name == "map":
+                assert 0.3 < window.run(SHARE_OF_WIDTH, one) < 1
         assert window.run("return document.documentElement.scrollWidth") <= width
     assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
     if name == "identify":

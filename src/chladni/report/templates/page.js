@@ -99,13 +99,14 @@ function triad(mesh, [x, y, z]) {
 }
 
 // A box that holds pins and triad, so large that the structure fills its share of the picture.
-function space(at, mesh, key = "scene", domain = {}) {
+// A colour bar of ``bar`` pixels leaves the rest of the width to it.
+function space(at, mesh, key = "scene", domain = {}, bar = 0) {
   const xyz = places(mesh), room = 0.12 * mesh.size, kept = at.layout?.[key];
   const least = (axis) => axis.reduce((a, b) => Math.min(a, b), Infinity), most = (axis) => axis.reduce((a, b) => Math.max(a, b), -Infinity);
   const range = xyz.map((axis) => [least(axis) - room, most(axis) + room]), long = range.map(([a, b]) => b - a), centre = range.map(([a, b]) => (a + b) / 2);
   const [e, u] = [mesh.eye, mesh.up], right = [u[1] * e[2] - u[2] * e[1], u[2] * e[0] - u[0] * e[2], u[0] * e[1] - u[1] * e[0]];
   const reach = (d) => most(xyz[0].map((_, n) => Math.abs(d.reduce((sum, v, k) => sum + v * (xyz[k][n] - centre[k]), 0)))) + room / 2;
-  const share = ([a, b] = [0, 1]) => b - a, wide = (at.clientWidth * share(domain.x)) / (at.clientHeight * share(domain.y));
+  const share = ([a, b] = [0, 1]) => b - a, wide = ((at.clientWidth - bar) * share(domain.x)) / (at.clientHeight * share(domain.y));
   const size = 0.95 * Math.min(wide / reach(right), 1 / reach(u)), vector = ([x, y, z]) => ({ x, y, z });
   const far = 1.5 * Math.max(1, size * Math.max(...long)), axis = (k) => ({ visible: false, showspikes: false, range: range[k] });
   return { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "manual", dragmode: "orbit", domain, aspectratio: kept?.aspectratio ?? vector(long.map((v) => size * v)),
@@ -163,7 +164,7 @@ function remainder(at, data, shared) {
     sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: data.low || 0, cmax: data.top, colorscale: title === "gain" ? "YlOrRd" : "YlGnBu", reversescale: true, colorbar: { thickness: 12, len: 0.8, title: { text: said(title), side: "right" } },
       hovertemplate: `${said(title)} %{intensity:.4g}<extra></extra>` }, seen),
     lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz),
-  ], { scene: space(at, mesh), margin: { l: 0, r: 0, t: 0, b: 0 } });
+  ], { scene: space(at, mesh, "scene", {}, 100), margin: { l: 0, r: 0, t: 0, b: 0 } });
 }
 
 function shapes(at, data, shared, box) {
