@@ -103,8 +103,8 @@ def _refuse_sparse(path: Path, made: Assembly, formed: FormedMesh, mapped: Mappe
     off = ShellSurface.whole(made).closest_points(formed.points).distance
     if spacing > reach and float(np.median(off)) <= reach:
         raise FileError(
-            f"{path}: its points have no cells and are {1e3 * spacing:.3g} mm apart, and a corner "
-            f"of a shell takes the thickness of points within {1e3 * reach:.2g} mm alone, so "
+            f"{path}: its points have no cells and are {1e3 * spacing:.3g} mm apart; a corner of a "
+            f"shell takes the thickness of points within {1e3 * reach:.2g} mm, so only "
             f"{100 * covered:.2g} % of the area has one; give the cells as well (VTU, PLY or an "
             f"LS-DYNA keyword file), or points at most {1e3 * reach:.2g} mm apart"
         )

@@ -55,9 +55,10 @@ def places(
     elsewhere = seated and not numbers_agree(made, nodes)
     frf = recorded[0].frf if recorded and "sensors" in test else None
     counted = frf is not None and number_channels(frf.outputs, frf.inputs)
-    if not seated and spoken and (counted or count_channels(spoken)):
+    numbers = [label for label in spoken if not label.startswith("base:")]
+    if not seated and numbers and (counted or count_channels(numbers)):
         raise LabelError(
-            f"{test.at('recordings')}: the labels {named(spoken, 3)} are taken as channel "
+            f"{test.at('recordings')}: the labels {named(numbers, 3)} are taken as channel "
             "numbers, because no coordinates show that they are grids; give each its grid or "
             "place in sensors.csv"
         )
