@@ -8,7 +8,6 @@ import dataclasses
 import inspect
 import json
 import re
-import runpy
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,6 +17,8 @@ from typing import Any
 import effect_signatures
 import error_sentences
 import numpy as np
+
+from chladni_evidence.effect_ground import GROUNDS, EffectGround, usual_grounds
 
 ROOT = Path(__file__).parents[1]
 SIGNATURES = "signatures"  # folder of the pictures of the effects
@@ -545,51 +546,23 @@ def _prior(effect: Any) -> list[tuple[str, ...]]:
 
 
 class _Grounds:
-    """The plates on which the contract of the effects is tested, each built when it is needed."""
+    """The structures on which the contract of the effects is checked, each built when needed."""
 
     def __init__(self) -> None:
-        self.tests = runpy.run_path(str(ROOT / "tests/effects/test_families.py"))
-        self.plates = runpy.run_path(str(ROOT / "tests/effects/conftest.py"))
-        self.built: dict[str, Any] = {}
+        self.built: dict[str, EffectGround] = {}
 
     def proposed(self, family: Any) -> tuple[bool, Any]:
         """True if natural frequencies alone suffice; and an example of the effect."""
         ground = self.of(family)
-        by_responses = family.proposed(ground.by_responses)
         by_poles = family.proposed(ground.by_poles)
-        found = [*by_responses, *by_poles]
+        found = [*family.proposed(ground.by_responses), *by_poles]
         return bool(by_poles), found[0].effect if found else None
 
-    def of(self, family: Any) -> Any:
-        """The plates that have what an effect acts on."""
-        return self._ground(self._name(family))
-
-    @staticmethod
-    def _name(family: Any) -> str:
-        if family.name == "over-constraint":
-            return "tied"
-        plates = {"": "plate", "supports": "held", "a shaker": "plate"}
-        return plates.get(family.needs, "joined")
-
-    def _ground(self, name: str) -> Any:
+    def of(self, family: Any) -> EffectGround:
+        """The structure that has what an effect acts on."""
+        name = usual_grounds(family)[0]
         if name not in self.built:
-            make, joined = self.tests, self.plates["jointed_plates"]
-            tied = self.plates["rigidly_tied"]
-            high = self.plates["HIGH"] / 2
-            build: dict[str, Callable[[], Any]] = {
-                "plate": lambda: make["ground"](
-                    make["plate"](0.4, 0.3, 8, 6, 1.5e-3), make["plate"](0.4, 0.3, 16, 12, 1.5e-3),
-                    make["SENSORS"],
-                ),
-                "held": lambda: make["ground"](
-                    make["cantilever"](8, 6), make["cantilever"](16, 12), [57, 10, 63, 40, 25, 39]
-                ),
-                "joined": lambda: make["of_plates"](joined),
-                "tied": lambda: make["of_plates"](
-                    lambda h=0.05: tied(joined(h), (0.27, 0.16, high))
-                ),
-            }  # fmt: skip
-            self.built[name] = build[name]()
+            self.built[name] = GROUNDS[name]()
         return self.built[name]
 
 
