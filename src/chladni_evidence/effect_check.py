@@ -152,8 +152,8 @@ def check_effect(
 ) -> EffectCheck:
     """Check an effect against the contract of effects, in seconds and without a diagnosis.
 
-    The rules are those to which every effect of chladni is held: slopes against differences,
-    ``apply`` against ``terms``, cards that are read back, concealment on the bench and others.
+    Every effect of chladni keeps the same rules: slopes equal differences, ``apply`` agrees with
+    ``terms``, cards are read back, the bench conceals the effect, and others.
     Then articles that conceal it show how far it moves their responses.
 
     Parameters

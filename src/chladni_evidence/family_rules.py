@@ -177,9 +177,9 @@ def lies_in_structure(case: TriedFamily) -> str:
 def written(acting: ActingEffect, made: Assembly, within: float | None = None) -> str:
     """The deck with ``apply`` has the frequencies of the reduced model with ``terms``.
 
-    Both may differ by a tenth of the change, which a basis of first order lacks. Where the effect
-    is a field, the elements follow its groups, and both may differ by half of the change: the
-    written deck is then nearer to the fit than the deck before. Stiffness that depends on frequency
+    Both may differ by a tenth of the change, which a basis of first order lacks. The elements of a
+    field follow its groups, so both may then differ by half of the change. Even so the written deck
+    is nearer to the fit than the deck before. Stiffness that depends on frequency
     has no such cards and is not compared.
 
     Parameters

@@ -86,8 +86,9 @@ def rule(name: str) -> Field[Any]:
 def odds_of_something_else(p: float, prior: float) -> float:
     """Largest posterior odds of a cause outside the catalogue, from p of a test of fit.
 
-    For p < 1/e the Bayes factor against the tested hypothesis is 1 / (-e p ln p) at most (Sellke,
-    Bayarri and Berger 2001, The American Statistician 55, 62-71). NaN (no test) leaves the prior.
+    For p < 1/e the Bayes factor against the tested hypothesis is 1 / (-e p ln p) at most. NaN (no
+    test) leaves the prior. Source: Sellke, Bayarri and Berger 2001, The American Statistician 55,
+    62-71.
 
     >>> round(odds_of_something_else(0.01, 1 / 8), 2), odds_of_something_else(0.5, 1 / 8)
     (1.0, 0.125)
