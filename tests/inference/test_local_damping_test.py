@@ -1,5 +1,6 @@
 """What gives and dissipates is told from what only gives, by which modes are damped."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -77,6 +78,18 @@ def test_modes_damped_as_much_as_they_give_are_said(deep):
     assert row.value > row.high
     assert row.median == pytest.approx(1.0, abs=0.05)  # a factor, drawn as a multiple of its median
     assert 0 < row.low < 1 < row.high
+
+
+def test_a_fit_that_is_too_good_does_not_hide_damping(deep):
+    """Its small p is no evidence against the explanation."""
+    frequency, fall = shifted(deep, FLEXIBLE)
+    n = int((frequency < 400).sum())
+    lossy = damping(frequency[:n], 0.005 + 0.5 * 0.6 * fall[:n])
+    close = replace(FITS, p=1e-9, better=True)
+    assert close.against == 1
+    found = damping_test_along_effect(close, deep, lossy)
+    assert not found.passes
+    assert found.against == found.p
 
 
 def test_what_holds_and_dissipates_is_no_spring(supported):

@@ -84,10 +84,8 @@ class _Linear:
         if self.span is not None:
             return self.span.projected(rng.normal(size=len(self.J)))
         shape = *self.use.shape, self.inputs, 2
-        error, of_line = (
-            _along_lines(rng.normal(size=shape)),
-            _along_lines(rng.normal(size=shape[0])),
-        )
+        error = _along_lines(rng.normal(size=shape))
+        of_line = _along_lines(rng.normal(size=shape[0]))
         of_channel = rng.normal(size=(1, shape[1]))
         size = OF_LINES * of_line[:, None] + OF_CHANNELS * of_channel - OF_LINES**2 - OF_CHANNELS**2
         size = SHARE * np.exp(size + OF_ARTICLES * rng.normal())
@@ -197,7 +195,7 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
         return test
     p, row = damping.tested()
     test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.p, LEAST_P):
+    if p >= min(test.against, LEAST_P):
         return test
     what, where, modes = damping.said()
     return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
@@ -207,7 +205,7 @@ def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
     """The test, or that of complex modes where it is the less likely of the two."""
     p, row, what, modes = coupling.tested()
     test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.p, LEAST_P):
+    if p >= min(test.against, LEAST_P):
         return test
     what += ": a part rotates or is driven by itself, or channels are delayed"
     where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"

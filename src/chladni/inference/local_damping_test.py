@@ -39,7 +39,7 @@ def damping_test_along_effect(
     near = shift[off[own].argmin(axis=1)]
     p, row = kept.following(np.abs(near))
     test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.p, LEAST_P):
+    if p >= min(test.against, LEAST_P):
         return test
     gives = "is compliant and dissipates, as a slipping joint or a viscous layer"
     holds = "is stiff and dissipates, as foam or rubber"
