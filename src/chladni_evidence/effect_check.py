@@ -9,6 +9,7 @@ from pathlib import Path
 from chladni.effects import registry
 from chladni.effects.family import Family
 from chladni.errors import AccuracyError, FileError
+from chladni.model.assembly import Assembly
 from chladni.progress import Progress, silent, within
 from chladni.results import Result
 from chladni.workflows.loaded_model import Model, as_model
@@ -29,14 +30,14 @@ from .effect_rules import (
 from .effect_visibility import Visibility, visibility
 from .family_rules import (
     TriedFamily,
-    applies_its_terms,
     describes_itself,
     is_concealed,
     lies_in_structure,
     proposes_candidates,
     tried,
-    weighs_what_it_writes,
+    weighed,
     writes_its_cards,
+    written,
 )
 
 FamilyRule = Callable[[TriedFamily], str]
@@ -48,6 +49,18 @@ def each(rule: Callable[[ActingEffect], str], most: int | None = None) -> Family
 
     def over(case: TriedFamily) -> str:
         said = [_of_one(rule, acting, len(case.acting)) for acting in case.acting[:most]]
+        return said[0]
+
+    return over
+
+
+def with_cards(rule: Callable[[ActingEffect, Assembly], str]) -> FamilyRule:
+    """A rule on an effect and the deck as a rule on all candidates, where a deck can hold them."""
+
+    def over(case: TriedFamily) -> str:
+        if case.family.no_cards:
+            return f"no cards: {case.family.no_cards}"
+        said = [rule(acting, case.ground.deck) for acting in case.acting]
         return said[0]
 
     return over
@@ -72,8 +85,8 @@ RULES: dict[str, FamilyRule] = {  # what an effect does: the rule that checks it
     "keeps K and M positive": each(positive_matrices, 1),
     "has exact slopes": each(exact_slopes),
     "does nothing where it is in the structure": each(idle_in_remade_structure),
-    "applies what its terms say": applies_its_terms,
-    "weighs what it writes": weighs_what_it_writes,
+    "applies what its terms say": with_cards(written),
+    "weighs what it writes": with_cards(weighed),
     "writes its cards": writes_its_cards,
     "reports plain numbers": each(reports_in_json),
     "survives pickling": each(survives_pickling),

@@ -179,8 +179,8 @@ def written(acting: ActingEffect, made: Assembly, within: float | None = None) -
 
     Both may differ by a tenth of the change, which a basis of first order lacks. The elements of a
     field follow its groups, so both may then differ by half of the change. Even so the written deck
-    is nearer to the fit than the deck before. Stiffness that depends on frequency
-    has no such cards and is not compared.
+    is nearer to the fit than the deck before. Stiffness that depends on frequency has no such cards
+    and is not compared.
 
     Parameters
     ----------
@@ -204,14 +204,6 @@ def written(acting: ActingEffect, made: Assembly, within: float | None = None) -
     return f"frequencies move by {100 * moved:.2g} %, and differ by {100 * off:.2g} %"
 
 
-def applies_its_terms(case: TriedFamily) -> str:
-    """``apply`` and ``terms`` are the same physics, for every candidate that a deck can hold."""
-    if case.family.no_cards:
-        return f"no cards: {case.family.no_cards}"
-    said = [written(acting, case.ground.deck) for acting in case.acting]
-    return said[0]
-
-
 def weighed(acting: ActingEffect, made: Assembly, within: float = WEIGHED) -> str:
     """The terms add the mass that ``apply`` adds to a structure.
 
@@ -230,14 +222,6 @@ def weighed(acting: ActingEffect, made: Assembly, within: float = WEIGHED) -> st
             "(fields of shells count by themselves)"
         )
     return f"{1e3 * found:.3g} g by its terms, {1e3 * due:.3g} g in the deck"
-
-
-def weighs_what_it_writes(case: TriedFamily) -> str:
-    """The terms add the mass that ``apply`` adds, for every candidate that a deck can hold."""
-    if case.family.no_cards:
-        return f"no cards: {case.family.no_cards}"
-    said = [weighed(acting, case.ground.deck) for acting in case.acting]
-    return said[0]
 
 
 def writes_its_cards(case: TriedFamily) -> str:

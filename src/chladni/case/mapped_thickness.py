@@ -89,25 +89,27 @@ def formed_thickness(
     fit = _fitted(made, formed, place)
     there = formed if fit is None else moved(formed, fit)
     mapped = map_thickness(made, there, pairs=pairs)
-    _refuse_sparse(path, made, there, mapped)
-    _refuse_elsewhere(path, mapped, place, bool(len(formed.cells)))
+    if (covered := _covered(mapped)) < LEAST_COVERED:
+        why = "" if len(formed.cells) else _too_sparse(made, there, covered)
+        raise FileError(f"{path}: {why or _elsewhere(mapped, covered, place, formed)}")
     return FormedThickness(path, mapped, fit)
 
 
-def _refuse_sparse(path: Path, made: Assembly, formed: FormedMesh, mapped: Mapped) -> None:
-    """Refuse points without cells on the deck that are too far apart for its shells."""
-    reach, covered = default_reach(made), _covered(mapped)
-    if len(formed.cells) or covered >= LEAST_COVERED or len(formed.points) < 2:
-        return
+def _too_sparse(made: Assembly, formed: FormedMesh, covered: float) -> str:
+    """Why points without cells on the deck cover little: their spacing; "" if it is not that."""
+    if len(formed.points) < 2:
+        return ""
+    reach = default_reach(made)
     spacing = float(np.median(cKDTree(formed.points).query(formed.points, k=2)[0][:, 1]))
     off = ShellSurface.whole(made).closest_points(formed.points).distance
-    if spacing > reach and float(np.median(off)) <= reach:
-        raise FileError(
-            f"{path}: its points have no cells and are {1e3 * spacing:.3g} mm apart; a corner of a "
-            f"shell takes the thickness of points within {1e3 * reach:.2g} mm, so only "
-            f"{100 * covered:.2g} % of the area has one; give the cells as well (VTU, PLY or an "
-            f"LS-DYNA keyword file), or points at most {1e3 * reach:.2g} mm apart"
-        )
+    if spacing <= reach or float(np.median(off)) > reach:
+        return ""
+    return (
+        f"its points have no cells and are {1e3 * spacing:.3g} mm apart; a corner of a "
+        f"shell takes the thickness of points within {1e3 * reach:.2g} mm, so only "
+        f"{100 * covered:.2g} % of the area has one; give the cells as well (VTU, PLY or an "
+        f"LS-DYNA keyword file), or points at most {1e3 * reach:.2g} mm apart"
+    )
 
 
 def _covered(mapped: Mapped) -> float:
@@ -117,19 +119,16 @@ def _covered(mapped: Mapped) -> float:
     return sum(s * p.coverage for s, p in zip(size, mapped.parts, strict=True)) / sum(size)
 
 
-def _refuse_elsewhere(path: Path, mapped: Mapped, place: str, cells: bool) -> None:
-    """Refuse a file whose sheets, or points without cells, hardly lie on those of the deck."""
-    found = _covered(mapped)
-    if found >= LEAST_COVERED:
-        return
-    if not cells:
+def _elsewhere(mapped: Mapped, covered: float, place: str, formed: FormedMesh) -> str:
+    """Why a file covers little: its sheets or points hardly lie on those of the deck."""
+    if not len(formed.cells):
         advice = "points without cells cannot be aligned, so give them in the deck's frame and unit"
     elif place == PLACES[0]:
         advice = "move it onto the deck (aligned)"
     else:
         advice = "it may belong to another part"
-    raise FileError(
-        f"{path}: {100 * found:.2g} % of the area of {len(mapped.parts)} parts has a matching "
+    return (
+        f"{100 * covered:.2g} % of the area of {len(mapped.parts)} parts has a matching "
         f"sheet in it; {advice}"
     )
 
