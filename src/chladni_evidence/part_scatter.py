@@ -64,6 +64,7 @@ def _scaled(part: Part, scale: dict[str, float]) -> Part:
 def stiffer(material: Material, factor: float) -> Material:
     """The material with all its moduli times a factor.
 
+    >>> from chladni.model.properties import Isotropic
     >>> stiffer(Isotropic(210e9, 0.3, 7850.0), 2.0).E
     420000000000.0
     """
