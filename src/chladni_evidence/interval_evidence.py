@@ -26,7 +26,7 @@ from chladni.effects.calibration_parameters import (
     thickness_of,
     with_scaled,
 )
-from chladni.inference.adequacy import adequacy
+from chladni.inference.adequacy import STATISTICS, adequacy
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.model.assembly import Assembly
 from chladni.output import make_folder, write_text
@@ -66,6 +66,7 @@ class CalibratedArticle:
     noise: str  # of the likelihood, as the case word
     p: float
     intervals: tuple[PosteriorOffset, ...]
+    residual: float = float("nan")  # rms over the median of what right models leave
 
 
 def of_prior(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
@@ -142,8 +143,10 @@ def _answer(question: Question, truth: dict[str, Any], noise: str) -> Calibrated
     problem, null = without_effects(prepare(question).problem)
     fits = adequacy(null, problem.mass_measurement, problem.labels)
     p = float("nan") if fits is None else fits.p
+    left = [] if fits is None else [s for s in fits.statistics if s.name == STATISTICS[1]]
+    residual = float(np.sqrt(left[0].value / left[0].median)) if left else float("nan")
     names = truth["structure"], truth["mesh"], truth["seed"], noise
-    return CalibratedArticle(*names, p, intervals(null, truth["scales"]))
+    return CalibratedArticle(*names, p, intervals(null, truth["scales"]), residual)
 
 
 def interval_evidence(
@@ -197,5 +200,11 @@ def table(answers: Sequence[CalibratedArticle]) -> list[str]:
             lines.append(
                 f"{noise:11} test of fit {len(p):7}  below 0.05: {np.mean(p < 0.05):.0%}, "
                 f"median {np.median(p):.2f}, uniform p {kstest(p, 'uniform').pvalue:.3f}"
+            )
+        ln = np.log([a.residual for a in mine if np.isfinite(a.residual)])
+        if len(ln):
+            lines.append(
+                f"{noise:11} residual {len(ln):10}  {np.exp(np.median(ln)):.2f} of the median of "
+                f"right models, sd of ln {np.std(ln):.2f}"
             )
     return lines

@@ -1,5 +1,6 @@
 """Coverage and uniformity of answers to articles that are drawn from the priors."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -80,3 +81,12 @@ def test_wide_intervals_are_not_uniform(width):
     assert (int(inside.strip("%")) > 98) == (width > 1)
     assert (uniform < 1e-6) == (width > 1)
     assert float(fits.split()[-1]) > 0.01
+
+
+def test_residuals_of_articles_are_compared_with_those_of_right_models():
+    """Twice as large as in the draws, with a scatter of 0.3 between articles."""
+    size = 2 * np.exp(0.3 * np.random.default_rng(4).normal(size=2000))
+    every = [CalibratedArticle("plate", "fine", 1, "formulation", 0.5, (), float(r)) for r in size]
+    (said,) = (line for line in table(every) if "residual" in line)
+    assert re.search(r" (1.9|2.0)\d of", said)
+    assert re.search(r"sd of ln 0.(29|3)", said)
