@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from chladni.errors import ModelError
-from chladni.inference.discrepancy import learned
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.inference.likelihood import Responses
+from chladni.inference.linear_model import LinearModel
 from chladni.inference.map_fit import MassMeasurement, constants, prior_residuals
 from chladni.inference.sensor_errors import SensorErrors, Side
 from chladni.reduced.frequency_dependent_stiffness import Dissipated
@@ -57,7 +57,10 @@ class RecordedRow:
         sd = data.std()
         r = data.stacked(self.deviation[None] / sd)[:, 0]
         J = data.stacked(self.slopes / sd[None])
-        return learned(data.error, r, J, self.r0, self.J0).neg2_log_evidence + self.constants
+        return (
+            LinearModel(data.error, J, self.J0).learned(r, self.r0).neg2_log_evidence
+            + self.constants
+        )
 
     def spread(self, likelihood: Likelihood = lambda data: data) -> Responses:
         """The data under a likelihood, with errors of form from calibration alone."""

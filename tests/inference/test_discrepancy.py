@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.ema.recording_noise import EqualisedError
 from chladni.inference import discrepancy as dis
-from chladni.inference.discrepancy import columns, discrepancy, form, learned
+from chladni.inference.discrepancy import columns, discrepancy, form
 from chladni.inference.hypothesis_fit import fitted
+from chladni.inference.linear_model import LinearModel
 from chladni.inference.map_fit import MassMeasurement, fit, prior_residuals
 from chladni.reduced.reduced_model import evaluate
 
@@ -93,9 +94,8 @@ def test_low_rank_covariance_is_the_dense_one(softer, state, about, most, monkey
 def test_no_error_at_all_is_the_plain_likelihood(reduced, softer, state):
     data = softer[0]
     tiny = discrepancy(data, state).with_delta(1e-9)
-    plain = data.residual(state, True)
-    for a, b in zip(replace(data, error=tiny).residual(state, True), plain, strict=True):
-        assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
+    for plain in data.scaled(state, True):
+        assert_allclose(tiny.whitened(plain), plain, atol=1e-9 * np.abs(plain).max())
 
 
 def test_evidence_is_the_sum_over_sizes_of_the_dense_one(reduced, softer, state):
@@ -111,7 +111,9 @@ def test_evidence_is_the_sum_over_sizes_of_the_dense_one(reduced, softer, state)
         cost = r @ np.linalg.solve(C, r) + r0 @ r0 - g @ np.linalg.solve(A, g)
         S.append(cost + np.linalg.slogdet(C)[1] + np.linalg.slogdet(A)[1] + prior.neg2_log(delta))
     total = -2 * np.log(np.exp(-np.array(S) / 2).sum() * np.log(prior.grid[1] / prior.grid[0]))
-    assert learned(error, r, J, r0, J0).neg2_log_evidence == pytest.approx(total, abs=1e-6)
+    assert LinearModel(error, J, J0).learned(r, r0).neg2_log_evidence == pytest.approx(
+        total, abs=1e-6
+    )
 
 
 SCALES = MassMeasurement(1.413, 1.4e-3)
@@ -176,6 +178,6 @@ def test_errors_that_spread_from_a_state_are_the_same_however_often_they_spread(
     once = data.allowing_errors(near, 1e-3)
     again = data.allowing_errors(far, 1e-3).allowing_errors(near, 1e-3)
     assert once.log_det == pytest.approx(again.log_det)
-    r, _ = once.residual(near, False)
-    assert float(r @ r) == pytest.approx(float(np.sum(again.residual(near, False)[0] ** 2)))
+    r, s = (d.error.whitened(d.scaled(near, False)[0]) for d in (once, again))
+    assert float(r @ r) == pytest.approx(float(s @ s))
     assert once.log_det != pytest.approx(data.allowing_errors(far, 1e-3).log_det)

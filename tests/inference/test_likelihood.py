@@ -47,11 +47,11 @@ def poles(reduced):
 
 
 def check_slopes(data, model, effects, x):
-    _, J = data.residual(evaluate(model, effects, x), True)
+    _, J = data.scaled(evaluate(model, effects, x), True)
     h = 1e-4  # next to an antiresonance ln H turns within 1e-3
 
     def r(x):
-        return data.residual(evaluate(model, effects, x, False), False)[0]
+        return data.scaled(evaluate(model, effects, x, False), False)[0]
 
     for k, e in enumerate(h * np.eye(len(x))):
         slope = (8 * (r(x + e) - r(x - e)) - (r(x + 2 * e) - r(x - 2 * e))) / (12 * h)
@@ -97,10 +97,10 @@ def test_slopes_of_poles(reduced, poles):
 
 def test_nothing_is_left_at_the_truth(reduced, responses, poles):
     stiffer = [calibration_parameter(reduced.groups, "E", [0])]
-    r, _ = responses.residual(evaluate(reduced.model, stiffer, np.array([0.04])), True)
+    r, _ = responses.scaled(evaluate(reduced.model, stiffer, np.array([0.04])), True)
     assert_allclose(r, 0, atol=1e-8)
     assert len(r) == 2 * 2 * responses.use.sum()
-    r, _ = poles.residual(evaluate(reduced.model, stiffer, np.array([0.004])), True)
+    r, _ = poles.scaled(evaluate(reduced.model, stiffer, np.array([0.004])), True)
     assert_allclose(r, 0, atol=1e-7)
 
 

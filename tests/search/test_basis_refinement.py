@@ -84,10 +84,12 @@ def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(errors, mo
 class Still:
     """Data that say nothing."""
 
+    error = None
+
     def rebased(self, model):
         return self
 
-    def residual(self, state, gradient):
+    def scaled(self, state, gradient):
         return np.zeros(1), np.zeros((1, 1))
 
 

@@ -39,8 +39,9 @@ class Offsets:
     """y = channels + noise."""
 
     y: np.ndarray
+    error = None
 
-    def residual(self, state, gradient):
+    def scaled(self, state, gradient):
         r = (state.offset.real - self.y) / NOISE
         return r, state.doffset.real / NOISE if gradient else np.zeros((len(r), 0))
 

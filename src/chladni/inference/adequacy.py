@@ -23,9 +23,10 @@ from scipy.stats import norm
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
-from .discrepancy import LEARNED, RIGID, Discrepancy, learned
+from .discrepancy import LEARNED, RIGID, Discrepancy
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Responses
+from .linear_model import LinearModel
 from .map_fit import MassMeasurement, prior_residuals, unknowns
 from .pole_data import SCALE, SCALE_SD, Poles
 from .result import FitStatistic
@@ -60,13 +61,11 @@ class FitTest:
 
 
 @dataclass(frozen=True, eq=False)
-class _Linear:
-    """A linearised fit: residuals of the data and of the prior information."""
+class _Linear(LinearModel):
+    """A linearised fit of responses with errors of form, and the layout of its residuals."""
 
     error: Discrepancy
     known: Whitening | None
-    J: np.ndarray
-    J0: np.ndarray
     use: np.ndarray
     inputs: int
 
@@ -107,11 +106,8 @@ class _Linear:
 
         And the mean square of the whitened residual by line and channel (n_f, n_out).
         """
-        error = self.error.with_delta(learned(self.error, r, self.J, r0, self.J0).delta)
-        J, z = error.whitened(self.J), error.whitened(r)
-        A, g = J.T @ J + self.J0.T @ self.J0, J.T @ z + self.J0.T @ r0
-        dx = np.linalg.solve(A, g)
-        z = z - J @ dx
+        error = self.error.with_delta(self.learned(r, r0).delta)
+        z = self.refitted(r, r0, error.delta)
         square = np.zeros((*self.use.shape, self.inputs, 2))
         square[self.use] = np.moveaxis(z.reshape(2, -1, self.inputs), 0, -1)
         square = (square**2).mean(axis=(2, 3))
@@ -161,7 +157,7 @@ def adequacy(
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     r, J = data.scaled(state, True)
     r0, J0 = prior_residuals(fit.effects, mass_measurement, fit.x, state)
-    model = _Linear(data.error, data.known, J, J0, data.use, data.values.shape[2])
+    model = _Linear(data.error, J, J0, data.known, data.use, data.values.shape[2])
     seen, square = model.statistics(r, r0)
     rng = np.random.default_rng(20250103)
     sd = np.array([p.sd for p in unknowns(fit.effects)])

@@ -167,9 +167,14 @@ class Discrepancy:
         """A copy with the error scaled to ``delta``."""
         return replace(self, delta=delta)
 
+    def share(self, delta: float | None = None) -> np.ndarray:
+        """δ² s / (1 + δ² s) (k,), the share of the variance along each column due to the error."""
+        v = (self.delta if delta is None else delta) ** 2 * self.s
+        return np.asarray(v / (1 + v))
+
     def whitened(self, r: np.ndarray) -> np.ndarray:
         """C^-½ r of residuals or of columns of slopes (n, ...)."""
-        less = 1 - 1 / np.sqrt(1 + self.delta**2 * self.s)
+        less = 1 - np.sqrt(1 - self.share())
         return r - (self.U * less) @ (self.U.T @ r)
 
     def log_det(self) -> float:
@@ -239,53 +244,3 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
         out[1, ..., p] = data.s[:, None] ** 2 * both
     out /= H * sd * np.log(10)
     return data.stacked(out.reshape(2 * len(i), *H.shape))
-
-
-@dataclass(frozen=True, eq=False)
-class Learned:
-    """Evidence over all δ, and which δ the data prefer.
-
-    Attributes
-    ----------
-    neg2_log_evidence : float  -2 ln evidence, δ integrated out
-    delta : float            its most probable value
-    """
-
-    neg2_log_evidence: float
-    delta: float
-
-
-def learned(
-    error: Discrepancy, r: np.ndarray, J: np.ndarray, r0: np.ndarray, J0: np.ndarray
-) -> Learned:
-    """Integrate δ out of the evidence of a model linearised at its fit.
-
-    Parameters
-    ----------
-    r, J : (n,), (n, n_p)      residuals of the data and slopes, not yet whitened by C
-    r0, J0 : (m,), (m, n_p)    those of the priors and the scales
-    """
-    u, V = error.U.T @ r, error.U.T @ J
-    A0, g0, c0 = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0, float(r @ r + r0 @ r0)
-    grid, prior = error.prior.grid, error.prior.neg2_log
-    S = np.empty(len(grid))
-    for k, delta in enumerate(grid):
-        v = delta**2 * error.s
-        w = v / (1 + v)
-        A, g = A0 - (V.T * w) @ V, g0 - V.T @ (w * u)
-        L = np.linalg.cholesky(A)
-        cost = c0 - w @ u**2 - float((sl.solve_triangular(L, g, lower=True) ** 2).sum())
-        S[k] = cost + 2 * np.log(np.diag(L)).sum() + np.log1p(v).sum() + prior(delta)
-    width = np.log(grid[1] / grid[0])
-    best = int(np.argmin(S))
-    total = S[best] - 2 * np.log(np.exp(-(S - S[best]) / 2).sum() * width)
-    return Learned(float(total), _peak(grid, S, best))
-
-
-def _peak(grid: np.ndarray, S: np.ndarray, best: int) -> float:
-    """Where the parabola through the best three values has its foot."""
-    if not 0 < best < len(S) - 1:
-        return float(grid[best])
-    a, b, c = S[best - 1 : best + 2]
-    shift = 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
-    return float(grid[best] * (grid[1] / grid[0]) ** np.clip(shift, -1, 1))

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..reduced.reduced_model import Reduced, evaluate
-from .discrepancy import learned
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, over_scales
 from .likelihood import Responses
+from .linear_model import LinearModel
 from .map_fit import prior_residuals, unknowns
 from .pole_data import Poles
 from .scan import baseline
@@ -107,7 +107,7 @@ def _evidence(
     if isinstance(data, Poles):
         return over_scales(data, state, r0, J0)
     if data.error is not None:
-        return learned(data.error, r, J, r0, J0).neg2_log_evidence
+        return LinearModel(data.error, J, J0).learned(r, r0).neg2_log_evidence
     A, g = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0
     cost = r @ r + r0 @ r0 - g @ np.linalg.solve(A, g)
     widths = 2 * np.log(data.std()[data.use]).sum()

@@ -14,9 +14,9 @@ from ..reduced.reduced_model import Reduced, State, evaluate
 from ..reduced.reduced_problem import ReducedProblem
 from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
-from .discrepancy import MEDIAN, learned
+from .discrepancy import MEDIAN
 from .likelihood import Data, Responses
-from .map_fit import Fit, MassMeasurement, constants, fit, prior_residuals
+from .map_fit import Fit, MassMeasurement, constants, fit, linearised_fit, prior_residuals
 from .pole_data import SCALE, SCALE_SD, Poles
 
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
@@ -273,9 +273,8 @@ def _fit_responses(
     """Fit parameters and the size δ of the model's error in turn; evidence integrates δ out."""
     assert data.error is not None
     for _ in range(ROUNDS):
-        found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
-        r0, J0 = prior_residuals(effects, mass_measurement, found.x, found.state)
-        likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
+        found, there = linearised_fit(model, effects, data, mass_measurement, x, max_steps)
+        likely = there.model.learned(there.r, there.r0)
         change = abs(np.log(likely.delta / data.error.delta))
         data = replace(data, error=data.error.with_delta(likely.delta))
         S = likely.neg2_log_evidence + constants(effects) + data.log_det
@@ -346,7 +345,7 @@ def over_scales(data: Poles, state: State, r0: np.ndarray, J0: np.ndarray) -> fl
     every = []
     for scale in SCALES:
         given = replace(data, scale=scale)
-        r, J = given.residual(state, True)
+        r, J = given.scaled(state, True)
         A, g = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0
         cost = r @ r + r0 @ r0 - g @ np.linalg.solve(A, g)
         widths = 2 * np.log(given.std()[data.use]).sum()
@@ -362,7 +361,7 @@ def _likely_scale(data: Poles, state: State) -> float:
 
 def neg2_log_mixture(data: Poles, state: State) -> float:
     """-2 ln p(poles | modes, best assignment, scale) p(scale), up to a constant."""
-    r, _ = data.residual(state, False)
+    r, _ = data.scaled(state, False)
     widths = 2 * np.log(data.std()[data.use]).sum()
     return float(r @ r + widths) + _scale_prior(data.scale)
 

@@ -94,10 +94,11 @@ def information(problem: UpdatingProblem, x: np.ndarray) -> Information:
 def _slopes(data: Data, state: State) -> np.ndarray:
     """Slopes of the whitened data; natural frequencies are paired in a wide window first."""
     if not isinstance(data, Poles):
-        return data.residual(state, True)[1]
+        J = data.scaled(state, True)[1]
+        return J if data.error is None else data.error.whitened(J)
     wide = replace(data, scale=PAIRED, strength=np.full(len(data.strength), np.inf))
     widths = np.append((wide.std() / data.std())[data.use], 1.0)
-    return wide.residual(state, True)[1] * widths[:, None]
+    return wide.scaled(state, True)[1] * widths[:, None]
 
 
 def calibration_positions(effects: Sequence[Effect]) -> np.ndarray:

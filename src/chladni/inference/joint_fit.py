@@ -13,6 +13,7 @@ import numpy as np
 from ..effects.effect import Effect, changes_channels
 from ..reduced.reduced_model import State, evaluate
 from .hypothesis_fit import HypothesisFit
+from .linear_model import LinearModel, Squares
 from .map_fit import MassMeasurement, descend, prior_residuals
 
 SharedKey = tuple[str, str, int]  # an effect's name, where it acts, number of the parameter
@@ -61,21 +62,25 @@ def joint_fit(
         start[at] = fit.fit.x
     mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
 
-    def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, list[State]]:
-        found, rows, slopes = [], [(x - mean) / sd], [np.diag(1 / sd)]
+    def objective(x: np.ndarray, gradient: bool) -> tuple[Squares, list[State]]:
+        off = (x - mean) / sd
+        found, cost, slope, H = [], float(off @ off), off / sd, np.diag(1 / sd**2)
         for one, at, mass in zip(states, where, masses, strict=True):
             state = evaluate(one.model, one.fit.effects, x[at], gradient)
-            r, J = one.data.residual(state, gradient)
-            weighed, slope = _weighed(one, mass, x[at], state)
+            r, J = one.data.scaled(state, gradient)
+            weighed, J0 = _weighed(one, mass, x[at], state)
+            linear = LinearModel(one.data.error, J, J0 if gradient else J0[:, :0])
+            own = linear.squares(r, weighed)
             found.append(state)
-            rows += [r, weighed]
+            cost += own.cost
             if gradient:
-                slopes += [_spread(J, at, n), _spread(slope, at, n)]
-        return np.concatenate(rows), np.concatenate(slopes), found
+                slope[at] += own.gradient
+                H[np.ix_(at, at)] += own.information
+        return Squares(cost, slope, H), found
 
     limit = np.array([p.step for p in priors])
-    x, _, J, found, _ = descend(objective, start, limit, max_steps, tol)
-    covariance = np.linalg.inv(J.T @ J)
+    x, squares, found, _ = descend(objective, start, limit, max_steps, tol)
+    covariance = np.linalg.inv(squares.information)
     fits = tuple(
         _of_state(one, x[at], covariance[np.ix_(at, at)], state)
         for one, at, state in zip(states, where, found, strict=True)
@@ -89,13 +94,6 @@ def _weighed(
     """The residual and slope of the weighing alone."""
     r, J = prior_residuals(one.fit.effects, mass, x, state)
     return r[len(x) :], J[len(x) :]
-
-
-def _spread(J: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
-    """The columns of one state placed among the columns of all states."""
-    out = np.zeros((len(J), n))
-    out[:, at] = J
-    return out
 
 
 def _positions(

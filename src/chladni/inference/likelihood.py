@@ -27,13 +27,14 @@ LOCAL = 0.1  # of the upper residual of a channel: the compliance round a point 
 
 
 class Data(Protocol):
-    """Residuals of a state, whitened so that their expected square is one."""
+    """Residuals of a state; their covariance is one without an error of form."""
 
-    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """r (n,) and ∂r/∂x (n, n_p)."""
+    @property
+    def error(self) -> Discrepancy | None:
+        """Covariance of the model's errors of form, or None."""
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals divided by the spread of each sample, with their dependence still present."""
+        """r (n,) over the spread of each sample and ∂r/∂x (n, n_p); ``error`` is still in them."""
 
     def rebased(self, model: Reduced) -> Self:
         """Return the data with rows in another basis."""
@@ -220,13 +221,6 @@ class Responses:
     def log_det(self) -> float:
         """Ln det of the covariance with known errors, if the evidence counts it."""
         return 0.0 if self.known is None or self.identified is None else self.known.log_det
-
-    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """δ over its spread, with the errors of the model's form whitened out."""
-        r, J = self.scaled(state, gradient)
-        if self.error is None:
-            return r, J
-        return self.error.whitened(r), self.error.whitened(J) if gradient else J
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """δ over its spread on used samples, real and imaginary, sensors' errors whitened out."""

@@ -17,6 +17,7 @@ from ..reduced.effect_dofs import slices
 from ..reduced.matrix_stack import along
 from ..reduced.reduced_model import Reduced, State, evaluate
 from .likelihood import Data
+from .linear_model import LinearModel, Squares
 
 APART = 1.96  # standard deviations of a weighing: a mass farther off has left the scales
 
@@ -139,6 +140,34 @@ def constants(effects: Sequence[Effect]) -> float:
     return float(widths + sum(p - w for p, w in zip(places, without, strict=True)))
 
 
+@dataclass(frozen=True, eq=False)
+class LinearPosterior:
+    """A state with its slopes, and residuals of the data (n,) and of all other knowledge (m,)."""
+
+    state: State
+    model: LinearModel
+    r: np.ndarray
+    r0: np.ndarray
+
+
+def linearised(
+    model: Reduced, effects: Sequence[Effect], data: Data,
+    mass_measurement: MassMeasurement | None, x: np.ndarray, gradient: bool = True,
+) -> tuple[Squares, LinearPosterior]:  # fmt: skip
+    """-2 ln posterior at x up to a constant, its slopes with ``gradient``, and what it is made of.
+
+    Raises
+    ------
+    ModelError
+        If x is no structure.
+    """
+    state = evaluate(model, effects, x, gradient)
+    r, J = data.scaled(state, gradient)
+    r0, J0 = prior_residuals(effects, mass_measurement, x, state)
+    linear = LinearModel(data.error, J, J0 if gradient else J0[:, :0])
+    return linear.squares(r, r0), LinearPosterior(state, linear, r, r0)
+
+
 def fit(
     model: Reduced,
     effects: Sequence[Effect],
@@ -156,67 +185,72 @@ def fit(
     start : (n_p,)      initial x
     tol : float        stop when a step improves -2 ln posterior by less
     """
+    return linearised_fit(model, effects, data, mass_measurement, start, max_steps, tol)[0]
+
+
+def linearised_fit(
+    model: Reduced, effects: Sequence[Effect], data: Data,
+    mass_measurement: MassMeasurement | None, start: np.ndarray, max_steps: int, tol: float = 0.05,
+) -> tuple[Fit, LinearPosterior]:  # fmt: skip
+    """Fit as :func:`fit`, and keep the linear model at the end."""
     limit = np.array([p.step for p in unknowns(effects)])
 
-    def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, State]:
-        state = evaluate(model, effects, x, gradient)
-        r, J = data.residual(state, gradient)
-        r0, J0 = prior_residuals(effects, mass_measurement, x, state)
-        return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
+    def objective(x: np.ndarray, gradient: bool) -> tuple[Squares, LinearPosterior]:
+        return linearised(model, effects, data, mass_measurement, x, gradient)
 
-    x, r, J, state, status = descend(objective, start, limit, max_steps, tol)
-    cost = float(r @ r)
-    A = J.T @ J
-    S = cost + np.linalg.slogdet(A)[1] + constants(effects)
-    own = r[: len(r) - len(prior_residuals(effects, mass_measurement, x, state)[0])]
-    return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
+    x, found, there, status = descend(objective, start, limit, max_steps, tol)
+    A = found.information
+    S = found.cost + np.linalg.slogdet(A)[1] + constants(effects)
+    misfit = found.cost - float(there.r0 @ there.r0)
+    done = tuple(effects), x, np.linalg.inv(A), misfit, float(S), there.state, data, status
+    return Fit(*done), there
 
 
-Objective = Callable[[np.ndarray, bool], tuple[np.ndarray, np.ndarray, Any]]
+Objective = Callable[[np.ndarray, bool], tuple[Squares, Any]]
 
 
 def descend(
     objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, Any, Status]:
-    """Levenberg-Marquardt: final x, its residuals, slopes, third value of the objective, status.
+) -> tuple[np.ndarray, Squares, Any, Status]:
+    """Levenberg-Marquardt: final x, its squares, second value of the objective, status.
 
     Parameters
     ----------
-    objective : x, True for slopes -> residuals (n,), slopes (n, n_p), any third value
+    objective : x, True for slopes -> squares, any second value
     limit : (n_p,)     longest step
     tol : stop when a step improves the sum of squares by less
     """
     x, damping = start.copy(), 1e-2
     status = Status.OUT_OF_STEPS if len(x) else Status.CONVERGED
-    r, J, state = objective(x, True)
-    cost = float(r @ r)
+    found, there = objective(x, True)
     for _ in range(max_steps if len(x) else 0):
-        found = _step(objective, x, r, J, cost, damping, limit)
-        if found is None:
-            status = Status.STALLED if np.abs(J.T @ r).max() > 1e-2 * cost else Status.CONVERGED
+        step = _step(objective, x, found, damping, limit)
+        if step is None:
+            stalled = np.abs(found.gradient).max() > 1e-2 * found.cost
+            status = Status.STALLED if stalled else Status.CONVERGED
             break
-        improved, x, damping = found
-        del state  # its slopes take as much memory as the next ones
-        r, J, state = objective(x, True)
-        cost = float(r @ r)
+        improved, x, damping = step
+        del there  # its slopes take as much memory as the next ones
+        found, there = objective(x, True)
         if improved < tol:
             status = Status.CONVERGED
             break
-    return x, r, J, state, status
+    return x, found, there, status
 
 
-def _step(objective, x, r, J, cost, damping, limit):  # type: ignore[no-untyped-def]
+def _step(
+    objective: Objective, x: np.ndarray, found: Squares, damping: float, limit: np.ndarray
+) -> tuple[float, np.ndarray, float] | None:
     """One accepted Levenberg-Marquardt step: (improvement, new x, new damping), or None."""
-    A, g = J.T @ J, J.T @ r
+    A, g = found.information, found.gradient
     for _ in range(8):
         dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)
         dx = dx / max(1.0, np.abs(dx / limit).max())
         try:
-            trial = objective(x + dx, False)[0]
+            new = objective(x + dx, False)[0].cost
         except ModelError:
-            trial = np.array([np.inf])
-        new = float(trial @ trial)
-        if new < cost:
-            return cost - new, x + dx, damping / 6
+            new = np.inf
+        if new < found.cost:
+            return found.cost - new, x + dx, damping / 6
         damping = max(damping, 1e-4) * 6
     return None

@@ -46,6 +46,10 @@ class Poles:
     a: np.ndarray | None = None
     b: np.ndarray | None = None
 
+    @property
+    def error(self) -> None:
+        """No error of form; ``scale`` has its place."""
+
     def rebased(self, model: Reduced) -> Self:
         """Rows for the visibility of modes in the basis of this model."""
         if self.outputs is None or self.inputs is None:
@@ -96,7 +100,7 @@ class Poles:
         f = np.sqrt(state.lam[model]) / (2 * np.pi)
         return np.log(f / self.frequency[test]), test, model
 
-    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """ln(f_model / f_test) over its spread; unpaired poles and modes at their price."""
         test, model, unpaired = self.pairs(state)
         lam = state.lam[model]
@@ -113,8 +117,6 @@ class Poles:
         dlam = along(state.dK, phi) - lam * along(state.dM, phi)
         J[test] = (dlam / (2 * lam) / sd[test]).T
         return r[use], J[use]
-
-    scaled = residual  # poles are independent
 
     def only(self, use: np.ndarray) -> Self:
         """Return these poles with others in use."""

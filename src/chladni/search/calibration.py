@@ -25,7 +25,8 @@ from ..inference.calibration_result import (
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted, wide_start
 from ..inference.identifiability import calibration_positions, identifiability, parameter_names
 from ..inference.likelihood import Responses
-from ..inference.map_fit import Fit, MassMeasurement, descend, fit, prior_residuals, unknowns
+from ..inference.linear_model import Squares
+from ..inference.map_fit import Fit, MassMeasurement, descend, fit, linearised, unknowns
 from ..inference.pole_data import Poles
 from ..parallel import in_parallel
 from ..progress import Progress, silent, within
@@ -266,18 +267,15 @@ def _held_cost(null: HypothesisFit, mass: MassMeasurement | None, k: int, z: flo
     sd = np.sqrt(found.covariance[k, k])
     held = found.x[k] + z * sd
 
-    def objective(y: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, None]:
+    def objective(y: np.ndarray, gradient: bool) -> tuple[Squares, None]:
         x = np.empty(len(rest))
         x[rest], x[k] = y, held
-        state = evaluate(model, found.effects, x, gradient)
-        r, J = found.data.residual(state, gradient)
-        r0, J0 = prior_residuals(found.effects, mass, x, state)
-        return np.append(r, r0), np.concatenate([J, J0])[:, rest] if gradient else J, None
+        squares, _ = linearised(model, found.effects, found.data, mass, x, gradient)
+        return squares.of_some(rest) if gradient else squares, None
 
     start = found.x[rest] + z * found.covariance[rest, k] / sd
     limit = np.array([p.step for p in unknowns(found.effects)])[rest]
     try:
-        r = descend(objective, start, limit, PROFILE_STEPS, 0.05)[1]
+        return descend(objective, start, limit, PROFILE_STEPS, 0.05)[1].cost
     except ModelError:
         return float("inf")
-    return float(r @ r)

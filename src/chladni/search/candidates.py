@@ -209,7 +209,7 @@ class UpdatingContext:
             if isinstance(data, Poles):
                 prior = _prior(effect, start)
                 for scale_index, scale in enumerate(ways):
-                    r, _ = replace(data, scale=scale).residual(state, False)
+                    r, _ = replace(data, scale=scale).scaled(state, False)
                     out[scale_index, k] = r @ r + prior
             else:
                 r, _ = data.scaled(state, False)

@@ -17,7 +17,7 @@ from ..inference.calibration_result import (
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.identifiability import calibration_positions, parameter_names
 from ..inference.likelihood import Responses
-from ..inference.map_fit import Fit, fit, prior_residuals, unknowns
+from ..inference.map_fit import Fit, fit, linearised, unknowns
 from ..inference.posterior_samples import WALKERS, Chains, sampled
 from ..progress import Progress
 from ..reduced.reduced_model import evaluate
@@ -49,11 +49,9 @@ def with_frozen(whole: UpdatingProblem, null: HypothesisFit) -> Fit:
     effects = [*found.effects, *frozen]
     z = unknowns(frozen)
     x = np.concatenate([found.x, [p.mean for p in z]])
-    state = evaluate(null.model, effects, x)
-    J = found.data.residual(state, True)[1]
-    J = np.concatenate([J, prior_residuals(effects, whole.mass_measurement, x, state)[1]])
+    H = linearised(null.model, effects, found.data, whole.mass_measurement, x)[0].information
     n = len(found.x)
-    moved = np.linalg.solve(J[:, :n].T @ J[:, :n], J[:, :n].T @ J[:, n:])
+    moved = np.linalg.solve(H[:n, :n], H[:n, n:])
     spread = moved * [p.sd for p in z]
     return replace(found, covariance=found.covariance + spread @ spread.T)
 
@@ -78,12 +76,9 @@ def posterior_sample(
 
     def log_density(x: np.ndarray) -> float:
         try:
-            state = evaluate(model, effects, x, False)
+            return -linearised(model, effects, data, mass, x, False)[0].cost / 2
         except ModelError:
             return -np.inf
-        r = data.residual(state, False)[0]
-        r0 = prior_residuals(effects, mass, x, state)[0]
-        return -float(r @ r + r0 @ r0) / 2
 
     chains = sampled(log_density, best.x, best.covariance, progress)
     draws = chains.draws
