@@ -228,7 +228,7 @@ def test_responses_see_it_with_slopes_of_second_order(mastic, reduced):
     flat = replace(effect, band=(effect.reference,) * 2)  # the loss moves no mode
     state = evaluate(model, [flat], X)
     data = replace(data, values=data.model(state))
-    slope = data._slopes(state)[1]
+    slope = data.slopes(state)[1]
     left = []
     for h in (0.02, 0.01):
         there = evaluate(model, [flat], X + h * np.eye(3)[1], False)

@@ -14,7 +14,7 @@ from ..dynamics.modal_sum import modal_sum
 from ..ema.correlation import wrapped
 from ..ema.identification import DERIVATIVES
 from ..ema.recording_noise import EqualisedError
-from ..reduced.matrix_stack import each_times
+from ..reduced.matrix_stack import EVERY, each_times
 from ..reduced.reduced_model import Reduced, State
 from .discrepancy import LARGEST, MEDIAN, USUAL, Discrepancy, curvature, discrepancy
 from .likely_sensor_errors import LikelyErrors, likely_errors
@@ -101,12 +101,13 @@ class Responses:
         return self.s[:, None, None] ** self.power * H + self.direct
 
     def receptance(
-        self, state: State, phi_o: np.ndarray, phi_i: np.ndarray, d: np.ndarray
-    ) -> np.ndarray:
-        """Receptance of the modes of :meth:`modal`, made complex by dissipation."""
-        H = modal_sum(phi_o, d, phi_i)
+        self, state: State, phi_o: np.ndarray, phi_i: np.ndarray, d: np.ndarray,
+        s: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Receptance of the modes of :meth:`modal`, made complex by dissipation; on lines s."""
+        H, s = modal_sum(phi_o, d, phi_i), self.s if s is None else s
         lost = state.dissipated
-        return H if lost is None else H + lost.seen(self.s, d, phi_o, phi_i)
+        return H if lost is None else H + lost.seen(s, d, phi_o, phi_i)
 
     def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r).
@@ -228,15 +229,24 @@ class Responses:
         r = self.stacked(self.deviation(state)[None] / sd)[:, 0]
         if not gradient:
             return r, np.zeros((len(r), 0))
-        return r, self.stacked(self._slopes(state) / sd[None])
+        f, o = np.asarray(self.use.any(axis=1)), np.asarray(self.use.any(axis=0))
+        J = self.slopes(state, f, o)
+        J /= sd[f][:, o]
+        return r, self._stacked(J, self.use[f][:, o])
 
     def stacked(self, z: np.ndarray) -> np.ndarray:
         """Columns of residuals (n, k) of k complex deviations over their spread (k, n_f, ...)."""
-        picked = z[:, self.use].reshape(len(z), self.use.sum() * z.shape[-1]).T
+        return self._stacked(z, self.use)
+
+    def _stacked(self, z: np.ndarray, use: np.ndarray) -> np.ndarray:
+        """Columns of :meth:`stacked` where z holds some lines and channels; ``use`` is of these."""
+        picked = z[:, use].reshape(len(z), use.sum() * z.shape[-1]).T
         columns = np.concatenate([picked.real, picked.imag])
         return columns if self.known is None else self.known.whitened(columns)
 
-    def _slopes(self, state: State) -> np.ndarray:
+    def slopes(
+        self, state: State, lines: np.ndarray | slice = EVERY, outputs: np.ndarray | slice = EVERY
+    ) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
         dK and dM are multiplied in the basis with Φ D φ_i on their right, which avoids a full
@@ -244,8 +254,9 @@ class Responses:
         if shapes change where they are measured.
         """
         phi_o, phi_i, d = self.modal(state)
-        H = self.receptance(state, phi_o, phi_i, d)
-        H = H + self.direct / self.s[:, None, None] ** self.power
+        phi_o, d, s = phi_o[outputs], d[lines], self.s[lines]
+        direct = np.broadcast_to(self.direct, self.values.shape[1:])[outputs]
+        H = self.receptance(state, phi_o, phi_i, d, s) + direct / s[:, None, None] ** self.power
         assert state.dK is not None
         assert state.dM is not None
         out = np.empty((len(state.dK), *H.shape), complex)
@@ -254,22 +265,22 @@ class Responses:
         for j in range(len(phi_i)):
             q = vectors @ (phi_i[j] * d).T
             W = each_times(state.dK, q)
-            W += each_times(state.dM, q * self.s**2)
+            W += each_times(state.dM, q * s**2)
             W = np.ascontiguousarray(W.transpose(2, 1, 0))  # or it is no product of BLAS
             out[:, :, :, j] = -(from_basis @ W).transpose(2, 0, 1)
             if state.ddrive is not None:
                 out[:, :, :, j] += np.einsum("for,pr->pfo", left, state.ddrive[:, j], optimize=True)
         if state.dissipated is not None:
-            for p, seen in state.dissipated.seen_slopes(self.s, d, phi_o, phi_i):
+            for p, seen in state.dissipated.seen_slopes(s, d, phi_o, phi_i):
                 out[p] += seen
         for p, moved in state.dmoved.items():
             moved_o, moved_i = self._of_test(moved)
-            out[p] += modal_sum(moved_o, d, phi_i)
+            out[p] += modal_sum(moved_o[outputs], d, phi_i)
             if state.drive is None:
                 out[p] += modal_sum(phi_o, d, moved_i)
         out /= H * LN10
         if state.doffset is not None:
-            out += state.doffset.T[:, None, :, None]
+            out += state.doffset[outputs].T[:, None, :, None]
         return out
 
     def only(self, use: np.ndarray) -> Self:

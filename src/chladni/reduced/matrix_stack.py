@@ -50,21 +50,37 @@ def felt_alike(change: np.ndarray) -> Iterator[tuple[slice, list[int]]]:
 
 @dataclass(frozen=True, eq=False)
 class Whole:
-    """All of the matrices: ``values`` (g, r, r)."""
+    """All of the matrices, without the half below the diagonal.
 
-    values: np.ndarray
+    Attributes
+    ----------
+    upper : (g, r (r + 1) / 2)     rows of the upper triangle, one after the other
+    at : (r, r) int                position in it of each entry
+    """
+
+    upper: np.ndarray
+    at: np.ndarray
 
     @property
     def shape(self) -> tuple[int, int]:
         """(g, r)."""
-        return self.values.shape[0], self.values.shape[1]
+        return len(self.upper), len(self.at)
 
     def add_to(
         self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
     ) -> None:
         """Add Σ_g w_g A_g over the groups ``among`` to each target (r, r)."""
-        for target, A in zip(targets, _summed(weights, self.values[among]), strict=True):
-            target += A
+        for target, upper in zip(targets, weights @ self.upper[among], strict=True):
+            target += upper[self.at]
+
+
+def whole(values: np.ndarray) -> Whole:
+    """The stack of symmetric matrices (g, r, r)."""
+    r = values.shape[1]
+    rows, columns = np.triu_indices(r)
+    at = np.empty((r, r), np.intp)
+    at[rows, columns] = at[columns, rows] = np.arange(len(rows))
+    return Whole(np.ascontiguousarray(values[:, rows, columns]), at)
 
 
 def _summed(weights: np.ndarray, values: np.ndarray) -> np.ndarray:

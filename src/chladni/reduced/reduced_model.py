@@ -34,7 +34,7 @@ from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
 from .field_factors import log_fields, mass_log, stiffness_log
 from .frequency_dependent_stiffness import Dissipated, Rising
-from .matrix_stack import MatrixStack, Whole, add_slopes, bordered
+from .matrix_stack import MatrixStack, add_slopes, bordered, whole
 from .real_modes import real_modes
 
 
@@ -177,7 +177,7 @@ class Reduced:
         linear: dict[str, MatrixStack] = {}
         cubic: dict[str, MatrixStack] = {}
         for name, pair in self.groups.components():
-            linear[name], cubic[name] = map(Whole, self.groups.project(pair, self.vectors))
+            linear[name], cubic[name] = map(whole, self.groups.project(pair, self.vectors))
         made = self._split[""] = replace(self, linear=linear, cubic=cubic)
         return made
 
@@ -193,7 +193,7 @@ def reduce(groups: ElementGroups, basis: np.ndarray, base: BaseMotion | None = N
     K, M = vectors.reduced(system.elastic), vectors.reduced(system.M)
     rest = mass_properties(groups.structure.assembly)[0] - float(groups.weight.sum())
     return Reduced(
-        groups, vectors, {"": Whole(linear)}, {"": Whole(cubic)}, Whole(mass),
+        groups, vectors, {"": whole(linear)}, {"": whole(cubic)}, whole(mass),
         K - linear.sum(axis=0) - cubic.sum(axis=0), M - mass.sum(axis=0), max(rest, 0.0),
         None if base is None else participation(groups, vectors, base),
     )  # fmt: skip
