@@ -35,6 +35,11 @@ class Squares:
         gradient = J.T @ r if J.shape[1] else np.zeros(0)
         return cls(float(r @ r), gradient, J.T @ J)
 
+    @property
+    def further(self) -> float:
+        """Improvement of the cost by the best step, if residuals are linear."""
+        return float(self.gradient @ np.linalg.solve(self.information, self.gradient))
+
     def of_some(self, chosen: np.ndarray) -> Self:
         """Squares with the slopes by some parameters alone."""
         return replace(
@@ -80,6 +85,13 @@ class LinearModel:
     def _information(self) -> np.ndarray:
         """JᵀJ + J0ᵀJ0 (n_p, n_p)."""
         return np.asarray(self.J.T @ self.J + self.J0.T @ self.J0)
+
+    def turned(self, y: np.ndarray, y0: np.ndarray, u: np.ndarray) -> Self:
+        """The model with slopes J + y uᵀ and J0 + y0 uᵀ."""
+        made = replace(self, J=self.J + np.outer(y, u), J0=self.J0 + np.outer(y0, u))
+        if self.error is not None:  # the product of U and J is the costly one
+            made.__dict__["_along"] = self._along + np.outer(self.error.U.T @ y, u)
+        return made
 
     def squares(self, r: np.ndarray, r0: np.ndarray, delta: float | None = None) -> Squares:
         """Squares of the data's residuals (n,) under C⁻¹, and of the rest (m,).

@@ -1,0 +1,75 @@
+"""The descent on curved residuals with known slopes, with and without secants."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.inference.discrepancy import Discrepancy
+from chladni.inference.linear_model import LinearModel
+from chladni.inference.map_fit import LinearPosterior, Status, descend
+
+T = np.linspace(0, 2, 15)
+TRUE = np.array([1.4, -0.8, 0.5])
+U = np.linalg.qr(np.random.default_rng(1).normal(size=(len(T), 4)))[0]
+ERROR = Discrepancy(U, np.array([1.0, 2.0, 3.0, 4.0]) * 1e3, 0.01)
+LIMIT = np.array([0.5, 0.5, 0.5])
+
+
+def decay(x):
+    """Residuals of a exp(b t) + c, and their slopes."""
+    e = np.exp(x[1] * T)
+    return x[0] * e + x[2], np.stack([e, x[0] * T * e, np.ones_like(T)], axis=1)
+
+
+def objective(calls):
+    """Squares of the decay under the error, counting the slopes computed."""
+
+    def at(x, gradient):
+        r, J = decay(x)
+        r = r - decay(TRUE)[0]
+        r0, J0 = x - TRUE, np.eye(3)
+        calls[gradient] += 1
+        some = J if gradient else J[:, :0]
+        linear = LinearModel(ERROR, some, J0 if gradient else J0[:, :0])
+        return linear.squares(r, r0), LinearPosterior(None, linear, r, r0)
+
+    return at
+
+
+def secant(here, there, dx):
+    return here.secant(there, dx, LIMIT)
+
+
+@pytest.mark.parametrize("way", [None, secant])
+def test_the_minimum_is_found_and_its_slopes_are_its_own(way):
+    x, found, here, status = descend(
+        objective([0, 0]), np.array([0.4, 0.3, 1.5]), LIMIT, 40, 1e-12, way
+    )
+    assert status is Status.CONVERGED
+    assert_allclose(x, TRUE, atol=1e-5)
+    assert_allclose(here.model.J, decay(x)[1])
+    C = np.eye(len(T)) + 1e-4 * (U * ERROR.s) @ U.T
+    expected = here.model.J.T @ np.linalg.solve(C, here.model.J) + np.eye(3)
+    assert_allclose(found.information, expected)
+
+
+def test_secants_save_slopes():
+    calls = {}
+    for way in (None, secant):
+        calls[way] = [0, 0]
+        descend(objective(calls[way]), np.array([0.4, 0.3, 1.5]), LIMIT, 40, 1e-12, way)
+    assert calls[secant][True] < calls[None][True]
+
+
+def test_a_secant_explains_the_step_that_made_it():
+    """J dx is the change of the residuals; across the step the slopes are as they were."""
+    at = objective([0, 0])
+    x, dx = np.array([1.0, -0.5, 0.2]), np.array([0.2, -0.1, 0.3])
+    here, there = at(x, True)[1], at(x + dx, False)[1]
+    squares, moved = here.secant(there, dx, LIMIT)
+    assert_allclose(moved.model.J @ dx, there.r - here.r)
+    across = np.cross(dx, [1.0, 0.0, 0.0])
+    assert_allclose(moved.model.J @ across, here.model.J @ across)
+    again = LinearModel(ERROR, moved.model.J, moved.model.J0).squares(there.r, there.r0)
+    assert_allclose(squares.information, again.information)
+    assert_allclose(squares.gradient, again.gradient)
