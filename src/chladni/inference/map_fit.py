@@ -226,18 +226,27 @@ Objective = Callable[[np.ndarray, bool], tuple[Squares, Any]]
 Secant = Callable[[Any, Any, np.ndarray], tuple[Squares, Any]]
 SECANTS = 2  # steps in turn that use slopes brought up to date
 SETTLED = 0.02  # of the tolerance: a further step that is expected to improve less is not taken
-TRUSTED = 0.25  # least share of the expected improvement at which slopes are used once more
+TRUSTED = 0.5  # least share of the expected improvement at which slopes are used once more
 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """An accepted step dx, and what the objective gives there without slopes."""
+    """An accepted step dx, and what the objective gives there without slopes.
+
+    ``shortened`` is true where the step would have been longer than the limit.
+    """
 
     dx: np.ndarray
     improved: float
     expected: float
     damping: float
+    shortened: bool
     there: Any
+
+    @property
+    def as_expected(self) -> bool:
+        """True if the residuals are nearly linear along the step."""
+        return not self.shortened and self.improved > TRUSTED * self.expected
 
 
 def descend(
@@ -267,7 +276,7 @@ def descend(
             break
         x, improved = x + step.dx, step.improved
         for _ in range(SECANTS if secant is not None and improved > tol else 0):
-            if step.improved < TRUSTED * step.expected:
+            if not step.as_expected:
                 break
             found, here = secant(here, step.there, step.dx)
             further = _step(objective, x, found, step.damping, limit, trials=1)
@@ -291,7 +300,8 @@ def _step(
     A, g = found.information, found.gradient
     for _ in range(trials):
         dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)
-        dx = dx / max(1.0, np.abs(dx / limit).max())
+        over = float(np.abs(dx / limit).max())
+        dx = dx / max(1.0, over)
         try:
             new, there = objective(x + dx, False)
         except ModelError:
@@ -299,6 +309,6 @@ def _step(
             continue
         if new.cost < found.cost:
             expected = -float(2 * g @ dx + dx @ A @ dx)
-            return _Step(dx, found.cost - new.cost, expected, damping / 6, there)
+            return _Step(dx, found.cost - new.cost, expected, damping / 6, over > 1, there)
         damping = max(damping, 1e-4) * 6
     return None
