@@ -1,7 +1,8 @@
 """A model linearised at a state: sums of squares under errors of form of any size.
 
-With C = I + δ² U diag(s) Uᵀ and w = δ² s / (1 + δ² s), products with C⁻¹ need no whitened slopes:
-aᵀ C⁻¹ b = aᵀb - (Uᵀa)ᵀ diag(w) (Uᵀb).
+The covariance is C = I + δ² U diag(s) Uᵀ. Products with its inverse need no whitened slopes:
+
+aᵀ C⁻¹ b = aᵀb - (Uᵀa)ᵀ diag(w) (Uᵀb),   w = δ² s / (1 + δ² s).
 """
 
 from dataclasses import dataclass, replace

@@ -275,8 +275,8 @@ def descend(
             status = Status.STALLED if stalled else Status.CONVERGED
             break
         x, improved = x + step.dx, step.improved
-        for _ in range(SECANTS if secant is not None and improved > tol else 0):
-            if not step.as_expected:
+        for _ in range(SECANTS):
+            if secant is None or improved < tol or not step.as_expected:
                 break
             found, here = secant(here, step.there, step.dx)
             further = _step(objective, x, found, step.damping, limit, trials=1)
