@@ -19,7 +19,7 @@ from .likelihood import Data, Responses
 from .map_fit import Fit, MassMeasurement, constants, fit, linearised_fit, prior_residuals
 from .pole_data import SCALE, SCALE_SD, Poles
 
-ROUGH = 8  # slopes of a fit that only has to show whether a hypothesis is in the running
+ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 
 NEARLY = 6.0  # in -2 ln evidence: an optimum so much worse still has a share of 5 %

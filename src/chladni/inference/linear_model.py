@@ -87,13 +87,6 @@ class LinearModel:
         """JᵀJ + J0ᵀJ0 (n_p, n_p)."""
         return np.asarray(self.J.T @ self.J + self.J0.T @ self.J0)
 
-    def turned(self, y: np.ndarray, y0: np.ndarray, u: np.ndarray) -> Self:
-        """The model with slopes J + y uᵀ and J0 + y0 uᵀ."""
-        made = replace(self, J=self.J + np.outer(y, u), J0=self.J0 + np.outer(y0, u))
-        if self.error is not None:  # the product of U and J is the costly one
-            made.__dict__["_along"] = self._along + np.outer(self.error.U.T @ y, u)
-        return made
-
     def squares(self, r: np.ndarray, r0: np.ndarray, delta: float | None = None) -> Squares:
         """Squares of the data's residuals (n,) under C⁻¹, and of the rest (m,).
 

@@ -149,18 +149,6 @@ class LinearPosterior:
     r: np.ndarray
     r0: np.ndarray
 
-    def secant(self, there: Self, dx: np.ndarray, limit: np.ndarray) -> tuple[Squares, Self]:
-        """The point ``there``, a step dx away, with slopes that explain the change along dx.
-
-        Broyden (1965), Math. Comp. 19, 577-593: the least change of the slopes, with parameters in
-        units of their longest step.
-        """
-        u = dx / limit**2
-        u = u / (dx @ u)
-        change = there.r - self.r - self.model.J @ dx, there.r0 - self.r0 - self.model.J0 @ dx
-        model = self.model.turned(*change, u)
-        return model.squares(there.r, there.r0), replace(there, model=model)
-
 
 def linearised(
     model: Reduced, effects: Sequence[Effect], data: Data,
@@ -210,11 +198,7 @@ def linearised_fit(
     def objective(x: np.ndarray, gradient: bool) -> tuple[Squares, LinearPosterior]:
         return linearised(model, effects, data, mass_measurement, x, gradient)
 
-    def secant(here: LinearPosterior, there: LinearPosterior, dx: np.ndarray) -> Any:
-        return here.secant(there, dx, limit)
-
-    smooth = None if data.error is None else secant  # pairs of poles jump
-    x, found, there, status = descend(objective, start, limit, max_steps, tol, smooth)
+    x, found, there, status = descend(objective, start, limit, max_steps, tol)
     A = found.information
     S = found.cost + np.linalg.slogdet(A)[1] + constants(effects)
     misfit = found.cost - float(there.r0 @ there.r0)
@@ -223,92 +207,51 @@ def linearised_fit(
 
 
 Objective = Callable[[np.ndarray, bool], tuple[Squares, Any]]
-Secant = Callable[[Any, Any, np.ndarray], tuple[Squares, Any]]
-SECANTS = 2  # steps in turn that use slopes brought up to date
 SETTLED = 0.02  # of the tolerance: a further step that is expected to improve less is not taken
-TRUSTED = 0.5  # least share of the expected improvement at which slopes are used once more
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """An accepted step dx, and what the objective gives there without slopes.
-
-    ``shortened`` is true where the step would have been longer than the limit.
-    """
-
-    dx: np.ndarray
-    improved: float
-    expected: float
-    damping: float
-    shortened: bool
-    there: Any
-
-    @property
-    def as_expected(self) -> bool:
-        """True if the residuals are nearly linear along the step."""
-        return not self.shortened and self.improved > TRUSTED * self.expected
 
 
 def descend(
-    objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float,
-    secant: Secant | None = None,
-) -> tuple[np.ndarray, Squares, Any, Status]:  # fmt: skip
+    objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float
+) -> tuple[np.ndarray, Squares, Any, Status]:
     """Levenberg-Marquardt: final x, its squares, second value of the objective, status.
-
-    With ``secant`` further steps use slopes that are brought up to date without being computed.
 
     Parameters
     ----------
     objective : x, True for slopes -> squares, any second value
     limit : (n_p,)     longest step
-    max_steps : computations of slopes after the first
     tol : stop when a step improves the sum of squares by less, or a further one by far less
-    secant : second values here and there, the step -> squares and second value there
     """
     x, damping = start.copy(), 1e-2
-    status = Status.OUT_OF_STEPS if len(x) else Status.CONVERGED
     found, here = objective(x, True)
-    for _ in range(max_steps if len(x) else 0):
+    for _ in range(max_steps):
+        if found.further < SETTLED * tol:
+            break
         step = _step(objective, x, found, damping, limit)
         if step is None:
             stalled = np.abs(found.gradient).max() > 1e-2 * found.cost
-            status = Status.STALLED if stalled else Status.CONVERGED
-            break
-        x, improved = x + step.dx, step.improved
-        for _ in range(SECANTS):
-            if secant is None or improved < tol or not step.as_expected:
-                break
-            found, here = secant(here, step.there, step.dx)
-            further = _step(objective, x, found, step.damping, limit, trials=1)
-            if further is None:
-                break
-            x, step = x + further.dx, further
-        damping = step.damping
+            return x, found, here, Status.STALLED if stalled else Status.CONVERGED
+        improved, x, damping = step
         del here  # its slopes take as much memory as the next ones
         found, here = objective(x, True)
-        if improved < tol or found.further < SETTLED * tol:
-            status = Status.CONVERGED
-            break
-    return x, found, here, status
+        if improved < tol:
+            return x, found, here, Status.CONVERGED
+    settled = found.further < SETTLED * tol
+    return x, found, here, Status.CONVERGED if settled else Status.OUT_OF_STEPS
 
 
 def _step(
-    objective: Objective, x: np.ndarray, found: Squares, damping: float, limit: np.ndarray,
-    trials: int = 8,
-) -> _Step | None:  # fmt: skip
-    """One accepted Levenberg-Marquardt step, or None."""
+    objective: Objective, x: np.ndarray, found: Squares, damping: float, limit: np.ndarray
+) -> tuple[float, np.ndarray, float] | None:
+    """One accepted Levenberg-Marquardt step: (improvement, new x, new damping), or None."""
     A, g = found.information, found.gradient
-    for _ in range(trials):
+    for _ in range(8):
         dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)
-        over = float(np.abs(dx / limit).max())
-        dx = dx / max(1.0, over)
+        dx = dx / max(1.0, np.abs(dx / limit).max())
         try:
-            new, there = objective(x + dx, False)
+            new = objective(x + dx, False)[0].cost
         except ModelError:
-            damping = max(damping, 1e-4) * 6
-            continue
-        if new.cost < found.cost:
-            expected = -float(2 * g @ dx + dx @ A @ dx)
-            return _Step(dx, found.cost - new.cost, expected, damping / 6, over > 1, there)
+            new = np.inf
+        if new < found.cost:
+            return found.cost - new, x + dx, damping / 6
         damping = max(damping, 1e-4) * 6
     return None
