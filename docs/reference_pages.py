@@ -22,7 +22,7 @@ from chladni_evidence.effect_ground import GROUNDS, EffectGround, usual_grounds
 
 ROOT = Path(__file__).parents[1]
 SIGNATURES = "signatures"  # folder of the pictures of the effects
-BLIND_SCORE = ROOT / "docs" / "blind_score.json"  # ``score.json`` of the last blind report
+BLIND_SCORE = ROOT / "docs" / "blind_score.json"  # rows of the last blind report of each set
 BY = "*This page is written by the program itself, from {}.*\n"
 
 
