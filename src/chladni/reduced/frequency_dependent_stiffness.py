@@ -18,16 +18,19 @@ Complex residues remain after equalisation.  A mode of residue a + ib contribute
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..effects.effect import MatrixTerm, Rise
-from .real_modes import in_modes
+from .matrix_stack import EVERY
 
 CLOSE = 1e-7  # relative distance of λ within which a divided difference is a derivative
 RIGID = 1e-9  # of the highest λ: modes below have no strain
+VISIBLE = 2.0  # of the highest spectral line: modes below follow the parameters in their damping
 APART = 1e-4  # relative distance of λ within which two modes are one and do not mix
 
 
@@ -97,7 +100,7 @@ class Dissipated:
 
 
 class Risen(NamedTuple):
-    """λ, φ (r, m), dK, dM (n_p, m, m) in these modes, and their dissipation."""
+    """λ, φ (r, m), ∂K and ∂M over the basis (n_p, m, m), and the dissipation."""
 
     lam: np.ndarray
     phi: np.ndarray
@@ -122,59 +125,114 @@ class Rising:
         self, lam: np.ndarray, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray, M: np.ndarray,
         gradient: bool,
     ) -> Risen:  # fmt: skip
-        """Apply :meth:`risen` with slopes over the basis, as in a state: φ⁻ᵀ is M φ."""
-        found = self.risen(lam, phi, in_modes(dK.copy(), phi), in_modes(dM.copy(), phi), gradient)
-        back = (M @ found.phi).T
-        return found._replace(dK=in_modes(found.dK, back), dM=in_modes(found.dM, back))
-
-    def risen(
-        self, lam: np.ndarray, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray, gradient: bool
-    ) -> Risen:
-        """The modes with the rise, from those without it."""
-        if not self.parts:
-            return Risen(lam, phi, dK, dM, None)
-        K, flow = np.diag(lam), dK - dM * lam  # of M⁻¹K in modes
-        found = []
-        for part, A, at in self.parts:
-            B, slope, plain = _risen_part(
-                part, phi.T @ A @ phi, at, lam, flow if gradient else None
-            )
-            K = K + B - plain
-            found.append((part, B, slope, at))
-        lam, V = np.linalg.eigh(K)
+        """The modes with the rise, from those without it; φ⁻ᵀ is M φ."""
+        parts = [_RisenPart(part, at, phi.T @ A @ phi, lam) for part, A, at in self.parts]
+        risen, V = np.linalg.eigh(np.diag(lam) + sum(one.stiffness - one.plain for one in parts))
+        modes, mixing, slopes = phi @ V, None, []
         if gradient:
-            dK = dK + sum(slope - plain for _, _, (slope, plain), _ in found)
-            dK, dM = in_modes(dK, V), in_modes(dM, V)
-        turned = [
-            (part, V.T @ B @ V, in_modes(slope[0].copy(), V) if gradient else slope[0], at)
-            for part, B, slope, at in found
-        ]
-        return Risen(lam, phi @ V, dK, dM, _dissipated(turned, lam, dK, dM, gradient))
+            slopes = [one.slopes(phi, dK, dM) for one in parts]
+            dK = dK + sum(each.over_basis(M @ phi) for each in slopes)
+            mixing = _mixing(risen, modes, dK, dM, parts)
+        return Risen(risen, modes, dK, dM, _dissipated(parts, slopes, risen, V, mixing, len(dK)))
 
 
-def _risen_part(
-    part: MatrixTerm, A: np.ndarray, at: slice, lam: np.ndarray, flow: np.ndarray | None
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """c G A G in modes, its slopes and those of c A (n_p, m, m), and c A.
+@dataclass(frozen=True, eq=False)
+class _RisenPart:
+    """A rising part in the modes λ (m,) without its rise; A (m, m) is its operator there."""
 
-    Parameters
+    part: MatrixTerm
+    at: slice
+    A: np.ndarray
+    lam: np.ndarray
+
+    @property
+    def rise(self) -> Rise:
+        """Its rise."""
+        assert self.part.rise is not None
+        return self.part.rise
+
+    @cached_property
+    def g(self) -> np.ndarray:
+        """Factor of each mode (m,)."""
+        return np.exp(self.rise.power * self.rise.log_frequency(self.lam))
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """c G A G."""
+        return self.part.coefficient * self.A * self.g * self.g[:, None]
+
+    @property
+    def plain(self) -> np.ndarray:
+        """c A."""
+        return self.part.coefficient * self.A
+
+    def slopes(self, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray) -> "_RisenSlopes":
+        """Slopes of c G A G - c A; dK, dM (n_p, m, m) are over the basis."""
+        L, c, lam = self.rise.log_frequency(self.lam), self.part.coefficient, self.lam
+        both = self.rise.gradient[:, None, None] * (L + L[:, None])
+        gradient = self.part.gradient[:, None, None]
+        risen = self.A * self.g * self.g[:, None]
+        low = np.flatnonzero(self.g != self.g[-1])  # all above have one factor
+        D = _divided(self.g, lam, self.rise)
+        K, M = ((phi[:, low].T @ each) @ phi for each in (dK, dM))
+        flow = K.swapaxes(1, 2) - M.swapaxes(1, 2) * lam[low]
+        flow[:, low] = 0.0
+        return _RisenSlopes(
+            self.at, c, self.g[:, None] * self.A, low, D[low] * (K - M * lam), D[:, low] * flow,
+            (gradient + c * both) * risen, gradient * self.A,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _RisenSlopes:
+    """∂(c G A G - c A)/∂x = c (H + Hᵀ) + own - plain in modes; the last two by own parameters.
+
+    H = G A ∂G: its low modes change their factor, the high ones have one factor for all.
+
+    Attributes
     ----------
-    A : (m, m)           in modes
-    flow : (n_p, m, m)   ∂(M⁻¹K)/∂x in modes; None where no slopes are requested
+    at : own parameters
+    GA : (m, m)
+    low : (k,)              modes with other factors than the highest
+    rows, columns : (n_p, k, m), (n_p, m, k)   ∂G of low modes by all, and of high modes by low ones
+    own, plain : (n_own, m, m)
     """
-    rise, c = part.rise, part.coefficient
-    assert rise is not None
-    L = rise.log_frequency(lam)
-    g = np.exp(rise.power * L)
-    B = A * g * g[:, None]
-    if flow is None:
-        return c * B, (np.zeros((0, *A.shape)),) * 2, c * A
-    half = (g[:, None] * A) @ (_divided(g, lam, rise) * flow)
-    slope, plain = c * (half + half.swapaxes(1, 2)), np.zeros_like(flow)
-    both = rise.gradient[:, None, None] * (L + L[:, None])
-    slope[at] += (part.gradient[:, None, None] + c * both) * B
-    plain[at] = part.gradient[:, None, None] * A
-    return c * B, (slope, plain), c * A
+
+    at: slice
+    c: float
+    GA: np.ndarray
+    low: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    own: np.ndarray
+    plain: np.ndarray
+
+    def half(self, left: np.ndarray, right: np.ndarray, p: slice = EVERY) -> np.ndarray:
+        """Left H right of parameters p, for left (a, m) and right (m, b): (n_p, a, b)."""
+        side = left @ self.GA
+        out = side[:, self.low] @ (self.rows[p] @ right)
+        return np.asarray(out + (side @ self.columns[p]) @ right[self.low])
+
+    def over_basis(self, back: np.ndarray) -> np.ndarray:
+        """The slopes over the basis, with φ⁻ᵀ (m, m)."""
+        half = self.half(back, back.T)
+        out = self.c * (half + half.swapaxes(1, 2))
+        out[self.at] += back @ (self.own - self.plain) @ back.T
+        return np.asarray(out)
+
+    def diagonal(self, V: np.ndarray) -> np.ndarray:
+        """∂(c G A G)/∂x along each of some vectors V (m, k): (n_p, k)."""
+        side = V.T @ self.GA
+        both = (side[:, self.low].T * (self.rows @ V)).sum(axis=1)
+        both = both + (side.T * (self.columns @ V[self.low])).sum(axis=1)
+        out = 2 * self.c * both
+        out[self.at] += np.einsum("ik,pij,jk->pk", V, self.own, V, optimize=True)
+        return np.asarray(out)
+
+    def own_in(self, V: np.ndarray) -> np.ndarray:
+        """∂(c G A G)/∂x by the own parameters in modes V (m, m): (n_own, m, m)."""
+        half = self.half(V.T, V, self.at)
+        return np.asarray(self.c * (half + half.swapaxes(1, 2)) + V.T @ self.own @ V)
 
 
 def _divided(g: np.ndarray, lam: np.ndarray, rise: Rise) -> np.ndarray:
@@ -187,42 +245,60 @@ def _divided(g: np.ndarray, lam: np.ndarray, rise: Rise) -> np.ndarray:
     return np.where(close, steep[:, None], (g[:, None] - g) / np.where(close, 1.0, gap))
 
 
-def _dissipated(
-    parts: Sequence[tuple[MatrixTerm, np.ndarray, np.ndarray, slice]], lam: np.ndarray,
-    dK: np.ndarray, dM: np.ndarray, gradient: bool,
-) -> Dissipated:  # fmt: skip
-    """Dissipation of the rising parts, from c G A G and its slopes in the modes of λ (m,)."""
-    m, strained = len(lam), np.where(lam > RIGID * lam[-1], lam, np.inf)
-    N, dN, slopes = np.zeros((m, m)), np.zeros((len(dK), m, m)), np.zeros((len(dK), m))
-    mixing = _mixing(lam, dK, dM) if gradient else None
-    for part, B, slope, at in parts:
-        rise = part.rise
-        assert rise is not None
-        N += rise.loss * B
-        if mixing is None:
-            continue
-        mixed, growth, scaled = mixing
-        share = np.diag(B) / strained
-        change = 2 * np.einsum("ij,pij->pj", B, mixed) - scaled * np.diag(B)
-        change += np.einsum("pjj->pj", slope)
-        slopes += rise.loss / 2 * (change - share * growth) / strained
-        slopes[at] += rise.loss_gradient[:, None] / 2 * share
-        dN[at] += rise.loss * slope[at] + rise.loss_gradient[:, None, None] * B
-    off_diagonal = 1 - np.eye(m)
-    return Dissipated(
-        np.diag(N) / 2 / strained, slopes, N * off_diagonal, dN * off_diagonal, np.sqrt(strained)
-    )
+class _Mixing(NamedTuple):
+    """How the modes that a test sees follow the parameters.
+
+    Attributes
+    ----------
+    seen : (k,)                 positions of these modes
+    turned : (n_p, m, k)        ∂φ/∂x in modes, without the change of length
+    growth, scaled : (n_p, k)   ∂λ and φᵀ∂Mφ
+    """
+
+    seen: np.ndarray
+    turned: np.ndarray
+    growth: np.ndarray
+    scaled: np.ndarray
 
 
 def _mixing(
-    lam: np.ndarray, dK: np.ndarray, dM: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """∂φ_j/∂x in modes (n_p, m, m) without its change of length, ∂λ and φᵀ∂Mφ of each (n_p, m).
+    lam: np.ndarray, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray, parts: Sequence[_RisenPart]
+) -> _Mixing:
+    """Modes nearer than ``APART`` do not mix with each other: any mixture of them is a mode."""
+    highest = 2 * np.pi * VISIBLE * max(one.rise.band[1] for one in parts)
+    seen = np.flatnonzero(lam <= highest**2)
+    gap = lam[seen] - lam[:, None]
+    inverse = gap / (gap**2 + (APART * np.maximum(np.abs(lam[seen]), RIGID * lam[-1])) ** 2)
+    K, M = ((phi.T @ (each @ phi[:, seen])) for each in (dK, dM))
+    k = np.arange(len(seen))
+    scaled = M[:, seen, k]
+    growth = K[:, seen, k] - lam[seen] * scaled
+    return _Mixing(seen, (K - M * lam[seen]) * inverse, growth, scaled)
 
-    Modes nearer than ``APART`` do not mix with each other: any mixture of them is a mode.
+
+def _dissipated(
+    parts: Sequence[_RisenPart], slopes: Sequence[_RisenSlopes], lam: np.ndarray, V: np.ndarray,
+    mixing: _Mixing | None, count: int,
+) -> Dissipated:  # fmt: skip
+    """Dissipation of the rising parts in the modes of λ (m,), V (m, m) in those without the rise.
+
+    Modes beyond those that are seen have no slopes.
     """
-    gap = lam[None, :] - lam[:, None]
-    inverse = gap / (gap**2 + (APART * np.maximum(np.abs(lam), RIGID * lam[-1])) ** 2)
-    scaled = np.einsum("pjj->pj", dM)
-    growth = np.einsum("pjj->pj", dK) - lam * scaled
-    return (dK - dM * lam) * inverse, growth, scaled
+    m, strained = len(lam), np.where(lam > RIGID * lam[-1], lam, np.inf)
+    N, dN, ratios = np.zeros((m, m)), np.zeros((count, m, m)), np.zeros((count, m))
+    off_diagonal = 1 - np.eye(m)
+    for one, slope in zip_longest(parts, slopes):
+        rise, B = one.rise, V.T @ one.stiffness @ V
+        N += rise.loss * B
+        if mixing is None:
+            continue
+        seen, turned, growth, scaled = mixing
+        share = np.diag(B)[seen] / strained[seen]
+        change = 2 * np.einsum("ij,pij->pj", B[:, seen], turned) - scaled * np.diag(B)[seen]
+        change += slope.diagonal(V[:, seen])
+        ratios[:, seen] += rise.loss / 2 * (change - share * growth) / strained[seen]
+        ratios[one.at] += rise.loss_gradient[:, None] / 2 * np.diag(B) / strained
+        gained = rise.loss * slope.own_in(V) + rise.loss_gradient[:, None, None] * B
+        dN[one.at] += gained * off_diagonal
+    ratio = np.diag(N) / 2 / strained
+    return Dissipated(ratio, ratios, N * off_diagonal, dN, np.sqrt(strained))

@@ -1,4 +1,4 @@
-"""Modes of the reduced model, and its slopes in modal coordinates."""
+"""Modes of the reduced model."""
 
 import numpy as np
 import scipy.linalg as sl
@@ -39,10 +39,3 @@ def _softest_first(K: np.ndarray, M: np.ndarray, shift: float) -> tuple[np.ndarr
     mu, phi = sl.eigh(M, K + shift * M, driver="gvd")
     mu, phi = mu[::-1], phi[:, ::-1]
     return 1 / mu - shift, phi / np.sqrt(np.einsum("ij,ij->j", phi, M @ phi))
-
-
-def in_modes(slopes: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """φᵀ A φ of every slope (n_p, m, m), in place; zero slopes are skipped."""
-    acts = slopes.any(axis=(1, 2))
-    slopes[acts] = phi.T @ slopes[acts] @ phi
-    return slopes
