@@ -172,7 +172,7 @@ class _RisenPart:
         both = self.rise.gradient[:, None, None] * (L + L[:, None])
         gradient = self.part.gradient[:, None, None]
         risen = self.A * self.g * self.g[:, None]
-        low = np.flatnonzero(self.g != self.g[-1])  # all above have one factor
+        low = np.flatnonzero(lam < (2 * np.pi * self.rise.band[1]) ** 2)  # one factor above
         D = _divided(self.g, lam, self.rise)
         K, M = ((phi[:, low].T @ each) @ phi for each in (dK, dM))
         flow = K.swapaxes(1, 2) - M.swapaxes(1, 2) * lam[low]
@@ -193,7 +193,7 @@ class _RisenSlopes:
     ----------
     at : own parameters
     GA : (m, m)
-    low : (k,)              modes with other factors than the highest
+    low : (k,)              modes below the upper end of the band
     rows, columns : (n_p, k, m), (n_p, m, k)   ∂G of low modes by all, and of high modes by low ones
     own, plain : (n_own, m, m)
     """
@@ -297,7 +297,7 @@ def _dissipated(
         change = 2 * np.einsum("ij,pij->pj", B[:, seen], turned) - scaled * np.diag(B)[seen]
         change += slope.diagonal(V[:, seen])
         ratios[:, seen] += rise.loss / 2 * (change - share * growth) / strained[seen]
-        ratios[one.at] += rise.loss_gradient[:, None] / 2 * np.diag(B) / strained
+        ratios[one.at, seen] += rise.loss_gradient[:, None] / 2 * share
         gained = rise.loss * slope.own_in(V) + rise.loss_gradient[:, None, None] * B
         dN[one.at] += gained * off_diagonal
     ratio = np.diag(N) / 2 / strained
