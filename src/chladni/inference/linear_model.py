@@ -87,29 +87,42 @@ class LinearModel:
         """JᵀJ + J0ᵀJ0 (n_p, n_p)."""
         return np.asarray(self.J.T @ self.J + self.J0.T @ self.J0)
 
+    def _plain(self, r: np.ndarray, r0: np.ndarray) -> Squares:
+        """Squares without an error of form."""
+        gradient = self.J.T @ r + self.J0.T @ r0
+        return Squares(float(r @ r + r0 @ r0), gradient, self._information)
+
+    def _less(self, plain: Squares, u: np.ndarray, w: np.ndarray) -> Squares:
+        """Squares less the shares w (k,) along the columns of U; u = Uᵀr (k,)."""
+        V = self._along
+        return Squares(
+            plain.cost - float(w @ u**2),
+            plain.gradient - V.T @ (w * u),
+            plain.information - (V.T * w) @ V,
+        )
+
     def squares(self, r: np.ndarray, r0: np.ndarray, delta: float | None = None) -> Squares:
         """Squares of the data's residuals (n,) under C⁻¹, and of the rest (m,).
 
         ``delta`` is that of the error where it is not given.
         """
-        cost, g = float(r @ r + r0 @ r0), self.J.T @ r + self.J0.T @ r0
+        plain = self._plain(r, r0)
         if self.error is None:
-            return Squares(cost, g, self._information)
-        w, u, V = self.error.share(delta), self.error.U.T @ r, self._along
-        return Squares(cost - float(w @ u**2), g - V.T @ (w * u), self._information - (V.T * w) @ V)
+            return plain
+        return self._less(plain, self.error.U.T @ r, self.error.share(delta))
 
     def learned(self, r: np.ndarray, r0: np.ndarray) -> Learned:
         """Integrate δ out of the evidence."""
         assert self.error is not None
-        u, V, prior = self.error.U.T @ r, self._along, self.error.prior
-        g0, c0 = self.J.T @ r + self.J0.T @ r0, float(r @ r + r0 @ r0)
+        plain, u, prior = self._plain(r, r0), self.error.U.T @ r, self.error.prior
         grid = prior.grid
         S = np.empty(len(grid))
         for k, delta in enumerate(grid):
             w = self.error.share(delta)
-            L = np.linalg.cholesky(self._information - (V.T * w) @ V)
-            g = g0 - V.T @ (w * u)
-            cost = c0 - w @ u**2 - float((sl.solve_triangular(L, g, lower=True) ** 2).sum())
+            under = self._less(plain, u, w)
+            L = np.linalg.cholesky(under.information)
+            step = sl.solve_triangular(L, under.gradient, lower=True)
+            cost = under.cost - float(step @ step)
             S[k] = cost + 2 * np.log(np.diag(L)).sum() - np.log1p(-w).sum() + prior.neg2_log(delta)
         width = np.log(grid[1] / grid[0])
         best = int(np.argmin(S))
