@@ -60,7 +60,7 @@ class CatalogueChoices:
         assert isinstance(fitted, Responses)
         state = evaluate(problem.reduced.model, problem.base, x, True)
         sd = np.array([p.sd for e in problem.base for p in e.parameters])
-        (r, J), (h, H) = (d.scaled(state, True) for d in (fitted, unseen))
+        (r, J), (h, H) = (d.residual(state, True) for d in (fitted, unseen))
         J, H = J * sd, H * sd
         steps = [self._changes(c, (fitted, unseen), x) for c in self.candidates]
         more = [np.array([s[k] for s in steps]).T for k in (0, 1)]
@@ -77,7 +77,7 @@ class CatalogueChoices:
         model = self.problem.reduced.model_for(candidate.effect, candidate.start)
         effects = [*self.problem.base, candidate.effect]
         state = evaluate(model, effects, np.concatenate([x, candidate.start]), False)
-        return tuple(d.rebased(model).scaled(state, False)[0] for d in data)
+        return tuple(d.rebased(model).residual(state, False)[0] for d in data)
 
     def gain(self, chosen: Iterable[int]) -> float:
         """Gain of a set in -2 ln evidence over the null, less the price of each member.

@@ -108,8 +108,8 @@ class Recorded:
         if effects:
             return self.catalogue.linearised(self.score, self.prepared.held, len(self.names))
         state = self.state(np.zeros(len(self.sd)), True)
-        r, J = self.score.scaled(state, True)
-        h, H = self.score.only(self.prepared.held).scaled(state, True)
+        r, J = self.score.residual(state, True)
+        h, H = self.score.only(self.prepared.held).residual(state, True)
         return Linearised(r, J * self.sd, h, H * self.sd)
 
     def calibration(self) -> CalibrationQuestion:

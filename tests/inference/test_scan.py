@@ -64,7 +64,7 @@ def directly(base, model, data, places, k, matrix, strength):
 def residuals(base, model, data, effect):
     """Residuals of the base and an effect of one strength, as a column."""
     state = evaluate(model, [*base.effects, effect], np.append(base.x, 0.0), False)
-    r, _ = data.rebased(model).scaled(state, False)
+    r, _ = data.rebased(model).residual(state, False)
     return replace(base, state=state).with_mass(r[:, None], 0.0)
 
 
@@ -134,7 +134,7 @@ def test_slopes_of_all_groups_together_are_the_slope_of_t(reduced, responses, ba
     slopes = field_slopes(base, reduced.model, responses, "t")
     whole = calibration_parameter(reduced.groups, "t", [0])
     state = evaluate(reduced.model, [*base.effects, whole], np.append(base.x, 0.0))
-    _, J = responses.scaled(state, True)
+    _, J = responses.residual(state, True)
     expected = np.append(J[:, -1], state.dweight[-1] / WEIGHED.sd)
     assert_allclose(slopes.sum(axis=1), expected, atol=1e-8 * np.abs(expected).max())
 

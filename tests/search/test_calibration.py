@@ -185,7 +185,7 @@ def test_bands_are_as_wide_as_the_posterior_and_show_held_out_channels_first(
         assert_allclose(every[0].low, every[0].measured, rtol=1e-2)
         assert width.max() < 1e-6
     else:
-        assert 0.5 * sd < np.median(width) < 50 * sd  # more at a zero of H, without limit
+        assert 0.5 * sd < width.max() < 50 * sd
         assert (np.array(every[0].low) <= np.array(every[0].measured) * 1.001).mean() > 0.9
 
 

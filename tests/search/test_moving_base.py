@@ -135,10 +135,10 @@ def test_slopes(reduced, data):
     x[:8] = 0.03, -0.02, 0.01, 0.05, 0.2, 0.1, -0.2, -1.0
     model = reduced.model
     seen = replace(data, values=data.model(evaluate(model, effects, 0.98 * x, False)))
-    _, J = seen.scaled(evaluate(model, effects, x), True)
+    _, J = seen.residual(evaluate(model, effects, x), True)
 
     def r(x):
-        return seen.scaled(evaluate(model, effects, x, False), False)[0]
+        return seen.residual(evaluate(model, effects, x, False), False)[0]
 
     h = 1e-4
     for k, e in enumerate(h * np.eye(len(x))):
@@ -184,7 +184,7 @@ def test_low_rank_reanalysis_is_the_evaluation(reduced, data, matrix):
             (Parameter("c", "-", 0.0, 1.0, strengths[c]),), rows=places.rows[[k]], grids=(1,)
         )
         state = evaluate(reduced.model, [rho, one], np.array([0.03, 0.0]), False)
-        r, _ = seen.scaled(state, False)
+        r, _ = seen.residual(state, False)
         due = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         assert scores[k, c] == pytest.approx(due, rel=1e-6)
 

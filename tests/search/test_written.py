@@ -58,7 +58,7 @@ def test_is_the_best_without_scatter(hypothesis):
     own = hypothesis.fit
     x = np.concatenate([own.of(own.effects[0]), own.of(hypothesis.effect)])
     left = evaluate(hypothesis.model, deck.fit.effects, x, False)
-    r, _ = hypothesis.data.scaled(left, False)
+    r, _ = hypothesis.data.residual(left, False)
     assert deck.fit.misfit <= r @ r + 1e-6
 
 

@@ -22,7 +22,7 @@ from ..reduced.effect_dofs import slices
 from ..reduced.reduced_model import State, evaluate
 from .calibration_result import Identifiability, ParameterKnowledge, ValueAndSpread
 from .hypothesis_fit import UpdatingProblem
-from .likelihood import Data
+from .likelihood import Responses
 from .map_fit import MassMeasurement, unknowns
 from .pole_data import Poles
 
@@ -91,11 +91,10 @@ def information(problem: UpdatingProblem, x: np.ndarray) -> Information:
     return Information(A.T @ A - (A.T @ B) @ mixed, weighing, problem.mass_measurement is not None)
 
 
-def _slopes(data: Data, state: State) -> np.ndarray:
+def _slopes(data: Responses | Poles, state: State) -> np.ndarray:
     """Slopes of the whitened data; natural frequencies are paired in a wide window first."""
     if not isinstance(data, Poles):
-        J = data.scaled(state, True)[1]
-        return J if data.error is None else data.error.whitened(J)
+        return data.residual(state, True)[1]
     wide = replace(data, scale=PAIRED, strength=np.full(len(data.strength), np.inf))
     widths = np.append((wide.std() / data.std())[data.use], 1.0)
     return wide.scaled(state, True)[1] * widths[:, None]

@@ -223,6 +223,13 @@ class Responses:
         """Ln det of the covariance with known errors, if the evidence counts it."""
         return 0.0 if self.known is None or self.identified is None else self.known.log_det
 
+    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """:meth:`scaled` with the errors of the model's form whitened out."""
+        r, J = self.scaled(state, gradient)
+        if self.error is None:
+            return r, J
+        return self.error.whitened(r), self.error.whitened(J) if gradient else J
+
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """δ over its spread on used samples, real and imaginary, sensors' errors whitened out."""
         sd = self.std()
