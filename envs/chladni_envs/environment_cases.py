@@ -94,6 +94,11 @@ class Recorded:
         model = self.prepared.problem.reduced.model
         return evaluate(model, self.effects, self.mean + self.sd * theta, gradient)
 
+    @property
+    def held(self) -> np.ndarray:
+        """Held-out samples of ``score`` on which a gain is reported (n_f, n_out) bool."""
+        return self.prepared.held.reporting
+
     @cached_property
     def catalogue(self) -> CatalogueChoices:
         """Effects that the search of a diagnosis would try on this case; it takes some seconds."""
@@ -106,10 +111,10 @@ class Recorded:
         residuals allow for errors of the model's form.
         """
         if effects:
-            return self.catalogue.linearised(self.score, self.prepared.held, len(self.names))
+            return self.catalogue.linearised(self.score, self.held, len(self.names))
         state = self.state(np.zeros(len(self.sd)), True)
         r, J = self.score.residual(state, True)
-        h, H = self.score.only(self.prepared.held).residual(state, True)
+        h, H = self.score.only(self.held).residual(state, True)
         return Linearised(r, J * self.sd, h, H * self.sd)
 
     def calibration(self) -> CalibrationQuestion:

@@ -245,7 +245,7 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
     tried = [family.name for family in problem.families]
     known = (problem.mass_measurement, problem.setup.hangers, problem.setup.sensors, tried)
     mark.update(repr(known).encode())
-    mark.update(repr((ready.held.tolist(), ready.what, ready.notes)).encode())
+    mark.update(repr((ready.held.whole.tolist(), ready.what, ready.notes)).encode())
     mark.update(repr([case.said(c) for c in COMMANDS]).encode())
     model = modelled(case.tested(case.assembly), 200.0)
     curves = model_frf(case, model, case.damping or 0.01, case.frfs[0])

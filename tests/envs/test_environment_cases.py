@@ -181,7 +181,7 @@ def test_an_effect_is_linear_between_nothing_and_where_it_began(choosing, record
     model = catalogue.problem.reduced.model_for(effect, start)
     x = np.concatenate([catalogue.problem.mean(), start])
     heavier = cases.evaluate(model, [*base, effect], x, False)
-    there = recorded.score.only(recorded.prepared.held).rebased(model).residual(heavier, False)[0]
+    there = recorded.score.only(recorded.held).rebased(model).residual(heavier, False)[0]
     theta = np.eye(choosing.p)[len(recorded.names) + k]
     np.testing.assert_allclose(problem.held_residual + problem.held_jacobian @ theta, there)
 

@@ -37,7 +37,8 @@ def test_a_deck_put_back_has_the_Q_that_was_promised(
     shutil.copy(tmp_path / "run" / deck, again / "plate.bdf")
     asked = question_of(chladni.load_case(again))
     prepared = prepare(asked)
-    now = written_Q(asked, prepared, prepared.nominal, (prepared.score.use, prepared.held))
+    sets = prepared.score.use, prepared.held.reporting
+    now = written_Q(asked, prepared, prepared.nominal, sets)
     due = diagnosed.agreement
     then = [getattr(q, score) for q in (due.fitted, due.held_out)]
     np.testing.assert_allclose(now, then, rtol=1e-6)

@@ -153,9 +153,11 @@ SCHEMA = (
     Key("band", "exclude", "list of [low, high]", "Hz", "none",
         "Excluded bands within it.", "[[23.0, 27.5]]", ("identify", *_SCORE)),
     Key("held_out", "sensors", "number, or list of labels", "", "a fifth of the outputs",
-        "Held-out outputs.", '["412:+Z"]', _FIT),
+        "Held-out outputs. The first, third, ... choose a name; the others report its gain.",
+        '["412:+Z"]', _FIT),
     Key("held_out", "band", "[low, high]", "Hz", "the upper fifth of the band",
-        "Held-out band.", "[200.0, 300.0]", (*_FIT, "bench")),
+        "Held-out band. It reports; without held-out sensors its lower half chooses.",
+        "[200.0, 300.0]", (*_FIT, "bench")),
     Key("search", "effects", "list of effects", "", "all of the catalogue",
         "Effects that are tried; no other effect is named. Faults of the recording are always "
         "tried.", '["point-mass", "stiffness-patch"]', ("diagnose",)),

@@ -40,6 +40,11 @@ class Data(Protocol):
         """Return the data with rows in another basis."""
 
 
+def rms_over_lines(values: np.ndarray) -> np.ndarray:
+    """Root mean square of H over its lines, (n_f, n_out, n_in) -> (n_out, n_in)."""
+    return np.asarray(np.sqrt((np.abs(values) ** 2).mean(axis=0)))
+
+
 @dataclass(frozen=True, eq=False)
 class Responses:
     """Damping-equalised FRFs.
@@ -54,6 +59,7 @@ class Responses:
     sigma_model : float                    sd of log10 H that neither noise nor δ explains
     noise : (n_f, n_out, n_in)             sd of log10 H of independent samples, spread included
     spread : (n_f, n_out, n_in)            sd of log10 H between repeats or articles
+    level : (n_out, n_in)                  rms of |H_X| over fitted lines; None: over all lines
     identified : EqualisedError            of H_X, whose columns span the data; replaces ``noise``
     """
 
@@ -69,6 +75,7 @@ class Responses:
     noise: np.ndarray | None = None
     spread: np.ndarray | None = None
     identified: EqualisedError | None = None
+    level: np.ndarray | None = None
     curved: float = USUAL  # δ of those errors
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
@@ -138,7 +145,7 @@ class Responses:
         if self.about is not None and self.identified is not None:
             out, more = np.full(self.values.shape, RESOLVED**2), [self.spread, self.bent]
         else:
-            rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
+            rms = rms_over_lines(self.values) if self.level is None else self.level
             out = self.sigma_model**2 * (1 + (0.6 * rms / np.abs(self.values)) ** 2)
             more = [self.noise, self.bent]
         return np.sqrt(sum((z**2 for z in more if z is not None), out))

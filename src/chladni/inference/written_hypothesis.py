@@ -43,9 +43,9 @@ def as_foretold(
     lines and sensors, including held-out ones, without measured values. Calibration parameters
     compensate for them as far as two limits allow. They are fitted to the predicted responses with
     their priors and a standard deviation ``LEFT``, and all stay within their 95 % intervals. A
-    number that the data exclude is no property of the structure. On the demo the held-out Q of the
-    deck is 0.0185. It is 0.0195 if numbers may leave their intervals, and 0.0245 with the numbers
-    as found. Use :func:`as_written` for natural frequencies and for effects that change no
+    number that the data exclude is no property of the structure. On the demo Q of the deck on all
+    held-out data was 0.0185, 0.0195 if numbers may leave their intervals, and 0.0245 with the
+    numbers as found. Use :func:`as_written` for natural frequencies and for effects that change no
     response.
 
     Parameters

@@ -133,7 +133,7 @@ def measured(
         written = as_written(known.fits[key], problem.mass_measurement)
         own, plain = known.fits[key], found.plain
         stages = [(plain, plain.fit.state), (own, written.fit.state)]
-        left = Left(*((a, b) for a, b in scores_of(prepared, own, stages)))
+        left = Left(*((a, b) for a, b in scores_of(prepared, own, stages, prepared.held.choosing)))
         return replace(known, written={**known.written, key: written}).row(replace(row, left=left))
     if wanted.ask is Ask.AFTER:
         return _after(prepared, known, row, wanted.after)
@@ -145,7 +145,7 @@ def measured(
 
 def _votes(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> Votes:
     """Held-out evidence on a row, or on a member of a set with the other members in place."""
-    problem, unseen = prepared.problem, prepared.unseen
+    problem, unseen = prepared.problem, prepared.unseen.choosing
     if key in known.fits:
         tested_one = held_out_evidence(problem, unseen, found.null, known.fits[key])
     else:

@@ -103,7 +103,7 @@ def scored_others(
     score = prepared.score
     if not isinstance(score, Responses) or not prepared.others:
         return ()
-    use = score.use | prepared.held
+    use = score.use | prepared.held.whole
     f_max = prepared.problem.setup.f_max
     own = {id(m): seen(question, score, m, f_max) for m in stages}
     out = []

@@ -31,14 +31,14 @@ from ..inference.complex_modes import mode_coupling
 from ..inference.damping_scatter import modal_damping
 from ..inference.hypothesis_fit import UpdatingProblem
 from ..inference.least_data import numbers, too_little
-from ..inference.likelihood import LN10, Responses
-from ..inference.map_fit import fit
+from ..inference.likelihood import Responses, rms_over_lines
 from ..inference.pole_data import Poles
 from ..inference.sensor_errors import sensor_errors
 from ..model.free_parameter import FreeParameter
 from ..progress import Progress, silent, within
 from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
+from .held_out_data import HeldOutChoice, held_out_sensors, of_poles, upper_part
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
@@ -47,7 +47,6 @@ from .question import Prepared, Question
 ZETA = 0.08  # equalised damping for comparing hypotheses: it widens the basins of convergence
 ZETA_Q = 0.02  # equalised damping for the reported Q
 POSITION_UNCERTAIN = 5e-3  # [m]
-SAME_PLACE = 1e-6  # [m]: a sensor nearer to a shaker counts as at its place
 SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
 FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
@@ -70,7 +69,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     frf = question.frf
     assert frf is not None
     low, high = band_of(question, frf)
-    held_band = question.held_band or _upper_part(question, low, high)
+    held_band = question.held_band or upper_part(low, high)
     fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
     use, seen_to = counted(frf, question.exclude), within(progress, 0.0, 0.3)
@@ -99,12 +98,12 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     mesh = mesh_hidden(nominal, f_max, measured_on(question))
     progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
-    held_sensors = _held_sensors(question)
+    left_out = HeldOutChoice(held_out_sensors(question), held_band, (low, fit_max), reach)
     others, said = others_identified(question, reach, within(progress, 0.8, 1.0))
     data, spreads = [], []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
-        use = _training(f, low, fit_max, held_sensors)
+        use = left_out.training(f)
         H = equalised(found, s)
         noise, spread = sample_noise(found, frf, s), measured_spread(H, others, s)
         counts = counted(frf, question.exclude)
@@ -113,7 +112,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
-            identified=error,
+            identified=error, level=rms_over_lines(H[use.any(axis=1)]),
             direct=question.outputs.moved_with_base(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.rebased(reduced.model))
@@ -121,17 +120,12 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
     problem = updating_problem(question, reduced, data[0], nuisance, f_max)
-    named = isinstance(question.held_sensors, tuple)
-    swapped = held_sensors if named else _swapped(problem, held_sensors)
-    if not np.array_equal(swapped, held_sensors):
-        held_sensors = swapped
-        data = [
-            d.only(_training(f, low, fit_max, swapped)) for d, f in zip(data, lines, strict=True)
-        ]
+    if not isinstance(question.held_sensors, tuple):
+        left_out = left_out.without_faults(problem)
+        data = [d.only(left_out.training(f)) for d, f in zip(data, lines, strict=True)]
         problem = replace(problem, data=data[0])
-    unseen, held = (_left_out(d, held_band, reach, held_sensors) for d in (data[0], data[1]))
-    names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
-    what = _held_in_words(names, held_band)
+    unseen, held = (left_out.samples(d) for d in data)
+    labels = question.outputs.labels
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
@@ -147,6 +141,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
         )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
+    notes += left_out.choosing_in_words(labels)
     notes.append(_sensor_note(question))
     notes += _mass_note(question)
     known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
@@ -161,8 +156,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
     size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
-        problem, data[1], held, what, tuple(notes), nominal, floor, found, too_little(*size),
-        numbers(*size), unseen=unseen, others=tuple(others), levels=studied,
+        problem, data[1], held, unseen, left_out.reporting_in_words(labels), tuple(notes), nominal,
+        floor, found, too_little(*size), numbers(*size), others=tuple(others), levels=studied,
     )  # fmt: skip
 
 
@@ -181,18 +176,6 @@ def _own_modes(nominal: Modelled, low: float, high: float) -> int:
     return int(((f > max(low / NEAR_BAND, 1e-3 * high)) & (f < NEAR_BAND * high)).sum())
 
 
-def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
-    """The held-out data in words: sensors, a band, or nothing."""
-    said = [f"{len(names)} sensors ({', '.join(names[:8])})"] if names else []
-    said += [f"band {band[0]:g}-{band[1]:g} Hz"] if band[1] > band[0] else []
-    return ", ".join(said) or "nothing"
-
-
-def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
-    """The uppermost fifth of the band, held out where the user names none."""
-    return high - 0.2 * (high - low), high
-
-
 def equalised_lines(
     band: tuple[float, float], exclude: Sequence[tuple[float, float]], zeta: float
 ) -> np.ndarray:
@@ -201,59 +184,6 @@ def equalised_lines(
     for a, b in exclude:
         f = f[(f < a) | (f > b)]
     return f
-
-
-def _held_sensors(question: Question) -> np.ndarray:
-    """Outputs that are held out: the named ones, or a fixed selection of a fifth of them."""
-    labels = question.outputs.labels
-    wanted = question.held_sensors
-    if isinstance(wanted, tuple):
-        return np.array([label in wanted for label in labels])
-    away = question.outputs.points[:, None] - question.inputs.points[None]
-    driven = (np.linalg.norm(away, axis=2) < SAME_PLACE).any(axis=1)  # a moving base has no place
-    count = min(len(labels) // 5 if wanted is None else wanted, max(len(labels) - 2, 0))
-    order = np.random.default_rng(20250101).permutation(len(labels))
-    chosen = [k for k in order if not driven[k]][:count]
-    return np.isin(np.arange(len(labels)), chosen)
-
-
-def _training(f: np.ndarray, low: float, high: float, held: np.ndarray) -> np.ndarray:
-    """Lines and channels that are fitted (n_f, n_out)."""
-    return np.outer((f >= low) & (f <= high), ~held)
-
-
-def _left_out(
-    data: Responses, band: tuple[float, float], reach: tuple[float, float], sensors: np.ndarray
-) -> np.ndarray:
-    """Lines of the held-out band, and the held-out sensors on every line (n_f, n_out)."""
-    f = data.s.imag / (2 * np.pi)
-    outside = (f >= band[0]) & (f <= band[1])
-    held = outside[:, None] | (sensors[None, :] & ((f >= reach[0]) & (f <= reach[1]))[:, None])
-    return held & ~data.use
-
-
-def _swapped(problem: UpdatingProblem, held: np.ndarray) -> np.ndarray:
-    """Held-out sensors, less those whose level is an outlier: a fault must be fitted to be found.
-
-    Outliers are judged by their median level against a calibrated model without effects.  Nothing
-    else of the held-out data enters the choice.
-    """
-    data = problem.data
-    assert isinstance(data, Responses)
-    model, weighed = problem.reduced.model, problem.mass_measurement
-    rough = fit(model, problem.base, data, weighed, problem.mean(), max_steps=8)
-    lines = data.use.any(axis=1)
-    delta = data.deviation(rough.state)[lines].reshape(lines.sum(), len(held), -1)
-    level = np.median(delta.real, axis=(0, 2))
-    turned = np.median(np.abs(delta.imag), axis=(0, 2)) > np.pi / 2 / LN10
-    spread = max(0.02, 1.5 * float(np.median(np.abs(level - np.median(level)))))
-    odd = (np.abs(level - np.median(level)) > 4 * spread) | turned
-    if not np.any(odd & held):
-        return held
-    calm = np.flatnonzero(~odd & ~held)[: int((odd & held).sum())]
-    out = held & ~odd
-    out[calm] = True
-    return out
 
 
 def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepared:
@@ -278,10 +208,14 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepar
     ).rebased(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, mesh, f_max)
     problem = updating_problem(question, reduced, data, nuisance, f_max)
-    what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
+    left_out = of_poles(held)
+    n = int(left_out.reporting.sum())
+    what = f"{n} of {len(held)} frequencies" if n else "nothing"
     notes = (*notes, *_unscored(question), *_mass_note(question))
     few = too_little(len(frequency), 0), numbers(len(frequency), 0)
-    return Prepared(problem, data, held, what, notes, nominal, None, found, *few, ~held, held)
+    return Prepared(
+        problem, data, left_out, left_out, what, notes, nominal, None, found, *few, ~held
+    )
 
 
 def _unscored(question: Question) -> list[str]:

@@ -101,6 +101,25 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Samples that are not fitted, in the shape of the ``use`` of some data.
+
+    Attributes
+    ----------
+    choosing : samples whose evidence supports or refuses a name
+    reporting : samples on which the gain of a name is reported, and on which nothing is decided
+    """
+
+    choosing: np.ndarray
+    reporting: np.ndarray
+
+    @property
+    def whole(self) -> np.ndarray:
+        """All samples that are held out."""
+        return np.asarray(self.choosing | self.reporting)
+
+
+@dataclass(frozen=True, eq=False)
 class Prepared:
     """An updating problem and the data that score it.
 
@@ -108,11 +127,10 @@ class Prepared:
     ----------
     problem : the updating problem of the diagnosis
     score : data on which Q is reported (over the same basis), with ``use`` = fitted samples
-    held : samples held out, in the shape of ``score.use``
-    what : the held-out data in words
+    held, unseen : samples held out, of ``score`` and of ``problem.data``
+    what : the data that report, in words
     notes : sentences on how the recording is compared, and why
     nominal : the structure of the deck, with all modes that a diagnosis needs
-    unseen : the held-out samples in the shape of ``problem.data.use``
     noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
     others : recordings that are not fitted, with their modes
     levels : the modes over levels of excitation, where there are two and more
@@ -120,7 +138,8 @@ class Prepared:
 
     problem: UpdatingProblem
     score: Responses | Poles
-    held: np.ndarray
+    held: HeldOut
+    unseen: HeldOut
     what: str
     notes: tuple[str, ...]
     nominal: Modelled
@@ -129,6 +148,5 @@ class Prepared:
     too_little: str = ""  # reason why data so few rarely separate explanations
     numbers: int = NUMBERS  # of the fitted modes and channels
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
-    unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     others: tuple[OtherTest, ...] = ()
     levels: LevelStudy = field(default_factory=LevelStudy)

@@ -64,25 +64,25 @@ class FittedScores:
 def fitted_scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[FittedScores, FittedScores]:
     """Q on the fitted data and on the held-out data."""
     winner = diagnosis.found or diagnosis.null
-    stages = _states(prepared.problem, diagnosis, winner)
-    first, second = (FittedScores(*Q) for Q in scores_of(prepared, winner, stages))
+    stages, reported = _states(prepared.problem, diagnosis, winner), prepared.held.reporting
+    first, second = (FittedScores(*Q) for Q in scores_of(prepared, winner, stages, reported))
     return first, second
 
 
 def scores_of(
-    prepared: Prepared, winner: HypothesisFit, stages: Sequence[tuple[HypothesisFit, State]]
-) -> list[list[float]]:
-    """Q of some states, one list for the fitted data and one for the held-out data."""
+    prepared: Prepared, winner: HypothesisFit, stages: Sequence[tuple[HypothesisFit, State]],
+    held: np.ndarray,
+) -> list[list[float]]:  # fmt: skip
+    """Q of some states, one list for the fitted data and one for the held-out data ``held``."""
     real = real_poles(prepared, winner)
     return [
         [prepared.score.rebased(fit.model).Q(state, use, real) for fit, state in stages]
-        for use in (prepared.score.use, held_out(prepared, winner))
+        for use in (prepared.score.use, of_channels(prepared, winner, held))
     ]
 
 
-def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
-    """Samples held out; for a fault of one channel, the samples of that channel alone."""
-    held = prepared.held
+def of_channels(prepared: Prepared, winner: HypothesisFit, held: np.ndarray) -> np.ndarray:
+    """Held-out samples; for a fault of one channel, those of that channel alone."""
     if not winner.channels or held.ndim < 2:
         return held
     mine = np.isin(prepared.problem.labels, winner.channels)
@@ -96,7 +96,7 @@ def with_deck(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     if found is None or diagnosis.shared:
         return diagnosis
     mass = prepared.problem.mass_measurement
-    return replace(diagnosis, deck=as_foretold(found, mass, prepared.unseen))
+    return replace(diagnosis, deck=as_foretold(found, mass, prepared.unseen.whole))
 
 
 def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:

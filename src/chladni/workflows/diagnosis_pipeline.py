@@ -57,7 +57,7 @@ from ..search.result_parts import (
     otherwise,
     remainder,
 )
-from ..search.verdict_models import fitted_scores, held_out, models, real_poles, with_deck
+from ..search.verdict_models import fitted_scores, models, of_channels, real_poles, with_deck
 from ..search.written_scores import noise_Q, written_Q
 from ..sparse.freed_memory import give_back_freed_memory
 from .axes_check import refuse_turned_axes
@@ -361,7 +361,7 @@ def _scores(
 ) -> tuple[Scores, Scores]:  # fmt: skip
     """Return Q of the three decks on fitted and held-out data, of noise, and of nuisances."""
     winner = found.found or found.null
-    sets = prepared.score.use, held_out(prepared, winner)
+    sets = prepared.score.use, of_channels(prepared, winner, prepared.held.reporting)
     named = found.found
     nominal = written_Q(question, prepared, stages.nominal, sets, real)
     calibrated = final = nominal

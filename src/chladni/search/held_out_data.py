@@ -1,0 +1,134 @@
+"""Data that are not fitted: samples that choose a name, and samples that only report its gain.
+
+Held-out sensors take turns: the first, third, ... choose and the others report. The held-out band
+of all sensors that do not choose reports too.  No decision uses a sample that reports.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..inference.hypothesis_fit import UpdatingProblem
+from ..inference.likelihood import LN10, Responses
+from ..inference.map_fit import fit
+from .question import HeldOut, Question
+
+SAME_PLACE = 1e-6  # [m]: a sensor nearer to a shaker counts as at its place
+Band = tuple[float, float]  # [Hz]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutChoice:
+    """Sensors and a band that are not fitted.
+
+    Attributes
+    ----------
+    sensors : outputs that are held out (n_out,) bool
+    band : held-out band [Hz]; empty where both ends are equal
+    fitted, reach : the band that is fitted, and all that is compared [Hz]
+    """
+
+    sensors: np.ndarray
+    band: Band
+    fitted: Band
+    reach: Band
+
+    def training(self, f: np.ndarray) -> np.ndarray:
+        """Lines and channels that are fitted (n_f, n_out), at frequencies f [Hz] (n_f,)."""
+        return np.outer(_inside(f, self.fitted), ~self.sensors)
+
+    def samples(self, data: Responses) -> HeldOut:
+        """The samples of some data that choose and that report."""
+        f = data.s.imag / (2 * np.pi)
+        everywhere, above = _inside(f, self.reach)[:, None], _inside(f, self.band)[:, None]
+        chosen = self.choosing
+        choosing = chosen & everywhere
+        if not self.sensors.any():  # a band alone: its lower half chooses
+            choosing = above & (f < sum(self.band) / 2)[:, None]
+        reporting = (self.sensors & ~chosen & everywhere) | (above & ~choosing)
+        return HeldOut(*(part & ~data.use for part in (choosing, reporting)))
+
+    @property
+    def choosing(self) -> np.ndarray:
+        """Held-out outputs that choose (n_out,) bool: every second one, or the only one."""
+        held = np.flatnonzero(self.sensors)
+        alone = len(held) == 1 and self.band[1] <= self.band[0]
+        return np.isin(np.arange(len(self.sensors)), held[:0] if alone else held[::2])
+
+    def reporting_in_words(self, labels: Sequence[str]) -> str:
+        """The data that report, in words: sensors, a band, or nothing."""
+        low, high = self.band
+        if not self.sensors.any():
+            low = (low + high) / 2
+        said = [*_in_words(labels, self.sensors & ~self.choosing)]
+        said += [f"band {low:g}-{high:g} Hz"] if high > low else []
+        return ", ".join(said) or "nothing"
+
+    def choosing_in_words(self, labels: Sequence[str]) -> list[str]:
+        """A sentence on the data that choose; empty where there are none."""
+        low, high = self.band
+        said = [*_in_words(labels, self.choosing)]
+        if not self.sensors.any() and high > low:
+            said = [f"band {low:g}-{(low + high) / 2:g} Hz"]
+        return [f"held out to choose a name, and not to report its gain: {s}" for s in said]
+
+    def without_faults(self, problem: UpdatingProblem) -> "HeldOutChoice":
+        """The choice without sensors whose level is an outlier: a fault is found only if fitted.
+
+        Outliers are judged by their median level against a calibrated model without effects.
+        Nothing else of the held-out data enters the choice.
+        """
+        data, held = problem.data, self.sensors
+        assert isinstance(data, Responses)
+        model, weighed = problem.reduced.model, problem.mass_measurement
+        rough = fit(model, problem.base, data, weighed, problem.mean(), max_steps=8)
+        lines = data.use.any(axis=1)
+        delta = data.deviation(rough.state)[lines].reshape(lines.sum(), len(held), -1)
+        level = np.median(delta.real, axis=(0, 2))
+        turned = np.median(np.abs(delta.imag), axis=(0, 2)) > np.pi / 2 / LN10
+        spread = max(0.02, 1.5 * float(np.median(np.abs(level - np.median(level)))))
+        odd = (np.abs(level - np.median(level)) > 4 * spread) | turned
+        if not np.any(odd & held):
+            return self
+        calm = np.flatnonzero(~odd & ~held)[: int((odd & held).sum())]
+        out = held & ~odd
+        out[calm] = True
+        return replace(self, sensors=out)
+
+
+def of_poles(held: np.ndarray) -> HeldOut:
+    """Held-out natural frequencies (n,) take turns from above: one reports, the next chooses."""
+    at = np.flatnonzero(held)
+    reporting = np.isin(np.arange(len(held)), at[::-1][::2])
+    return HeldOut(held & ~reporting, reporting)
+
+
+def held_out_sensors(question: Question) -> np.ndarray:
+    """Outputs that are held out (n_out,) bool: the named ones, or a fixed selection of a fifth."""
+    labels = question.outputs.labels
+    wanted = question.held_sensors
+    if isinstance(wanted, tuple):
+        return np.array([label in wanted for label in labels])
+    away = question.outputs.points[:, None] - question.inputs.points[None]
+    driven = (np.linalg.norm(away, axis=2) < SAME_PLACE).any(axis=1)  # a moving base has no place
+    count = min(len(labels) // 5 if wanted is None else wanted, max(len(labels) - 2, 0))
+    order = np.random.default_rng(20250101).permutation(len(labels))
+    chosen = [k for k in order if not driven[k]][:count]
+    return np.isin(np.arange(len(labels)), chosen)
+
+
+def upper_part(low: float, high: float) -> Band:
+    """The uppermost fifth of a band, held out where the user names none."""
+    return high - 0.2 * (high - low), high
+
+
+def _inside(f: np.ndarray, band: Band) -> np.ndarray:
+    return np.asarray((f >= band[0]) & (f <= band[1]))
+
+
+def _in_words(labels: Sequence[str], those: np.ndarray) -> list[str]:
+    """Sensors in words; empty where there are none."""
+    names = [n for n, h in zip(labels, those, strict=True) if h]
+    sensors = "sensor" if len(names) == 1 else "sensors"
+    return [f"{len(names)} {sensors} ({', '.join(names[:8])})"] if names else []

@@ -1,0 +1,148 @@
+"""Fitted, choosing and reporting data are disjoint; no decision uses data that report."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.frf import FRF
+from chladni.effects.points import with_masses
+from chladni.fem.measured_dofs import MeasuredDofs
+from chladni.fem.modelled import modelled
+from chladni.inference.likelihood import Responses
+from chladni.inference.map_fit import MassMeasurement
+from chladni.reduced.reduced_model import evaluate
+from chladni.search.basis_refinement import refined
+from chladni.search.deciding import decided
+from chladni.search.decision_in_words import concluded
+from chladni.search.diagnosis import diagnose
+from chladni.search.held_out_data import HeldOutChoice, of_poles, upper_part
+from chladni.search.preparation import prepare
+from chladni.search.question import HeldOut, Question
+from chladni.search.verdict_models import fitted_scores
+from chladni_specimens.plates import plate
+
+LABELS = tuple("abcdefgh")
+LOW, HIGH = 20.0, 170.0
+F = np.linspace(15, 200, 60)
+
+
+def choice(sensors: int, with_band: bool) -> HeldOutChoice:
+    held = np.isin(np.arange(len(LABELS)), [6, 1, 4, 3, 0][:sensors])
+    band = upper_part(LOW, HIGH) if with_band else (HIGH, HIGH)
+    return HeldOutChoice(held, band, (LOW, band[0]), (LOW, HIGH))
+
+
+def split(made: HeldOutChoice, zeta: float) -> tuple[np.ndarray, HeldOut]:
+    """Fitted samples, and those that are held out."""
+    values = np.ones((len(F), len(LABELS), 1), complex)
+    s = 2 * np.pi * F * (zeta + 1j)
+    data = Responses(values, s, None, None, made.training(F), "accelerance")
+    return data.use, made.samples(data)
+
+
+@pytest.mark.parametrize("with_band", [True, False])
+@pytest.mark.parametrize("sensors", range(6))
+def test_a_sample_is_fitted_or_chooses_or_reports(sensors, with_band):
+    """No sample does two of these, and all samples of the band that is compared do one."""
+    made = choice(sensors, with_band)
+    fitted, held = split(made, 0.08)
+    parts = np.array([fitted, held.choosing, held.reporting])
+    inside = (F >= LOW) & (F <= HIGH)
+    assert parts.sum(axis=0).max() == 1
+    assert parts.any(axis=0)[inside].all()
+    assert not parts.any(axis=0)[~inside].any()
+    assert held.reporting.any() == (sensors > 0 or with_band)
+    assert held.choosing.any() == (sensors > 1 or with_band)
+    again = split(made, 0.02)[1]  # the same frequencies at any damping
+    np.testing.assert_array_equal(again.choosing, held.choosing)
+
+
+def test_held_out_data_are_described_by_their_use():
+    made = choice(3, True)
+    assert made.reporting_in_words(LABELS) == "1 sensor (e), band 140-170 Hz"
+    assert made.choosing_in_words(LABELS)[0].endswith("2 sensors (b, g)")
+    alone = choice(0, True)
+    assert alone.reporting_in_words(LABELS) == "band 155-170 Hz"
+    assert alone.choosing_in_words(LABELS)[0].endswith("band 140-155 Hz")
+    assert choice(0, False).reporting_in_words(LABELS) == "nothing"
+    assert not choice(1, False).choosing_in_words(LABELS)
+
+
+@pytest.mark.parametrize("n", range(5))
+def test_held_out_frequencies_take_turns(n):
+    held = np.arange(9) >= 9 - n
+    made = of_poles(held)
+    np.testing.assert_array_equal(made.whole, held)
+    assert not (made.choosing & made.reporting).any()
+    assert made.reporting.sum() - made.choosing.sum() in (0, 1)
+    assert made.reporting[-1] == (n > 0)
+
+
+GRIDS = np.array([2, 4, 6, 18, 20, 30, 33, 43, 45, 47])
+PLATE = plate(0.3, 0.22, 6, 6, 1e-3)
+
+
+def sites(grids: np.ndarray) -> MeasuredDofs:
+    n = len(grids)
+    return MeasuredDofs(
+        tuple(f"{g}:+Z" for g in grids), grids, PLATE.points[PLATE.rows(grids)],
+        np.tile([0.0, 0.0, 1.0], (n, 1)), np.zeros(n), np.zeros(n),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def question() -> Question:
+    """A plate that carries 25 g which the deck lacks, with 2 of 10 sensors held out."""
+    model = modelled(with_masses(PLATE, (32,), 0.025), 900.0)
+    phi_o, phi_i = (sites(g).rows(model.structure) @ model.modes.shapes for g in (GRIDS, GRIDS[:1]))
+    f = np.linspace(15, 200, 700)
+    s, w = 2j * np.pi * f[:, None], 2 * np.pi * model.modes.frequency
+    H = np.einsum("or,fr,ir->foi", phi_o, s**2 / (s**2 + 0.02 * w * s + w**2), phi_i)
+    z = np.random.default_rng(3).normal(size=(2, *H.shape))
+    values = H * (1 + 0.005 * (z[0] + 1j * z[1]))
+    outputs, inputs = sites(GRIDS), sites(GRIDS[:1])
+    frf = FRF(values, f, outputs.labels, inputs.labels, "accelerance")
+    return Question(
+        PLATE, outputs, inputs, frf=frf, band=(LOW, HIGH), effects=("point-mass",),
+        mass_measurement=MassMeasurement(0.518 + 0.025, 0.001),
+    )  # fmt: skip
+
+
+def test_no_decision_uses_data_that_report(question):
+    """Nonsense on all samples that report: every number of the decision stays, reported Q moves."""
+    ready = prepare(question)
+    spoilt = replace(
+        ready, score=_spoilt(ready.score, ready.held.reporting),
+        problem=replace(ready.problem, data=_spoilt(ready.problem.data, ready.unseen.reporting)),
+    )  # fmt: skip
+    answers = [_answer(question, p) for p in (ready, spoilt)]
+    (decision, Q), (again, worse) = answers
+    assert decision.named
+    assert decision == again
+    assert_allclose(Q[0].effect, worse[0].effect, rtol=1e-9)
+    assert Q[1].effect < 0.1 * Q[1].calibrated
+    assert worse[1].effect > 100 * Q[1].effect
+
+
+def test_data_that_choose_refuse_a_name(question):
+    """The sensor that chooses moves as the deck without the mass does: the mass is not named."""
+    ready = prepare(question)
+    problem, at = ready.problem, ready.unseen.choosing[..., None]
+    bare = evaluate(problem.reduced.model, problem.base, problem.mean(), False)
+    values = np.where(at, problem.data.model(bare), problem.data.values)
+    other = replace(ready, problem=replace(problem, data=replace(problem.data, values=values)))
+    assert not _answer(question, other)[0].named
+
+
+def _spoilt(data: Responses, at: np.ndarray) -> Responses:
+    return replace(data, values=np.where(at[..., None], 7.0 + 3.0j, data.values))
+
+
+def _answer(question, prepared):
+    found = diagnose(prepared.problem)
+    refine = partial(refined, question, prepared)
+    decision, known = decided(prepared, found, refine)
+    return decision, fitted_scores(prepared, concluded(prepared, found, decision, known)[0])
