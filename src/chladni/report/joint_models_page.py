@@ -35,7 +35,9 @@ def in_words(found: JointModels) -> PageParts:
     refused = [f"{row.name}: {row.refused}." for row in found.rows if row.refused]
     doubts = [f"{row.name}: {why}" for row in found.rows for why in row.distrust]
     table = Table(_HEADS, [_row(r) for r in found.rows], ("joints",), _CAPTION)
-    held = f"held out: {found.what}" if found.what else "no data were held out"
+    held = "no data were held out"
+    if found.what:
+        held = f"held out: {found.what}; the best model is chosen on these data"
     sections = [
         Section("Models of the joints", [table, Items([held])]),
         Section("Not possible in this deck", [Items(refused)] if refused else []),
