@@ -153,10 +153,10 @@ SCHEMA = (
     Key("band", "exclude", "list of [low, high]", "Hz", "none",
         "Excluded bands within it.", "[[23.0, 27.5]]", ("identify", *_SCORE)),
     Key("held_out", "sensors", "number, or list of labels", "", "a fifth of the outputs",
-        "Held-out outputs. The first, third, ... choose a name; the others report its gain.",
+        "Held-out outputs. Every third reports the gain of a name; the others choose it.",
         '["412:+Z"]', _FIT),
     Key("held_out", "band", "[low, high]", "Hz", "the upper fifth of the band",
-        "Held-out band. It reports; without held-out sensors its lower half chooses.",
+        "Held-out band. Every third output reports there; the others choose.",
         "[200.0, 300.0]", (*_FIT, "bench")),
     Key("search", "effects", "list of effects", "", "all of the catalogue",
         "Effects that are tried; no other effect is named. Faults of the recording are always "

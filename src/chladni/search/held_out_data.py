@@ -15,6 +15,7 @@ from ..inference.map_fit import fit
 from .question import HeldOut, Question
 
 SAME_PLACE = 1e-6  # [m]: a sensor nearer to a shaker counts as at its place
+THIRD = 3  # one output of so many reports: a name needs evidence more than its report needs samples
 Band = tuple[float, float]  # [Hz]
 
 
@@ -41,37 +42,26 @@ class HeldOutChoice:
     def samples(self, data: Responses) -> HeldOut:
         """The samples of some data that choose and that report."""
         f = data.s.imag / (2 * np.pi)
-        everywhere, above = _inside(f, self.reach)[:, None], _inside(f, self.band)[:, None]
-        chosen = self.choosing
-        choosing = chosen & everywhere
-        if not self.sensors.any():  # a band alone: its lower half chooses
-            choosing = above & (f < sum(self.band) / 2)[:, None]
-        reporting = (self.sensors & ~chosen & everywhere) | (above & ~choosing)
-        return HeldOut(*(part & ~data.use for part in (choosing, reporting)))
+        everywhere, above = (_inside(f, band)[:, None] for band in (self.reach, self.band))
+        held = ((self.sensors & everywhere) | above) & ~data.use
+        return HeldOut(held & ~self.reporting, held & self.reporting)
 
     @property
-    def choosing(self) -> np.ndarray:
-        """Held-out outputs that choose (n_out,) bool: every second one, or the only one."""
-        held = np.flatnonzero(self.sensors)
-        alone = len(held) == 1 and self.band[1] <= self.band[0]
-        return np.isin(np.arange(len(self.sensors)), held[:0] if alone else held[::2])
+    def reporting(self) -> np.ndarray:
+        """Outputs whose held-out samples report (n_out,) bool; those of all others choose."""
+        groups = np.flatnonzero(self.sensors), np.flatnonzero(~self.sensors)
+        return np.isin(np.arange(len(self.sensors)), np.concatenate([g[::THIRD] for g in groups]))
 
-    def reporting_in_words(self, labels: Sequence[str]) -> str:
-        """The data that report, in words: sensors, a band, or nothing."""
-        low, high = self.band
-        if not self.sensors.any():
-            low = (low + high) / 2
-        said = [*_in_words(labels, self.sensors & ~self.choosing)]
-        said += [f"band {low:g}-{high:g} Hz"] if high > low else []
+    def in_words(self, labels: Sequence[str], reporting: bool) -> str:
+        """The data that report, or that choose, in words: sensors, a band, or nothing."""
+        of = self.reporting == reporting
+        names = [n for n, h in zip(labels, self.sensors & of, strict=True) if h]
+        sensors = "sensor" if len(names) == 1 else "sensors"
+        said = [f"{len(names)} {sensors} ({', '.join(names[:8])})"] if names else []
+        (low, high), others = self.band, int((of & ~self.sensors).sum())
+        if high > low and others:
+            said += [f"band {low:g}-{high:g} Hz of {others} other{'s' * (others > 1)}"]
         return ", ".join(said) or "nothing"
-
-    def choosing_in_words(self, labels: Sequence[str]) -> list[str]:
-        """A sentence on the data that choose; empty where there are none."""
-        low, high = self.band
-        said = [*_in_words(labels, self.choosing)]
-        if not self.sensors.any() and high > low:
-            said = [f"band {low:g}-{(low + high) / 2:g} Hz"]
-        return [f"held out to choose a name, and not to report its gain: {s}" for s in said]
 
     def without_faults(self, problem: UpdatingProblem) -> "HeldOutChoice":
         """The choice without sensors whose level is an outlier: a fault is found only if fitted.
@@ -98,9 +88,8 @@ class HeldOutChoice:
 
 
 def of_poles(held: np.ndarray) -> HeldOut:
-    """Held-out natural frequencies (n,) take turns from above: one reports, the next chooses."""
-    at = np.flatnonzero(held)
-    reporting = np.isin(np.arange(len(held)), at[::-1][::2])
+    """Held-out natural frequencies (n,): from the highest on, every third reports."""
+    reporting = np.isin(np.arange(len(held)), np.flatnonzero(held)[::-1][::THIRD])
     return HeldOut(held & ~reporting, reporting)
 
 
@@ -125,10 +114,3 @@ def upper_part(low: float, high: float) -> Band:
 
 def _inside(f: np.ndarray, band: Band) -> np.ndarray:
     return np.asarray((f >= band[0]) & (f <= band[1]))
-
-
-def _in_words(labels: Sequence[str], those: np.ndarray) -> list[str]:
-    """Sensors in words; empty where there are none."""
-    names = [n for n, h in zip(labels, those, strict=True) if h]
-    sensors = "sensor" if len(names) == 1 else "sensors"
-    return [f"{len(names)} {sensors} ({', '.join(names[:8])})"] if names else []

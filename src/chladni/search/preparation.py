@@ -141,7 +141,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
         )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
-    notes += left_out.choosing_in_words(labels)
+    what, chosen_on = (left_out.in_words(labels, reporting) for reporting in (True, False))
+    notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
     notes.append(_sensor_note(question))
     notes += _mass_note(question)
     known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
@@ -156,8 +157,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
     size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
-        problem, data[1], held, unseen, left_out.reporting_in_words(labels), tuple(notes), nominal,
-        floor, found, too_little(*size), numbers(*size), others=tuple(others), levels=studied,
+        problem, data[1], held, unseen, what, tuple(notes), nominal, floor, found,
+        too_little(*size), numbers(*size), others=tuple(others), levels=studied,
     )  # fmt: skip
 
 
