@@ -8,10 +8,11 @@ import pytest
 
 from chladni.effects import point_mass
 from chladni.effects.effect_context import EffectContext, Setup
+from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.point_mass import SHARE, TRIED
 from chladni.effects.search_context import SearchContext
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni_specimens.plates import plate
+from chladni_specimens.plates import folded_panel, plate
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +54,23 @@ def test_the_mass_that_the_scales_ask_for_is_sought_by_itself(where):
 @pytest.mark.parametrize("share", [0.0, -2.0, 0.5 * TRIED.min()])
 def test_none_is_asked_for_that_is_less_than_the_least_tried(where, share):
     assert len(proposed(where, share * SHARE * where.setup.weight)) == 4
+
+
+@pytest.mark.parametrize("z", [-0.01, -0.001])
+def test_a_place_between_a_fold_and_the_next_grids_can_be_reached(z):
+    """Both faces end at the fold: next to it a place moves as a rigid body does there."""
+    panel = folded_panel(0.4, 0.3, 0.04, 0.0, 0.02, 1e-3)
+    reduced = reduced_problem(panel, 250.0)
+    setup = Setup((), (), float(reduced.groups.weight.sum()), 200.0)
+    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
+    k = int(np.argmin(np.linalg.norm(where.grids.point - [0.2, 0.0, -0.02], axis=1)))
+    support = ExtraSupport.near(where, k)
+    patch = support.patch
+    at = patch.plane @ (np.array([0.21, 0.0, z]) - patch.origin)
+    x = np.array([0.0, *(at / patch.size), 0.0, 0.0])
+    np.testing.assert_allclose(support.at(x), [0.21, 0.0, z], atol=1e-9)
+    weights = patch.weights(at)  # they reproduce motions that are linear in the plane
+    np.testing.assert_allclose([weights.sum(), *(weights @ patch.flat)], [1.0, *at], atol=1e-6)
+    heights = panel.points[panel.rows(patch.grids), 2]
+    assert heights.max() == pytest.approx(0.0)  # the fold itself, and no grid of the other face
+    assert np.ptp(panel.points[panel.rows(patch.grids), 1]) == pytest.approx(0.0)

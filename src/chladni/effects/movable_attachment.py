@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 import scipy.sparse as sp
 
-from ..geometry.facets import tangents
+from ..geometry.facets import cell_normals, tangents
 from .effect import WIDER, Effect, Parameter, PointTerm, Traits, Weight
 from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate, Location, in_mm
@@ -200,12 +200,24 @@ def there(where: EffectContext, k: int) -> dict[str, Any]:
     return {"text": f"at grid {grid}", "grids": (grid,), "point": point, "trials_factor": tried}
 
 
+def _in_face(where: EffectContext, normal: np.ndarray) -> np.ndarray:
+    """Grids of shells that face a direction, or that border on a shell which does (k,) bool.
+
+    The normal of a grid on a fold is that of neither face, yet both faces reach as far as the fold.
+    """
+    spots, assembly = where.grids, where.groups.structure.assembly
+    cells = assembly.shells.nodes
+    facing = np.abs(cell_normals(assembly.points, cells) @ normal) > FACING
+    bordering = np.isin(spots.grids, assembly.ids[np.unique(cells[facing])])
+    return ((np.abs(spots.normal @ normal) > FACING) | bordering) & (spots.line < 0)
+
+
 def patch(where: EffectContext, k: int, directions: np.ndarray) -> Patch:
     """The neighbours of the k-th grid in the same face of the sheet, or on its line of beams."""
     spots = where.grids
     d = spots.point - spots.point[k]
     if spots.line[k] < 0:
-        mine = (np.abs(spots.normal @ spots.normal[k]) > FACING) & (spots.line < 0)
+        mine = _in_face(where, spots.normal[k])
         plane, neighbours = np.stack(tangents(spots.normal[k])), NEIGHBOURS
     else:
         mine = np.zeros(len(spots), bool)
