@@ -142,7 +142,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
     what, chosen_on = (left_out.in_words(labels, reporting) for reporting in (True, False))
-    notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
+    if unseen.choosing.any():
+        notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
     notes.append(_sensor_note(question))
     notes += _mass_note(question)
     known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
