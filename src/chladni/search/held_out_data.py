@@ -1,7 +1,7 @@
 """Data that are not fitted: samples that choose a name, and samples that only report its gain.
 
-Held-out sensors take turns: the first, third, ... choose and the others report. The held-out band
-of all sensors that do not choose reports too.  No decision uses a sample that reports.
+Every third held-out sensor reports, the others choose.  In the held-out band every third of the
+fitted sensors reports, too.  No choice of a name uses a sample that reports.
 """
 
 from collections.abc import Sequence
