@@ -15,7 +15,7 @@ from ..model.assembly import Assembly
 from .effect_context import ElementGrids
 from .family import Article, Family
 from .points import AtPoints, strength
-from .search_context import Candidate, SearchContext, best_places, distinct
+from .search_context import Candidate, SearchContext, best_places, valleys
 from .sheet_pairs import SheetPairs
 
 MEDIAN, SD = 2e4, 2.0  # [N/m], sd of ln
@@ -130,7 +130,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     scores = context.scan.point_scores(len(context.bases) - 1, "K", TRIED, places)
     return [
         Candidate(effects[k], np.array([np.log(TRIED[int(scores[k].argmin())] / MEDIAN)]), base)
-        for k in distinct(scores.min(axis=1), points, [], FOLLOWED)
+        for k in valleys(scores.min(axis=1), points, wanted=FOLLOWED)
     ]
 
 

@@ -21,7 +21,7 @@ from .effect import Effect, MatrixTerm, Parameter, Traits
 from .element_groups import ElementGroups
 from .estimate import Estimate, in_mm
 from .family import Article, Family
-from .search_context import Candidate, ResponseScan, SearchContext, best_places, distinct
+from .search_context import Candidate, ResponseScan, SearchContext, best_places
 
 LEAST_LEFT = 0.1  # of the bending stiffness always remains, so that K stays positive
 SHELLS = 3  # in a line at least
@@ -33,6 +33,7 @@ SHORTEST, LONGEST = 0.4, 4.0  # times that: limits of a moved line
 ANGLES = 4
 PLACES = 48  # middles of lines, all over the sheets
 BEGUN = 12  # lines, far from each other, that are moved while they explain more
+APART = 1 / 6  # of the size of all lines: least distance between those that are moved
 TURNS = (-np.pi / 8, -np.pi / 16, np.pi / 16, np.pi / 8)
 STRETCHED = (0.7, 1.4)  # times its length
 NEIGHBOUR_DISTANCE = 1.7  # of a shell's size: distance of its neighbours
@@ -151,6 +152,15 @@ def _different(lines: Sequence[Line | None]) -> list[Line]:
     return list({line.shells.tobytes(): line for line in lines if line is not None}.values())
 
 
+def _far_apart(score: np.ndarray, centre: np.ndarray) -> list[int]:
+    """The best lines at a minimum distance: far from a crack the scores have no valleys."""
+    reach, out = APART * np.linalg.norm(np.ptp(centre, axis=0)), list[int]()
+    for k in np.argsort(score):
+        if all(np.linalg.norm(centre[k] - centre[j]) > reach for j in out):
+            out.append(int(k))
+    return out[:BEGUN]
+
+
 @dataclass(frozen=True, eq=False)
 class Crack(Effect):
     """K - (1 - f) Σ_line B_e, B_e the bending stiffness, f = 0.1 + 0.9 / (1 + e^x) the rest of it.
@@ -266,7 +276,7 @@ def _at_rest(
         return line
 
     score = scores(first)
-    begun = distinct(score, np.array([line.centre for line in first]), [], BEGUN)
+    begun = _far_apart(score, np.array([line.centre for line in first]))
     ends = _different([at_rest(first[k]) for k in begun if np.isfinite(score[k])])
     return ends, len(known)
 

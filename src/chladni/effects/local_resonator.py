@@ -24,7 +24,7 @@ from .estimate import Estimate, Remarks
 from .family import Article, Family
 from .movable_attachment import MovableMass, around, closer, moved, patch, there
 from .points import strength, with_masses
-from .search_context import Candidate, SearchContext, best_places, distinct
+from .search_context import Candidate, SearchContext, best_places, valleys
 
 SHARE = 0.015  # of the structure's mass: prior median of the resonator's mass
 TYPICAL = 3.0  # highest spectral line over the prior median of its frequency
@@ -142,14 +142,12 @@ def candidates(context: SearchContext) -> list[Candidate]:
     out: list[Candidate] = []
     for about in range(len(context.bases)):
         score = _scores(context, about, mass, hertz, places)[1]
-        (k,) = distinct(score.min(axis=1), places.point, taken, 1)
-        if not np.isfinite(score[k]).any():
-            continue
-        taken.append(k)
-        step, best = hertz[1] / hertz[0], hertz[int(np.argmin(score[k]))]
-        closer = around(where.grids, where.places, int(some[k]))
-        finer = best * step ** np.linspace(-1, 1, 5)
-        out.append(_best(context, about, mass, finer, closer))
+        for k in valleys(score.min(axis=1), places.point, taken):
+            taken.append(k)
+            step, best = hertz[1] / hertz[0], hertz[int(np.argmin(score[k]))]
+            closer = around(where.grids, places, k)
+            finer = best * step ** np.linspace(-1, 1, 5)
+            out.append(_best(context, about, mass, finer, closer))
     return out
 
 

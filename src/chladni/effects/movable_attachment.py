@@ -13,12 +13,13 @@ from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from ..geometry.facets import cell_normals, tangents
 from .effect import WIDER, Effect, Parameter, PointTerm, Traits, Weight
 from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate, Location, in_mm
-from .search_context import Candidate, SearchContext, best_places, distinct
+from .search_context import Candidate, SearchContext, best_places, valleys
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
@@ -275,7 +276,7 @@ def attachments(
     unknown = len(strengths)
     for about in range(len(context.bases)):
         score = scan.point_scores(about, matrix, np.append(strengths, known))
-        for k in distinct(score[:, :unknown].min(axis=1), places.point, chosen, 2):
+        for k in valleys(score[:, :unknown].min(axis=1), places.point, chosen, 2):
             chosen.append(k)
             follow(about, strengths, k)
         for c, at in zip(known, score[:, unknown:].argmin(axis=0), strict=True):
@@ -284,8 +285,8 @@ def attachments(
 
 
 def around(grids: ElementGrids, places: ElementGrids, k: int) -> ElementGrids:
-    """A denser sample of the grids round one of the places, up to its neighbours."""
-    d = np.linalg.norm(places.point - places.point[k], axis=1)
-    reach = np.sort(d)[min(4, len(d) - 1)]
-    near = np.flatnonzero(np.linalg.norm(grids.point - places.point[k], axis=1) <= reach)
+    """A denser sample of the grids round one of the places, up to half-way to the others."""
+    nearest = cKDTree(places.point).query(grids.point)[0]
+    own = np.linalg.norm(grids.point - places.point[k], axis=1)
+    near = np.flatnonzero(own <= nearest * (1 + 1e-9))
     return grids.only(near[grids.only(near).spread(CLOSER)])

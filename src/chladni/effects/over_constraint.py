@@ -82,7 +82,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if context.scan is None:
         some = farthest_point_sample(np.array([e.point for e in effects]), BY_POLES)
         chosen = [effects[k] for k in some]
-        return best_places(context, chosen, FOLLOWED, apart=-1.0, extended=True)
+        return best_places(context, chosen, FOLLOWED, anywhere=True, extended=True)
     left = np.ones((len(every), len(STARTS)))
     left[at] = [[e.left(x) for x in STARTS] for e in effects]
     out: dict[int, Candidate] = {}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .effect import Effect
 from .effect_context import EffectContext, ElementGrids
@@ -151,7 +152,7 @@ class SearchContext(Protocol):
         """The lowest local minima over the effect's whole prior, if only poles are known."""
 
 
-APART = 1 / 6  # of the structure's size: least distance between places that are both followed
+NEIGHBOURS = 6  # places round a place of a sheet
 
 
 def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candidate]:
@@ -177,14 +178,14 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
 
 
 def best_places(
-    context: SearchContext, effects: Sequence[Effect], wanted: int = 2, *, apart: float = APART,
+    context: SearchContext, effects: Sequence[Effect], wanted: int = 2, *, anywhere: bool = False,
     extended: bool = False, point: np.ndarray | None = None,
 ) -> list[Candidate]:  # fmt: skip
     """The best places of an effect, evaluated at many places with all its starts.
 
     Parameters
     ----------
-    apart : see :func:`distinct`
+    anywhere : the best wherever they are, not those of different valleys
     extended : see :meth:`SearchContext.scores`
     point : (n_effects, 3)   their places [m], where these are not the points of the effects
     """
@@ -194,27 +195,31 @@ def best_places(
     for effect in effects:
         scores = context.scores(effect, effect.starts(), extended)[0]
         options.append((float(scores.min()), effect.starts()[int(np.argmin(scores))]))
-    best = distinct(np.array([score for score, _ in options]), point, [], wanted, apart)
+    least = np.array([score for score, _ in options])
+    best = np.argsort(least)[:wanted] if anywhere else valleys(least, point, wanted=wanted)
     return [Candidate(effects[k], options[k][1], context.bases[-1]) for k in best]
 
 
-def distinct(
-    score: np.ndarray, point: np.ndarray, taken: Sequence[int], wanted: int, apart: float = APART
+def valleys(
+    score: np.ndarray, point: np.ndarray, taken: Sequence[int] = (), wanted: int = 1
 ) -> list[int]:
-    """The best positions, at a minimum distance from each other.
+    """The best positions whose neighbours all score worse: each is the bottom of its own valley.
+
+    A distance instead of neighbours loses a true place that is near to a false one with a better
+    score.
 
     Parameters
     ----------
     score : (n,)       a smaller score is better
-    point : (n, 3)     [m]
+    point : (n, 3)     [m]; positions that share a point are neighbours
     taken : positions chosen before
-    apart : minimum distance over the structure's size; negative: places may coincide
     """
-    reach = apart * np.linalg.norm(np.ptp(point, axis=0))
-    out: list[int] = []
-    for k in np.argsort(score):
-        if all(np.linalg.norm(point[k] - point[j]) > reach for j in [*taken, *out]):
-            out.append(int(k))
-        if len(out) == wanted:
-            break
-    return out
+    places, place = np.unique(point, axis=0, return_inverse=True)
+    least = np.full(len(places), np.inf)
+    np.minimum.at(least, place, score)
+    near = cKDTree(places).query(places, k=min(NEIGHBOURS + 1, len(places)))[1]
+    bottom = least <= least[near.reshape(len(places), -1)].min(axis=1)
+    bottom[place[list(taken)]] = False
+    bottoms = np.flatnonzero(bottom & np.isfinite(least))
+    best = bottoms[np.argsort(least[bottoms], kind="stable")][:wanted]
+    return [int(np.argmin(np.where(place == at, score, np.inf))) for at in best]

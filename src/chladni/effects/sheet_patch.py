@@ -16,7 +16,7 @@ from .effect import Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location, in_mm
 from .family import Article
-from .search_context import Candidate, SearchContext, best_places, distinct
+from .search_context import Candidate, SearchContext, best_places, valleys
 
 BELL, RIMMED = (0.0, 0.3), (float(np.log(2.0)), 0.5)  # ln p and sd: pressed; cut or glued on
 RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
@@ -198,11 +198,10 @@ class SheetPatch(Effect):
         for about, base in enumerate(context.bases):
             amount, score = context.scan.field_scores(about, cls.quantity, changes)
             score = np.where((amount > least) & (amount < most), score, np.inf)
-            for k in distinct(score, centre, taken, cls.followed):
-                if np.isfinite(score[k]):
-                    taken.append(k)
-                    start = np.array([cls.begun(float(amount[k])), *starts[k][1:]])
-                    out.append(Candidate(effects[k], start, base))
+            for k in valleys(score, centre, taken, cls.followed):
+                taken.append(k)
+                start = np.array([cls.begun(float(amount[k])), *starts[k][1:]])
+                out.append(Candidate(effects[k], start, base))
         return out
 
 

@@ -283,7 +283,7 @@ def _spoken_for(context: SearchContext, effect: ViscoelasticJoint) -> float:
 def softer_beads(context: SearchContext) -> list[Candidate]:
     """The beads whose change of stiffness explains most."""
     effects = beads_of(context.where.groups.structure)
-    return best_places(context, effects, FOLLOWED, apart=-1.0, extended=True)
+    return best_places(context, effects, FOLLOWED, anywhere=True, extended=True)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
@@ -297,7 +297,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     effects = [_of_one(context, joint, families, len(tried)) for joint in tried]
     gain = np.array([_spoken_for(context, e) for e in effects])
     best = [effects[k] for k in np.argsort(-gain)[:FOLLOWED] if gain[k] > WORTH]
-    return best_places(context, best, FOLLOWED, apart=-1.0, extended=True)
+    return best_places(context, best, FOLLOWED, anywhere=True, extended=True)
 
 
 def soften(article: Article, rng: np.random.Generator) -> Article:

@@ -143,7 +143,7 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
     if context.scan is None:
         some = farthest_point_sample(np.array([tried[k][0].point for k in own]), BY_POLES)
         chosen = [effect(own[k]) for k in some]
-        return best_places(context, chosen, FOLLOWED, apart=-1.0, extended=True)
+        return best_places(context, chosen, FOLLOWED, anywhere=True, extended=True)
     alone = [kind((kind.strength(float(share.min())),)) for _, share in tried]
     left = np.array([[e.left(x[0])[0] for x in e.starts()] for e in alone])
     out: dict[int, Candidate] = {}

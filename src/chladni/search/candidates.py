@@ -10,7 +10,7 @@ import numpy as np
 from ..effects.effect import Effect, MatrixTerm, of
 from ..effects.effect_context import EffectContext, ElementGrids
 from ..effects.joints import Connection
-from ..effects.search_context import APART, Candidate
+from ..effects.search_context import Candidate
 from ..errors import ModelError
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import Responses
@@ -29,6 +29,7 @@ from ..reduced.reduced_model import evaluate
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .pole_starts import global_starts
 
+APART = 1 / 6  # of the structure's size: effects nearer to each other are one
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
 
