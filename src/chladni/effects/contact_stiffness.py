@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..geometry.clearance import all_gaps
-from ..geometry.refine import smooth_normals
+from ..geometry.folds import smooth_points
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect_context import ElementGrids
@@ -71,7 +71,7 @@ def close_places(assembly: Assembly) -> ClosePlaces:
     of e^50 in this way.
     """
     nodes, found = assembly.shells.nodes, []
-    smooth = smooth_normals(assembly)[1]
+    smooth = smooth_points(assembly)
     cell = np.full(len(assembly.points), -1)
     for gap in all_gaps(assembly):
         part = assembly.part(gap.parts[0])

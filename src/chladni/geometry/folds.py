@@ -3,8 +3,10 @@
 import numpy as np
 import scipy.sparse as sp
 
-from .facets import cell_normals
+from ..model.assembly import Assembly
+from .facets import cell_normals, point_normals
 
+SMOOTH = np.cos(np.radians(35.0))  # a point is at a fold if a facet is farther from their mean
 FOLDED = np.cos(np.radians(20.0))  # a fold is where normals of shells at one grid differ by more
 
 
@@ -28,3 +30,15 @@ def share_at_folds(points: np.ndarray, cells: np.ndarray, folded: float = FOLDED
     both = holds[:, meet.row[at]].multiply(holds[:, meet.col[at]])
     fold = np.asarray(both.sum(axis=1)).ravel() > 0
     return np.asarray(fold[cells].mean(axis=1))
+
+
+def smooth_points(assembly: Assembly) -> np.ndarray:
+    """Mask of the points away from folds, where all facets are of one part (n,)."""
+    nodes = assembly.shells.nodes
+    face, mean = (of(assembly.points, nodes) for of in (cell_normals, point_normals))
+    least, low, high = (np.full(len(mean), v) for v in (1.0, 1e9, -1e9))
+    for k in range(4):
+        np.minimum.at(least, nodes[:, k], np.einsum("ij,ij->i", face, mean[nodes[:, k]]))
+        np.minimum.at(low, nodes[:, k], assembly.shells.part)
+        np.maximum.at(high, nodes[:, k], assembly.shells.part)
+    return (least > SMOOTH) & (low == high)

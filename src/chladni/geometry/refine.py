@@ -1,7 +1,8 @@
 """Refinement of a structure, every shell split in four and every beam in two, to find mesh error.
 
-On a smooth sheet new nodes lie on the smooth surface through the old ones: cubic edges from vertex
-normals (Vlachos et al. 2001, Curved PN triangles). At folds they lie on the chord.
+New nodes lie on the deck's own facets. Cubic edges from vertex normals (Vlachos et al. 2001, Curved
+PN triangles) are closer to a cylinder, but they round the flat strip between two creases. On a
+tailgate of 20 mm they left 1.4 % of the frequencies of a mesh of 10 mm, and chords leave 0.6 %.
 """
 
 from dataclasses import replace
@@ -11,10 +12,8 @@ import numpy as np
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Beams, Shells, picked
 from .beam_lines import member_beams
-from .facets import cell_normals, point_normals
 
 SAME_AXES = 1e-6  # of unit vectors: frames of neighbours that count as equal for supports
-SMOOTH = np.cos(np.radians(35.0))  # facets whose normals differ by more form a fold
 
 
 def refined(assembly: Assembly) -> Assembly:
@@ -37,15 +36,10 @@ def _finer_shells(assembly: Assembly) -> tuple[Assembly, Middles]:
         return assembly, (np.zeros((0, 2), int), 0)
     tri = shells.triangle
     edges, of = _edges(shells.nodes)
-    normal, smooth = smooth_normals(assembly)
-    middle = _bent(assembly.points, edges, normal, smooth)
+    middle = assembly.points[edges].mean(axis=1)
     n, m = len(assembly.points), len(edges)
     quads = shells.nodes[~tri]
-    centre = assembly.points[quads].mean(axis=1)
-    sides = middle[of[~tri]]
-    # the centre of a bent patch: Coons' blend of its sides
-    centre = sides.mean(axis=1) * 2 - centre if len(quads) else centre
-    points = np.concatenate([assembly.points, middle, centre])
+    points = np.concatenate([assembly.points, middle, assembly.points[quads].mean(axis=1)])
     grown, _ = with_points(assembly, points[n:])
     grown = _held_between(grown, np.arange(n, n + m), edges)
     grown = _held_between(grown, np.arange(n + m, len(points)), quads)
@@ -112,32 +106,6 @@ def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     flat = np.sort(pairs.reshape(-1, 2), axis=1)
     edges, of = np.unique(flat, axis=0, return_inverse=True)
     return edges, of.reshape(-1, 4)
-
-
-def smooth_normals(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """Vertex normals (n, 3), and a mask of the points where all facets of one part agree (n,)."""
-    nodes = assembly.shells.nodes
-    face, total = (of(assembly.points, nodes) for of in (cell_normals, point_normals))
-    least, low, high = (np.full(len(total), v) for v in (1.0, 1e9, -1e9))
-    for k in range(4):
-        np.minimum.at(least, nodes[:, k], np.einsum("ij,ij->i", face, total[nodes[:, k]]))
-        np.minimum.at(low, nodes[:, k], assembly.shells.part)
-        np.maximum.at(high, nodes[:, k], assembly.shells.part)
-    return total, (least > SMOOTH) & (low == high)
-
-
-def _bent(
-    points: np.ndarray, edges: np.ndarray, normal: np.ndarray, smooth: np.ndarray
-) -> np.ndarray:
-    """Middle of each edge on the cubic through both ends, normal to both normals."""
-    a, b = points[edges[:, 0]], points[edges[:, 1]]
-    n_a, n_b = normal[edges[:, 0]], normal[edges[:, 1]]
-    d = b - a
-    lift = (
-        np.einsum("ij,ij->i", d, n_a)[:, None] * n_a - np.einsum("ij,ij->i", d, n_b)[:, None] * n_b
-    )
-    both = (smooth[edges[:, 0]] & smooth[edges[:, 1]])[:, None]
-    return (a + b) / 2 - np.where(both, lift / 8, 0.0)
 
 
 def parents(shells: Shells) -> np.ndarray:
