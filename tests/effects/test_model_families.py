@@ -1,12 +1,14 @@
 """Factors on joints and on the shear of shells: exact, harmless at nought, never negative."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.effect import Effect, FieldChange, Parameter
 from chladni.effects.element_groups import element_groups
 from chladni.effects.model_families import (
     ADHESIVE,
@@ -17,6 +19,7 @@ from chladni.effects.model_families import (
 )
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Bushes
+from chladni.reduced.accuracy import products
 from chladni.reduced.reduced_model import evaluate, reduce
 from chladni_specimens.plates import folded_panel
 
@@ -62,6 +65,53 @@ def test_idle_at_nought_and_positive_far_away(jointed):
     assert_allclose(zero.lam, evaluate(model, [], np.zeros(0), False).lam, rtol=1e-9, atol=1e-3)
     for x in (-4.0, 4.0):
         assert evaluate(model, found, np.full(len(found), x), False).lam.min() > -1e-3 * zero.lam[9]
+
+
+@dataclass(frozen=True, eq=False)
+class Soft(Effect):
+    """One group of shells whose E (or t) is e^x times the deck's."""
+
+    quantity: Literal["E", "t"] = "E"
+    own: np.ndarray = field(default_factory=lambda: np.zeros((0, 1)))
+
+    def terms(self, x):
+        """The field over the groups."""
+        return (FieldChange(self.quantity, self.own[:, 0] * x[0], self.own),)
+
+
+@pytest.fixture(scope="module")
+def softened(jointed):
+    """The panel over all its dofs, its shear factors, and a group of shells that softens."""
+    built = structure(jointed)
+    groups = element_groups(built)
+    basis = normal_modes(built.system, 200).shapes  # up to where a single shell bends
+    own, unknown = np.eye(len(groups))[:, :1], (Parameter("soft", "-", 0.0, 1.0),)
+    soft = [Soft(unknown, quantity=q, own=own) for q in "Et"]
+    return reduce(groups, basis), model_families(built)[1:], soft
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_shear_takes_no_more_than_a_soft_patch_leaves(softened, which):
+    """Taken from the deck's own stiffness, it would leave the patch with negative shear."""
+    model, shear, soft = softened
+    x = np.append(np.full(len(shear), -1.0), -2.5)
+    K = products(model, [*shear, soft[which]], x, np.eye(model.vectors.shape[0]))[0]
+    stiffness = np.linalg.eigvalsh((K + K.T) / 2)
+    assert stiffness.min() > -1e-9 * stiffness.max()
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_slopes_know_of_the_limit(softened, which):
+    model, shear, soft = softened
+    effects, x, h = [*shear, soft[which]], np.append(np.full(len(shear), -0.7), -1.5), 1e-6
+    state = evaluate(model, effects, x)
+    for p, e in enumerate(np.eye(len(x))):
+        up, down = (evaluate(model, effects, x + s * h * e, False).lam for s in (1, -1))
+        due = np.einsum("im,ij,jm->m", state.phi, state.dK[p], state.phi) - state.lam * np.einsum(
+            "im,ij,jm->m", state.phi, state.dM[p], state.phi
+        )
+        at = slice(6, 30)
+        assert_allclose((up - down)[at] / (2 * h), due[at], rtol=1e-4, atol=1e-5 * state.lam[30])
 
 
 @pytest.mark.parametrize("far", [1.0, 30.0])

@@ -139,13 +139,18 @@ class Rise:
 
 @dataclass(frozen=True, eq=False)
 class MatrixTerm:
-    """c A added to K or M: A (n, n) symmetric, c, dc/dx (n_parameters,)."""
+    """c A added to K or M: A (n, n) symmetric, c, dc/dx (n_parameters,).
+
+    ``part`` is the position of the part of which A is a share, or None. A negative c is then a
+    share of the part where it is softest, so that fields of stiffness leave the sum positive.
+    """
 
     matrix: Literal["K", "M"]
     operator: sp.csr_array
     coefficient: float
     gradient: np.ndarray
     rise: Rise | None = None
+    part: int | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,11 +41,13 @@ class ModelFamily(Effect):
     traits = Traits(writable=False)
 
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    part: int | None = None  # position of the part whose shells the family belongs to
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The operator of the family times the change of the factor."""
         (factor,), (v,) = self.parameters, x
-        return (MatrixTerm("K", self.operator, factor.value(v) - 1, np.array([factor.slope(v)])),)
+        change, slope = factor.value(v) - 1, np.array([factor.slope(v)])
+        return (MatrixTerm("K", self.operator, change, slope, part=self.part),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ def shared_factor(name: str, family: str, sd: float) -> Parameter:
 
 def model_families(built: Structure) -> list[ModelFamily]:
     """Every family of joints, and the transverse shear of every part."""
-    return [*joint_nuisances(built), *_families(dict(_shear(built)))]
+    return [*joint_nuisances(built), *_shear(built)]
 
 
 def joint_nuisances(built: Structure) -> list[ModelFamily]:
@@ -122,7 +124,7 @@ def _bushes(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
         yield "bushes", of_lumps(built, "bushes", own.tolist()).K, FASTENER
 
 
-def _shear(built: Structure) -> Iterator[tuple[str, tuple[sp.csr_array, float]]]:
+def _shear(built: Structure) -> Iterator[ModelFamily]:
     """γᵀS γ of every part with a share of more than ``FEWEST`` of the shells' area."""
     assembly = built.assembly
     shells = assembly.shells
@@ -139,4 +141,5 @@ def _shear(built: Structure) -> Iterator[tuple[str, tuple[sp.csr_array, float]]]
         arrays = section_arrays(alone, geo)
         A = shell.stiffness(geo, alone.shells.thickness, S=arrays.S, reference=arrays.Qm)
         K = congruence(built.T, blocks(A, alone.shells.nodes, len(assembly.points)))
-        yield f"shear of {assembly.parts[k].name}", (K, SHEAR)
+        text = f"shear of {assembly.parts[k].name}"
+        yield ModelFamily((shared_factor("k", text, SHEAR),), text, operator=K, part=int(k))

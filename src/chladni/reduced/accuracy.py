@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from ..dynamics.reduction import beyond
 from ..effects.effect import Effect, MatrixTerm, PointTerm, Term, of
 from .effect_dofs import acting_at, own_part, own_positions
-from .field_factors import log_fields, mass_log, stiffness_log
+from .field_factors import limited, log_fields, mass_log, stiffness_log
 from .frequency_dependent_stiffness import UnrisenModes, applied
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import ReducedProblem
@@ -112,7 +112,8 @@ def products(
     n_own, u = len(q) - n, q[:n]
     K, M = system.elastic @ u, system.M @ u
     acting = acting_at(effects, x)
-    fields = log_fields(acting, len(groups), len(x), "" not in model.linear)[0]
+    split = "" not in model.linear
+    fields, slopes = log_fields(acting, len(groups), len(x), split)
     logs = {k: v[groups.group, None, None] for k, v in fields.items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces():
@@ -132,7 +133,8 @@ def products(
             b = sp.hstack([rows, idle, own], format="csr")
             added = b.T @ (term.coefficient[:, None] * (b @ q))
             K, M = (K + added, M) if term.matrix == "K" else (K, M + added)
-        for part in of(MatrixTerm, terms):
+        for given in of(MatrixTerm, terms):
+            part = limited(given, groups.part, fields, slopes, split)[0]
             m = part.operator.shape[0]
             strained = applied(part, u[:m], frame, system.M)
             added = np.pad(part.coefficient * strained, ((0, len(q) - m), (0, 0)))

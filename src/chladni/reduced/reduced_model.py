@@ -32,7 +32,7 @@ from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
-from .field_factors import log_fields, mass_log, stiffness_log
+from .field_factors import limited, log_fields, mass_log, stiffness_log
 from .frequency_dependent_stiffness import Dissipated, Rising
 from .matrix_stack import MatrixStack, add_slopes, bordered, whole
 from .real_modes import real_modes
@@ -255,7 +255,8 @@ def evaluate(
     """
     n_p = count(effects)
     acting = acting_at(effects, x)
-    logs, slopes = log_fields(acting, len(model.groups), n_p, "" not in model.linear)
+    split = "" not in model.linear
+    logs, slopes = log_fields(acting, len(model.groups), n_p, split)
     r, n_own = len(model.K0), sum(effect.traits.own_dofs for effect in effects)
     K, M, dK, dM = (with_own(A, n_own) for A in _shells(model, logs, slopes, gradient))
     weight, dweight = _weight(model, logs, slopes)
@@ -280,7 +281,8 @@ def evaluate(
                 for p, db in moved.items():
                     half = (b.T * term.coefficient) @ db
                     slope[at.start + p] += half + half.T
-        for part in of(MatrixTerm, terms):
+        for given in of(MatrixTerm, terms):
+            part, dlog = limited(given, model.groups.part, logs, slopes, split)
             A = with_own(model.operator(part.operator), n_own)
             target, slope = (K, dK) if part.matrix == "K" else (M, dM)
             rising.add(part, A, at)
@@ -289,6 +291,8 @@ def evaluate(
                 base.add_operator(part, model.vectors, at)
             if gradient:
                 slope[at] += part.gradient[:, None, None] * A
+                for k in np.flatnonzero(dlog):
+                    slope[k] += part.coefficient * dlog[k] * A
         extra, d_extra, _ = effect.weight(x[at])
         weight, dweight[at] = weight + extra, dweight[at] + d_extra
         for change in of(ChannelChange, terms):
