@@ -22,11 +22,15 @@ class Share:
     Attributes
     ----------
     times : size of the effects over scatter and mesh together; 0 for cases without an effect
+    named : named right, or among several names; without an effect, named at all
+    cases : all of this size
+    listed : these, and those that "calibration alone, or one of" lists
     """
 
     times: float
     named: int
     cases: int
+    listed: int
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -37,16 +41,21 @@ class Share:
 
 
 def shares(rows: Sequence[Row]) -> list[Share]:
-    """Share named right or among several, by size; first that of false alarms without an effect.
+    """Share named, and share named or listed, by size; first those of false alarms.
 
     Cases whose size was not set belong to no share.
     """
-    nulls = [r["outcome"] in ("wrong", "among") for r in rows if r["effect"] in NULLS]
-    out = [Share(0.0, sum(nulls), len(nulls))] if nulls else []
+    nulls = [r for r in rows if r["effect"] in NULLS]
+    out = [_share(0.0, nulls, ("wrong", "among"))] if nulls else []
     for times in sorted({r["times"] for r in rows if r["times"] is not None}):
-        named = [r["outcome"] in NAMED for r in rows if r["times"] == times]
-        out.append(Share(times, sum(named), len(named)))
+        out.append(_share(times, [r for r in rows if r["times"] == times], NAMED))
     return out
+
+
+def _share(times: float, rows: Sequence[Row], counted: tuple[str, ...]) -> Share:
+    named = [r["outcome"] in counted for r in rows]
+    listed = [n or r["listed"] for n, r in zip(named, rows, strict=True)]
+    return Share(times, sum(named), len(rows), sum(listed))
 
 
 def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[Share]]:
@@ -55,15 +64,19 @@ def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[
     Each folder is a curve, so that two versions of a diagnosis stand side by side.
     """
     found = {str(out): shares(score([out], lambda text: None)) for out in outs}
-    lines = [f"{'':24}{'size':>6}{'named':>7}{'of':>5}   90 % interval"]
+    lines = [f"{'':24}{'size':>6}{'named':>7}{'listed':>8}{'of':>5}   90 % interval of named"]
     for name, every in found.items():
         for s in every:
             size = f"{s.times:g}" if s.times else "none"
             low, high = s.interval
             lines.append(
-                f"{name[-22:]:24}{size:>6}{s.named:>7}{s.cases:>5}   {low:.0%} to {high:.0%}"
+                f"{name[-22:]:24}{size:>6}{s.named:>7}{s.listed:>8}{s.cases:>5}   "
+                f"{low:.0%} to {high:.0%}"
             )
-    lines.append("size: change of the responses over that by scatter and mesh; none: false alarms")
+    lines += [
+        "size: change of the responses over that by scatter and mesh; none: false alarms",
+        "listed: named, or one of several with calibration alone",
+    ]
     write_json(outs[0] / "power.json", {n: [vars(s) for s in every] for n, every in found.items()})
     write_text(outs[0] / "power.txt", "\n".join(lines) + "\n")
     curves = {

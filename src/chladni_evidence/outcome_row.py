@@ -47,8 +47,9 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     ``outcome`` is one of: right; part (some of several hidden effects, and nothing else); wrong;
     none (no name, though an effect was hidden); admitted (the answer is "not known"); among
     (several indistinguishable names, one of them right); refused; crash. ``by_evidence`` is the
-    outcome without the veto of held-out data. ``plain`` is the answer of calibration alone, for
-    comparison.
+    outcome without the veto of held-out data. ``listed``: "one of" has all of the truth, also next
+    to calibration alone; without an effect, it has any name. ``plain`` is the answer of calibration
+    alone, for comparison.
     """
     d, kind = answer.result, truth["effect"]
     truth = {**truth, "effect": catalogued(kind)}
@@ -62,6 +63,7 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
         "called": name,
         "outcome": outcome_of(answer, name, truth),
         "by_evidence": outcome_of(answer, vetoed or name, truth),
+        "listed": _listed(d, truth),
         "vetoed": vetoed,
         "veto_right": None if vetoed is None else not _is(vetoed, truth),
         "kin": _kin(name, truth),
@@ -113,6 +115,12 @@ def outcome_of(answer: Answer, name: str, truth: Row) -> str:
         return "part"
     apart = set((given - hidden) + (hidden - given))
     return "among" if any(apart <= names for names in among) else "wrong"
+
+
+def _listed(d: Row, truth: Row) -> bool:
+    lists = [set(names) for names in d.get("one_of") or []]
+    hidden = set() if truth["effect"] in NULLS else set(members(truth["effect"]))
+    return any(hidden <= names for names in lists)
 
 
 def _is(called: str, truth: Row) -> bool:

@@ -11,26 +11,29 @@ from chladni_evidence.blind_power import Share, power, shares
 from chladni_evidence.evidence_sets import Order, of_sizes
 
 SIZED = [
-    {"effect": "point-mass", "times": t, "outcome": o}
+    {"effect": "point-mass", "times": t, "outcome": o, "listed": o in ("none", "among")}
     for t, o in ((1.0, "none"), (1.0, "right"), (2.0, "among"), (2.0, "right"), (2.0, "wrong"))
 ]
-NULLS = [{"effect": "nothing", "times": None, "outcome": o} for o in ("right", "wrong", "admitted")]
+NULLS = [
+    {"effect": "nothing", "times": None, "outcome": o, "listed": o == "right"}
+    for o in ("right", "wrong", "admitted")
+]
 
 
 def test_a_wrong_name_is_no_power_and_a_name_of_nothing_is_an_alarm():
-    usual = {"effect": "crack", "times": None, "outcome": "right"}
+    usual = {"effect": "crack", "times": None, "outcome": "right", "listed": False}
     assert shares([*SIZED, *NULLS, usual]) == [
-        Share(0.0, 1, 3), Share(1.0, 1, 2), Share(2.0, 2, 3),
+        Share(0.0, 1, 3, 2), Share(1.0, 1, 2, 2), Share(2.0, 2, 3, 2),
     ]  # fmt: skip
 
 
 def test_intervals_hold_their_share_and_narrow_as_the_root_of_the_cases():
-    few, many = Share(1.0, 8, 10), Share(1.0, 800, 1000)
+    few, many = Share(1.0, 8, 10, 8), Share(1.0, 800, 1000, 800)
     assert few.interval[0] < 0.8 < few.interval[1]
     widths = [s.interval[1] - s.interval[0] for s in (few, many)]
     assert widths[0] / widths[1] == pytest.approx(10.0, rel=0.1)
-    assert Share(1.0, 0, 5).interval[0] == 0.0
-    assert Share(1.0, 5, 5).interval[1] == 1.0
+    assert Share(1.0, 0, 5, 0).interval[0] == 0.0
+    assert Share(1.0, 5, 5, 5).interval[1] == 1.0
 
 
 def test_folders_stand_side_by_side(tmp_path, monkeypatch):

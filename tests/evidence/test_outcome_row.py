@@ -122,6 +122,23 @@ def test_intervals_of_parts_together_are_held_against_their_mean():
     assert covered == {"E": [1, 1], "rho": [0, 0], "t": [0, 1], "wall": [0, 0], "effect": [0, 0]}
 
 
+@pytest.mark.parametrize(
+    ("lists", "truth", "listed"),
+    [
+        ([["calibration alone", "crack"]], told("crack"), True),
+        ([["calibration alone", "crack"]], told("point-mass"), False),
+        ([["crack"], ["sensor-mass", "point-mass"]], told("point-mass + sensor-mass"), True),
+        ([["crack", "point-mass"]], told("point-mass + sensor-mass"), False),
+        ([], told("crack"), False),
+        ([["calibration alone", "crack"]], told("nothing"), True),
+        ([], told("nothing"), False),
+    ],
+)
+def test_a_list_counts_if_all_of_the_truth_is_in_it(lists, truth, listed):
+    given = answer(None, "calibration only", one_of=lists)
+    assert row(given, truth)["listed"] is listed
+
+
 @pytest.mark.parametrize(("sigmas", "inside"), [(1.6, 1), (1.7, 0), (-1.6, 1), (-1.7, 0)])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_an_interval_of_95_percent_is_scored_as_one_of_90(sigmas, inside, sign):
