@@ -34,8 +34,12 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Ends of the interval; 0 or 1 where no or every case counts."""
-        k, n = self.named, self.cases
+        """Ends of the interval of the share named."""
+        return self.ends(self.named)
+
+    def ends(self, k: int) -> tuple[float, float]:
+        """Ends of the interval where k cases count; 0 or 1 where none or every case does."""
+        n = self.cases
         low = 0.0 if k == 0 else float(beta.ppf(0.05, k + 0.5, n - k + 0.5))
         return low, 1.0 if k == n else float(beta.ppf(0.95, k + 0.5, n - k + 0.5))
 
@@ -80,10 +84,14 @@ def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[
     write_json(outs[0] / "power.json", {n: [vars(s) for s in every] for n, every in found.items()})
     write_text(outs[0] / "power.txt", "\n".join(lines) + "\n")
     curves = {
-        name: ([s.times for s in every], [s.named / s.cases for s in every],
-               [s.interval for s in every])
+        f"{Path(name).name}: {what}": (
+            [s.times for s in every],
+            [getattr(s, kind) / s.cases for s in every],
+            [s.ends(getattr(s, kind)) for s in every],
+        )
         for name, every in found.items()
-    }  # fmt: skip
+        for kind, what in (("named", "named"), ("listed", "named or listed"))
+    }
     shares_over_size(outs[0] / "power.png", curves)
     for line in lines:
         say(line)

@@ -66,7 +66,7 @@ def shares_over_size(
     for (label, (size, share, ends)), colour in zip(curves.items(), cycle(_COLOURS)):
         low, high = np.array(ends).T
         off = np.array([share - low, high - share])
-        ax.errorbar(size, share, off, marker="o", capsize=3, color=colour, label=label)
+        ax.errorbar(size, share, off, marker="o", capsize=3, color=colour, label=label, ls=":")
     ax.set_ylim(-0.03, 1.03)
     ax.set_xlabel("size of the effect, times scatter and mesh (0: no effect, false alarms)")
     ax.set_ylabel("share named")
