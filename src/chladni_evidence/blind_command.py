@@ -106,8 +106,9 @@ def power(
 ) -> None:
     """Share of effects named over their size, and false alarms.
 
-    Each folder is a curve. Cases are made with `blind make --sizes`. Opens the truths, as score
-    does; writes power.json, power.txt and power.png into the first folder.
+    Each folder has two curves, named and listed. Cases are made with
+    `blind make --sizes`. Opens the truths, as score does; writes power.json,
+    power.txt and power.png into the first folder.
     """
     from .blind_power import power
 

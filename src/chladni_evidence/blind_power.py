@@ -65,7 +65,7 @@ def _share(times: float, rows: Sequence[Row], counted: tuple[str, ...]) -> Share
 def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[Share]]:
     """Score folders one by one; write power.json, power.txt and power.png into the first.
 
-    Each folder is a curve, so that two versions of a diagnosis stand side by side.
+    Each folder has two curves, named and listed; two versions of a diagnosis stand side by side.
     """
     found = {str(out): shares(score([out], lambda text: None)) for out in outs}
     lines = [f"{'':24}{'size':>6}{'named':>7}{'listed':>8}{'of':>5}   90 % interval of named"]
@@ -84,7 +84,7 @@ def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[
     write_json(outs[0] / "power.json", {n: [vars(s) for s in every] for n, every in found.items()})
     write_text(outs[0] / "power.txt", "\n".join(lines) + "\n")
     curves = {
-        f"{Path(name).name}: {what}": (
+        f"{name}: {what}": (
             [s.times for s in every],
             [getattr(s, kind) / s.cases for s in every],
             [s.ends(getattr(s, kind)) for s in every],

@@ -44,12 +44,13 @@ VETO = re.compile(rf"(\S+) gained .* in -2 ln evidence, but (?:{_VETOES})")
 def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     """The row of one case.
 
-    ``outcome`` is one of: right; part (some of several hidden effects, and nothing else); wrong;
-    none (no name, though an effect was hidden); admitted (the answer is "not known"); among
-    (several indistinguishable names, one of them right); refused; crash. ``by_evidence`` is the
-    outcome without the veto of held-out data. ``listed``: "one of" has all of the truth, also next
-    to calibration alone; without an effect, it has any name. ``plain`` is the answer of calibration
-    alone, for comparison.
+    ``outcome`` is right, wrong, refused, crash or one of these. Part: some of several hidden
+    effects, and nothing else. None: no name, though an effect was hidden. Admitted: the answer is
+    "not known". Among: several indistinguishable names, one of them right.
+
+    ``by_evidence`` is the outcome without the veto of held-out data. ``listed`` is true if a list
+    of "one of" holds all of the truth; without a hidden effect, if there is any list. ``plain`` is
+    the answer of calibration alone, for comparison.
     """
     d, kind = answer.result, truth["effect"]
     truth = {**truth, "effect": catalogued(kind)}

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.stats import kstest
 
 from .outcome_row import NULLS, QUANTITIES, Row
 from .outside_kinds import OUTSIDE
@@ -106,6 +107,18 @@ def _figures(rows: Sequence[Row]) -> Iterator[str]:
             f"held-out Q of the right names: {median:.0%} of the way from calibration to the "
             f"floor (median of {len(shares)})"
         )
+    yield from _tests_of_fit([r for r in rows if r["outcome"] == "right"])
+
+
+def _tests_of_fit(right: Sequence[Row]) -> Iterator[str]:
+    """Median and uniformity of p for right answers, by the mesh of their articles."""
+    for mesh in sorted({r["mesh"] for r in right}):
+        p = np.array([r["p"] for r in right if r["mesh"] == mesh and r["p"] is not None], float)
+        if len(p := p[np.isfinite(p)]):
+            yield (
+                f"p of the test of fit, {mesh}: {len(p)} right, median {np.median(p):.2f}, "
+                f"least {p.min():.2f}, uniform p {kstest(p, 'uniform').pvalue:.2g}"
+            )
 
 
 def _costs(rows: Sequence[Row]) -> Iterator[str]:

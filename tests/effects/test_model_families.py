@@ -81,7 +81,7 @@ class Soft(Effect):
 
 @pytest.fixture(scope="module")
 def softened(jointed):
-    """The panel over all its dofs, its shear factors, and a group of shells that softens."""
+    """The panel over 200 modes, its shear factors, and a group of shells that softens."""
     built = structure(jointed)
     groups = element_groups(built)
     basis = normal_modes(built.system, 200).shapes  # up to where a single shell bends

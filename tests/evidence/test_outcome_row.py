@@ -223,6 +223,18 @@ def test_what_an_answer_leaves_open_is_no_crash():
     assert (r["outcome"], r["p"], r["gain_share"]) == ("none", None, None)
 
 
+def test_uniformity_of_p_is_of_right_answers_by_mesh():
+    """Of two values with a largest distance d = 0.4, p = 1 - 2 (2d - 1/2)² = 0.82."""
+    right = row(answer(), told())
+    rows = [{**right, "mesh": m, "p": p} for m, p in (("a", 0.2), ("a", 0.6), ("b", 0.5))]
+    rows += [{**right, "mesh": "b", "p": None}, {**right, "outcome": "wrong", "p": 0.001}]
+    lines = [line for line in overall(rows).splitlines() if line.startswith("p of the test")]
+    assert lines == [
+        "p of the test of fit, a: 2 right, median 0.40, least 0.20, uniform p 0.82",
+        "p of the test of fit, b: 1 right, median 0.50, least 0.50, uniform p 1",
+    ]
+
+
 def test_tables_add_up():
     """Every case once in the matrix; an unknown effect named is wrong, a null named an alarm."""
     rows = [

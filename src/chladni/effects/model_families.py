@@ -142,4 +142,6 @@ def _shear(built: Structure) -> Iterator[ModelFamily]:
         A = shell.stiffness(geo, alone.shells.thickness, S=arrays.S, reference=arrays.Qm)
         K = congruence(built.T, blocks(A, alone.shells.nodes, len(assembly.points)))
         text = f"shear of {assembly.parts[k].name}"
+        if not K.nnz:
+            continue
         yield ModelFamily((shared_factor("k", text, SHEAR),), text, operator=K, part=int(k))
