@@ -109,10 +109,12 @@ def cases(reduced):
         "membrane-prestress": (pulled, [0.4, -0.2], [0, 0]),
         "mesh-error": (over, [1.0], [0]),
         "joint-footprint": (
-            mesh.JointFootprint(over.parameters, over.text, rows=over.rows, change=over.change),
+            mesh.JointFootprint(
+                over.parameters, over.text, rows=over.rows, omega=over.omega, log=over.log
+            ),
             [1.0], [0],
         ),
-        "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
+        "jitter": (own, 0.01 * np.sin(np.arange(len(own.omega)) + 1), np.zeros(len(own.omega))),
     }  # fmt: skip
     ones = (Parameter("k", "-", 0.0, 0.4),)
     found["fold-bending"] = (
@@ -205,7 +207,8 @@ def test_modal_discrepancy_moves_every_mode_by_itself(cases):
     case = cases["jitter"]
     state = evaluate(case.model, [case.effect], case.x, False)
     n = len(case.x)
-    assert_allclose(np.sort(case.effect.lam * (1 + case.x)), state.lam[6 : 6 + n], rtol=1e-8)
+    due = np.sort(case.effect.omega**2 * np.exp(case.x))
+    assert_allclose(due, state.lam[6 : 6 + n], rtol=1e-8)
 
 
 HEAVIER = (

@@ -69,7 +69,7 @@ def test_slopes_of_responses(reduced, responses, effects):
 
 def test_slopes_where_a_finer_mesh_moves_sensors_and_shakers(reduced, responses, effects):
     plain = mesh_errors(solved(reduced.structure, 400.0), 200.0)[0]
-    moved = np.cos(np.arange(6 * len(plain.change))).reshape(6, -1)
+    moved = np.cos(np.arange(6 * len(plain.omega))).reshape(6, -1)
     error = replace(plain, shapes=0.2 * moved)
     still = replace(plain, shapes=np.zeros((0, 0)))
     x = np.array([0.02, 0.7])

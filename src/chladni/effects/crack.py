@@ -17,11 +17,13 @@ from ..geometry.facets import cell_areas, cell_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
-from .effect import Effect, MatrixTerm, Parameter, Traits
+from .effect import Effect, MatrixTerm, Parameter, Traits, Within
 from .element_groups import ElementGroups
 from .estimate import Estimate, in_mm
 from .family import Article, Family
+from .model_families import within_shear
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
+from .shell_components import shear_matrices
 
 LEAST_LEFT = 0.1  # of the bending stiffness always remains, so that K stays positive
 SHELLS = 3  # in a line at least
@@ -165,7 +167,7 @@ def _far_apart(score: np.ndarray, centre: np.ndarray) -> list[int]:
 class Crack(Effect):
     """K - (1 - f) Σ_line B_e, B_e the bending stiffness, f = 0.1 + 0.9 / (1 + e^x) the rest of it.
 
-    With f > 0 the sum stays positive: at most B is subtracted from A + B.
+    A change of thickness, modulus or shear of the sheet multiplies B_e (:class:`.effect.Within`).
     """
 
     name = "crack"
@@ -176,14 +178,23 @@ class Crack(Effect):
     )
 
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    bending: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    shear: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    within: tuple[Within, Within] = (Within(), Within())  # of bending, and of shear
     line: Line | None = None
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """(f - 1) B."""
+        """(f - 1) B, bending and the shear that comes with it."""
         f = left(x[0])
         slope = -(f - LEAST_LEFT) * (1 - (f - LEAST_LEFT) / (1 - LEAST_LEFT))
-        return (MatrixTerm("K", self.operator, f - 1, np.array([slope])),)
+        return tuple(
+            MatrixTerm("K", A, f - 1, np.array([slope]), within=within)
+            for A, within in zip((self.bending, self.shear), self.within, strict=True)
+        )
+
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
+        """B φ."""
+        return sp.csr_array(((self.bending + self.shear) @ shapes).T)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Give the shells of the line their own property, with 12I/t³ times f."""
@@ -203,7 +214,16 @@ def left(x: float) -> float:
 def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     """A crack along one line, out of ``tried`` lines."""
     assembly, on = groups.structure.assembly, line.shells
-    K = blocks(groups.cubic[on], groups.nodes[on], len(assembly.points))
+    built, shear = groups.structure, shear_matrices(assembly, on)[1]
+    bending, shear = (
+        congruence(built.T, blocks(A, groups.nodes[on], len(assembly.points)))
+        for A in (groups.cubic[on] - shear, shear)
+    )
+    pieces = frozenset(("bending", int(i)) for i in assembly.shells.ids[on])
+    within = (
+        Within(pieces, shells=on, bending=True),
+        replace(within_shear(assembly.shells, on), bending=True),
+    )
     name, (x, y, z) = assembly.parts[line.part].name, line.centre.tolist()
     starts = (-1.5, -0.5, 0.5, 1.5, 2.5)
     unknown = Parameter("12I/T3", "-", 0.0, 1.5, kind="linear", starts=starts, nominal=-40.0)
@@ -211,7 +231,7 @@ def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     return Crack(
         (unknown,), f"on {name} through ({in_mm(line.centre)} mm)", (name,), point=(x, y, z),
         radius=float(reach), grids=tuple(assembly.ids[np.unique(groups.nodes[on])].tolist()),
-        trials_factor=tried, shells=on, operator=congruence(groups.structure.T, K), line=line,
+        trials_factor=tried, shells=on, bending=bending, shear=shear, within=within, line=line,
     )  # fmt: skip
 
 

@@ -14,24 +14,29 @@ from ..fem.modelled import Modelled, modelled
 from ..geometry.footprints import on_smaller_shells, regions_of_joints
 from ..geometry.refine import refined
 from ..model.assembly import Assembly
-from .effect import Effect, Parameter, PointTerm, ShapeChange, Term, Traits
+from .effect import Effect, ModalFactor, Parameter, ShapeChange, Term, Traits
 
 MOST_DOFS = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
 LARGE = 20_000  # dofs from which refined modes are solved only up to the comparison limit
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
-SOFTEST = 0.45  # largest loss of modal stiffness by a finer mesh: twice as much leaves a rest
 FOOTPRINT = 0.5, 0.7  # prior of the footprint error: as in the deck, half or a quarter as wide
 REGIONS = 4  # regions of joints with their own footprints; each needs one refined solution
 
 
 @dataclass(frozen=True, eq=False)
 class MeshError(Effect):
-    """Change of modal stiffness: x times that of a mesh twice as fine.
+    """Modal stiffness Λ^½ e^{x L} Λ^½: that of a mesh twice as fine at x = 1.
 
-    ``change`` (k,) [rad²/s²] is its diagonal over coordinates ``rows`` (k, n). ``shapes`` (p, k) is
-    the change of motion at the measured places for each of these coordinates.
+    Relative errors are extrapolated, not differences, so no mode loses all of its stiffness.
+
+    Attributes
+    ----------
+    rows : (k, n)              coordinates of the modes of the deck
+    omega : (k,) [rad/s]
+    log : (k, k)               L
+    shapes : (p, k)            change of motion at the measured places by each coordinate
     """
 
     name = "mesh-error"
@@ -39,12 +44,13 @@ class MeshError(Effect):
     kind = "nuisance"
 
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    change: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    omega: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    log: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def terms(self, x: np.ndarray) -> tuple[Term, ...]:
-        """x ΔK over the modes, and x times the change of their shapes at sensors and shaker."""
-        own = PointTerm("K", self.rows, x[0] * self.change, self.change[:, None], strained=True)
+        """x L over the modes, and x times the change of their shapes at sensors and shaker."""
+        own = ModalFactor(self.rows, self.omega, x[0] * self.log, self.log[None])
         if not len(self.shapes):
             return (own,)
         return own, ShapeChange(self.rows, self.shapes, float(x[0]), np.ones(1))
@@ -52,7 +58,7 @@ class MeshError(Effect):
 
 @dataclass(frozen=True, eq=False)
 class ModalDiscrepancy(Effect):
-    """Independent small errors of the stiffness of each mode."""
+    """Independent small errors x_r of the logarithm of the stiffness of each mode."""
 
     name = "jitter"
     claim = "another element formulation gives slightly different frequencies"
@@ -60,16 +66,17 @@ class ModalDiscrepancy(Effect):
     traits = Traits(writable=False)
 
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    lam: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    omega: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """λ_r x_r on the diagonal of the modal stiffness."""
-        return (PointTerm("K", self.rows, self.lam * x, np.diag(self.lam), strained=True),)
+    def terms(self, x: np.ndarray) -> tuple[ModalFactor, ...]:
+        """λ_r e^{x_r} of each mode."""
+        each = np.eye(len(x))
+        return (ModalFactor(self.rows, self.omega, np.diag(x), each[:, :, None] * each[:, None]),)
 
 
 @dataclass(frozen=True, eq=False)
 class JointFootprint(MeshError):
-    """Change of modal stiffness: x times that of joints on shells half as wide."""
+    """Relative change of modal stiffness: x times that of joints on shells half as wide."""
 
     name = "joint-footprint"
     claim = "a joint acts over the width of one shell of the mesh, not over its real width"
@@ -86,7 +93,7 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     different shells.
 
     The refined modes Ψ at the old points are paired with the modes Φ. B = ΦᵀMΨ is made orthogonal,
-    softest modes first, and ΔK = B Λ_ref Bᵀ - Λ. B is square, so that x = 1 gives the refined
+    softest modes first, and Λ^½ e^L Λ^½ = B Λ_ref Bᵀ. B is square, so that x = 1 gives the refined
     frequencies exactly.
     """
     built = model.structure
@@ -127,70 +134,66 @@ def _nowhere(built: Structure) -> sp.csr_array:
 
 @dataclass(frozen=True, eq=False)
 class _ModalChange:
-    """Changes by another mesh, over the modes of the deck MΦ (n, r).
+    """Changes by another mesh, over the modes of the deck: their coordinates ΦᵀM (r, n), ω (r,).
 
-    ``stiffness`` (r, r) is the change of the modal stiffness λ (r,), ``seen`` (p, r) that of the
-    mode shapes at the measured places.
+    ``log`` (r, r) is the logarithm of the relative change of modal stiffness, ``seen`` (p, r) the
+    change of the mode shapes at the measured places.
     """
 
-    M_phi: np.ndarray
-    lam: np.ndarray
-    stiffness: np.ndarray
+    rows: sp.csr_array
+    omega: np.ndarray
+    log: np.ndarray
     seen: np.ndarray
 
     def __sub__(self, other: Self) -> Self:
         """The difference of two changes."""
-        left = self.stiffness - other.stiffness
-        return replace(self, stiffness=left, seen=self.seen - other.seen)
+        return replace(self, log=self.log - other.log, seen=self.seen - other.seen)
 
     def error(self, kind: type[MeshError], prior: tuple[float, float]) -> MeshError:
         """The nuisance effect with this change."""
-        change, V = np.linalg.eigh(self._within_reach())
         unknown = Parameter("mesh", "-", *prior, kind="linear", step=0.5)
-        rows = sp.csr_array((self.M_phi @ V).T)
-        return kind((unknown,), "every mode", rows=rows, change=change, shapes=self.seen @ V)
-
-    def _within_reach(self) -> np.ndarray:
-        """The change of stiffness, limited on a coarse mesh so that twice the loss leaves a rest.
-
-        The change is linear in x, and a mode with five shells a wave would lose more than it has.
-        """
-        root = np.sqrt(self.lam)
-        share, V = np.linalg.eigh(self.stiffness / np.outer(root, root))
-        if share.min(initial=0.0) > -SOFTEST:
-            return self.stiffness
-        W = root[:, None] * V
-        return (W * np.maximum(share, -SOFTEST)) @ W.T
+        return kind(
+            (unknown,), "every mode", rows=self.rows, omega=self.omega, log=self.log,
+            shapes=self.seen,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class _CoarseModes:
-    """The modes of the deck: λ (r,), MΦ (n, r), Φ at the measured places (p, r)."""
+    """The modes of the deck: ω (r,), ΦᵀM (r, n), Φ at the measured places (p, r)."""
 
     dofs: np.ndarray
-    lam: np.ndarray
-    M_phi: np.ndarray
+    omega: np.ndarray
+    rows: sp.csr_array
     at_places: np.ndarray
     places: Places
 
     @classmethod
     def of(cls, built: Structure, modes: ModalModel, places: Places) -> Self:
         """Collect the modes of the deck's structure."""
-        lam, phi = (2 * np.pi * modes.frequency) ** 2, modes.shapes
-        return cls(built.system.dofs, lam, built.system.M @ phi, places(built) @ phi, places)
+        rows, phi = sp.csr_array((built.system.M @ modes.shapes).T), modes.shapes
+        return cls(
+            built.system.dofs, 2 * np.pi * modes.frequency, rows, places(built) @ phi, places
+        )
 
     def changed_to(self, finer: Structure, modes: ModalModel) -> _ModalChange:
         """The change by a finer structure with modes Ψ."""
-        overlap = self.M_phi.T @ (finer.rows(self.dofs) @ modes.shapes)
+        overlap = self.rows @ (finer.rows(self.dofs) @ modes.shapes)
         own, partner = linear_sum_assignment(-(overlap**2))
-        soft = np.argsort(self.lam[own], kind="stable")
+        soft = np.argsort(self.omega[own], kind="stable")
         own, partner = own[soft], partner[soft]
         B = _orthogonal(overlap[np.ix_(own, partner)])
-        lam = (2 * np.pi * modes.frequency[partner]) ** 2
-        stiffness, seen = np.zeros((len(self.lam),) * 2), np.zeros_like(self.at_places)
-        stiffness[np.ix_(own, own)] = (B * lam) @ B.T - np.diag(self.lam[own])
+        half = B * (2 * np.pi * modes.frequency[partner]) / self.omega[own, None]
+        log, seen = np.zeros((len(self.omega),) * 2), np.zeros_like(self.at_places)
+        log[np.ix_(own, own)] = _log(half @ half.T)
         seen[:, own] = self.places(finer) @ modes.shapes[:, partner] @ B.T - self.at_places[:, own]
-        return _ModalChange(self.M_phi, self.lam, (stiffness + stiffness.T) / 2, seen)
+        return _ModalChange(self.rows, self.omega, log, seen)
+
+
+def _log(A: np.ndarray) -> np.ndarray:
+    """Logarithm of a positive definite matrix."""
+    w, V = np.linalg.eigh(A)
+    return np.asarray((V * np.log(w)) @ V.T)
 
 
 def _orthogonal(overlap: np.ndarray) -> np.ndarray:
@@ -198,7 +201,6 @@ def _orthogonal(overlap: np.ndarray) -> np.ndarray:
 
     Another mass matrix puts δM_ij of a soft mode i into a stiff one j, and only λ_i/λ_j as much of
     j into i. The polar factor would share both evenly and turn the soft mode towards the stiff one.
-    For x beyond 1 this acts as a loss of x(x - 1) λ_j δM_ij²/4, which can exceed λ_i.
     """
     Q, R = np.linalg.qr(overlap)
     return np.asarray(Q * np.where(np.diag(R) < 0, -1.0, 1.0))
@@ -213,17 +215,17 @@ def modal_discrepancy(
     mesh.
     """
     modes = _flexible(model.up_to(1.1 * f_max), f_max)
-    lam = (2 * np.pi * modes.frequency) ** 2
-    own = np.zeros(len(lam))
+    own = np.zeros(len(modes.frequency))
     if mesh is not None:
         b = mesh.rows @ modes.shapes
-        own = 0.5 * np.abs((b.T * mesh.change) @ b).diagonal() / (2 * lam)
+        own = 0.5 * np.abs(b.T @ mesh.log @ b).diagonal() / 2
     unknown = tuple(
         Parameter(f"mode {r + 1}", "-", 0.0, 2 * float(std), kind="linear", step=0.02)
         for r, std in enumerate(np.hypot(sd, own))
     )
     rows = sp.csr_array((model.structure.system.M @ modes.shapes).T)
-    return ModalDiscrepancy(unknown, "every mode", rows=rows, lam=lam)
+    omega = 2 * np.pi * modes.frequency
+    return ModalDiscrepancy(unknown, "every mode", rows=rows, omega=omega)
 
 
 def _flexible(modes: ModalModel, f_max: float) -> ModalModel:

@@ -1,6 +1,6 @@
 """Effects: possible differences between model and test article, and their terms in the model.
 
-An effect acts on the reduced model in five ways only (:data:`Term`):
+An effect acts on the reduced model in six ways only (:data:`Term`):
 
 - It multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
   stiffness) on groups of shells. It multiplies calibrated operators and never subtracts nominal
@@ -8,7 +8,9 @@ An effect acts on the reduced model in five ways only (:data:`Term`):
 - It adds *point terms* c(p) bᵀb to K or M, with rows b of the structure (a spring, a mass) and of
   dofs that it brings along (a mass on a spring). An effect that releases clamps
   (fem/released.py) has rows beyond the dofs of the deck.
-- It adds *operators* c(p) A, c > -1, where A is the contribution of a part to K or M.
+- It adds *operators* c(p) A, c > -1, where A is the contribution of a part to K or M. Where A is a
+  share of other operators or of sheets (:class:`Within`), their factors multiply it.
+- It changes the *modes* of the stiffness, K to GᵀKG (the mesh, the footprints of joints).
 - It changes *channels* of the test: gain, sign.
 - It changes *shapes* at the measured places only (the mesh around a sensor).
 
@@ -94,8 +96,7 @@ class PointTerm:
 
     If the place is unknown, ``moving`` holds ∂b/∂x for the parameters that move it. If the effect
     has its own dofs, ``own`` (k, own_dofs) is b on these. A moving base carries them as it carries
-    the rows ``carrier`` of the structure. If a clamp is released, ``strained`` rows take only the
-    deformation, without the motion that follows the clamp.
+    the rows ``carrier`` of the structure.
     """
 
     matrix: Literal["K", "M"]
@@ -105,7 +106,6 @@ class PointTerm:
     moving: dict[int, sp.csr_array] = field(default_factory=dict)
     own: np.ndarray | None = None
     carrier: sp.csr_array | None = None
-    strained: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,11 +138,32 @@ class Rise:
 
 
 @dataclass(frozen=True, eq=False)
+class Within:
+    """The whole of which an operator A is a share: its changes multiply a change of A.
+
+    A term c A adds c m A. The factor m is left of A by all changes of the whole. Hence c > -1
+    leaves the stiffness positive.
+
+    Attributes
+    ----------
+    pieces : contents of A, each a kind and an id: ("joint", 17). Operators with more are the whole
+    complete : whether A is all that the pieces have, so that 1 + c multiplies their shares
+    shells : rows of the shells of whose stiffness A is a share; their softest group sets m
+    bending : A is a share of their bending alone
+    """
+
+    pieces: frozenset[tuple[str, int]] = frozenset()
+    complete: bool = True
+    shells: np.ndarray | None = None
+    bending: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class MatrixTerm:
     """c A added to K or M: A (n, n) symmetric, c, dc/dx (n_parameters,).
 
-    ``part`` is the position of the part of which A is a share, or None. A negative c is then a
-    share of the part where it is softest, so that fields of stiffness leave the sum positive.
+    ``within`` is the whole of which A is a share. A ``geometric`` A has no sign (a membrane force).
+    All of these together take at most 0.99 of the stiffness of any motion.
     """
 
     matrix: Literal["K", "M"]
@@ -150,7 +171,28 @@ class MatrixTerm:
     coefficient: float
     gradient: np.ndarray
     rise: Rise | None = None
-    part: int | None = None
+    within: Within | None = None
+    geometric: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ModalFactor:
+    """Λ e^L in place of the stiffness Λ = diag(ω²) of some modes Φ, L symmetric.
+
+    K becomes GᵀKG with G = I + Φ (Λ^-½ e^{L/2} Λ^½ - I) ΦᵀM. The logarithms L of all effects on the
+    same ``rows`` are added. K stays positive. Motion that follows a released clamp is not strained.
+
+    Attributes
+    ----------
+    rows : (k, n)      ΦᵀM
+    omega : (k,) [rad/s]
+    log, gradient : L (k, k), ∂L/∂x (n_parameters, k, k)
+    """
+
+    rows: sp.csr_array
+    omega: np.ndarray
+    log: np.ndarray
+    gradient: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +218,8 @@ class ShapeChange:
     gradient: np.ndarray
 
 
-Term = FieldChange | PointTerm | MatrixTerm | ChannelChange | ShapeChange
-Kind = TypeVar("Kind", FieldChange, PointTerm, MatrixTerm, ChannelChange, ShapeChange)
+Term = FieldChange | PointTerm | MatrixTerm | ModalFactor | ChannelChange | ShapeChange
+Kind = TypeVar("Kind", FieldChange, PointTerm, MatrixTerm, ModalFactor, ChannelChange, ShapeChange)
 
 
 class Weight(NamedTuple):

@@ -7,9 +7,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..model.assembly import Assembly
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter, Within
 from .joints import Connection, with_factor_on, with_family
-from .model_families import JointFamilies, shared_factor
+from .model_families import JointFamilies, JointFamily, shared_factor, within_joints
 
 NONE_ELSE = 1e-9  # of a family's stiffness: with less of it elsewhere, the joint is all of it
 
@@ -20,23 +20,25 @@ def _nothing() -> sp.csr_array:
 
 @dataclass(frozen=True, eq=False)
 class JointStiffness(Effect):
-    """K + (f - 1) K_j + (g - 1) Σ_{i≠j} K_i: the joint times f(x_0), others of its family times g.
+    """K + (g - 1) Σ_i K_i + (f/g - 1) g K_j: the joint times f(x_0), others of its family times g.
 
     The last parameter is ln g, where there are others. It takes the place of the factor that a
-    family shares. Hence no joint loses more than it has, and K stays positive. With ``own_loads``
+    family shares. The joint is within its family, so each factor multiplies what the other left
+    (:class:`.effect.Within`), also where two effects act on one family. With ``own_loads``
     the basis contains (P⁻¹ A)ᵏ φ, which spans the mode change for any stiffness of the joint.
 
     Attributes
     ----------
     joint : what it is in the deck
     family : name of its family, "" for a joint of none
-    operator, others : contribution to K of the joint, and of all others of its family
+    operator : contribution to K of the joint
+    whole : its family with other members, or None
     """
 
     joint: Connection | None = None
     family: str = ""
     operator: sp.csr_array = field(default_factory=_nothing)
-    others: sp.csr_array = field(default_factory=_nothing)
+    whole: JointFamily | None = None
 
     @classmethod
     def of(
@@ -52,17 +54,15 @@ class JointStiffness(Effect):
         own : contribution of the joint to K; bᵀ b of its rows by default
         """
         own = sp.csr_array(joint.rows.T @ joint.rows) if own is None else own
-        others = _nothing()
-        if family in families:
-            K, sd = families[family]
-            left = sp.csr_array(K - own)
-            if abs(left).max() > NONE_ELSE * abs(K).max():
-                others, unknown = left, (*unknown, shared_factor(shared, family, sd))
+        whole = None
+        if known := families.get(family):
+            if abs(known.operator - own).max() > NONE_ELSE * abs(known.operator).max():
+                whole, unknown = known, (*unknown, shared_factor(shared, family, known.sd))
         x, y, z = joint.point.tolist()
         return cls(
             unknown, text, joint.parts, joint.grids, point=(x, y, z), trials_factor=tried,
             replaces=(family,) if family in families else (), joint=joint, family=family,
-            operator=own, others=others, **more,
+            operator=own, whole=whole, **more,
         )  # fmt: skip
 
     def factor(self, x: np.ndarray) -> tuple[float, float]:
@@ -75,23 +75,30 @@ class JointStiffness(Effect):
         return None
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The terms of the joint and of the others."""
-        f, slope = self.factor(x)
-        own = MatrixTerm("K", self.operator, f - 1, slope * np.eye(len(x))[0])
-        return (own, *self.of_others(x))
+        """The terms of the family and of the joint."""
+        (f, slope), (g, dg) = self.factor(x), self.shared(x)
+        gradient = slope / g * np.eye(len(x))[0] - f / g**2 * dg
+        own = MatrixTerm("K", self.operator, f / g - 1, gradient, within=self.within)
+        return (own, *self.of_family(x))
 
     @property
-    def has_others(self) -> bool:
-        """True if the last parameter is the factor of the others."""
-        return self.others.nnz > 0
+    def within(self) -> Within:
+        """The elements of the joint."""
+        return within_joints(() if self.joint is None else self.joint.ids)
 
-    def of_others(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The term of the others, if there are any."""
-        if not self.has_others:
-            return ()
+    def shared(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Factor g on the family and its gradient (n_p,); 1 where the joint is all of it."""
+        if self.whole is None:
+            return 1.0, np.zeros(len(x))
         p = self.parameters[-1]
-        slope = p.slope(x[-1]) * np.eye(len(x))[-1]
-        return (MatrixTerm("K", self.others, p.value(x[-1]) - 1, slope),)
+        return p.value(x[-1]), p.slope(x[-1]) * np.eye(len(x))[-1]
+
+    def of_family(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """The term of the family, if it has other members."""
+        if self.whole is None:
+            return ()
+        g, dg = self.shared(x)
+        return (MatrixTerm("K", self.whole.operator, g - 1, dg, within=self.whole.within),)
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """A φ of the joint; the basis already represents all of its family together."""
@@ -100,13 +107,9 @@ class JointStiffness(Effect):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write the joint as fitted, and the others as fitted with it."""
         assert self.joint is not None
-        g = self.factor_of_others(x)
+        g, _ = self.shared(x)
         made = with_family(assembly, self.family, g)
         return with_factor_on(made, self.joint, self.factor(x)[0] / g, self.loss(x))
-
-    def factor_of_others(self, x: np.ndarray) -> float:
-        """Factor g on all others."""
-        return self.parameters[-1].value(x[-1]) if self.has_others else 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,7 +72,7 @@ class MembranePrestress(Effect):
             / np.sqrt(s)
         )
         every = zip(self.operators, self.force(x), slope, strict=True)
-        return tuple(MatrixTerm("K", K, float(N), g) for K, N, g in every)
+        return tuple(MatrixTerm("K", K, float(N), g, geometric=True) for K, N, g in every)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write CELAS2 between the grids of the part, and on the mean rotation of its rim."""

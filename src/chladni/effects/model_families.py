@@ -6,7 +6,7 @@ shear of a part. Two formulations of one element differ most in it (MacNeal's re
 flexibility is a part of it), and so do coarse and fine meshes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,20 +15,40 @@ import scipy.sparse as sp
 from ..fem import shell
 from ..fem.assemble import Structure
 from ..fem.derivative import by_part, of_lumps
-from ..fem.energy import only
-from ..fem.shell_section import section_arrays
 from ..fem.sparse_assembly import blocks, congruence
-from ..model.assembly import Assembly
+from ..model.assembly import Assembly, Shells
 from ..model.properties import Isotropic, ShellSection, SolidSection
-from .effect import Effect, MatrixTerm, Parameter, Traits
-from .joints import SOFT, with_family
+from .effect import Effect, MatrixTerm, Parameter, Traits, Within
+from .joints import solid_parts, with_family
+from .shell_components import shear_matrices
 
 ADHESIVE, WELD, FASTENER = 0.5, 0.3, 0.5  # prior sd of ln k
 JOINTS = "adhesive", "welds", "bushes"  # names of the families of joints
 FAR = 3.0  # limit of scatter in prior standard deviations
 SHEAR = 0.5  # prior sd of ln of the transverse shear stiffness of a part
-JointFamilies = dict[str, tuple[sp.csr_array, float]]  # name: operator in K, prior sd of ln k
 FEWEST = 0.002  # share of the shells' area below which a part has no factor of its own
+
+
+@dataclass(frozen=True, eq=False)
+class JointFamily:
+    """All joints of one kind: their contribution to K, their elements, and the prior sd of ln k."""
+
+    operator: sp.csr_array
+    within: Within
+    sd: float
+
+
+JointFamilies = dict[str, JointFamily]
+
+
+def within_shear(shells: Shells, rows: np.ndarray) -> Within:
+    """The share of the transverse shear of sheets that some shells have."""
+    return Within(frozenset(("shear", int(i)) for i in shells.ids[rows]), shells=rows)
+
+
+def within_joints(ids: Iterable[int]) -> Within:
+    """The share of joints that consists of these elements."""
+    return Within(frozenset(("joint", int(i)) for i in ids))
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +61,13 @@ class ModelFamily(Effect):
     traits = Traits(writable=False)
 
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    part: int | None = None  # position of the part whose shells the family belongs to
+    within: Within = field(default_factory=Within)
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The operator of the family times the change of the factor."""
         (factor,), (v,) = self.parameters, x
         change, slope = factor.value(v) - 1, np.array([factor.slope(v)])
-        return (MatrixTerm("K", self.operator, change, slope, part=self.part),)
+        return (MatrixTerm("K", self.operator, change, slope, within=self.within),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +86,9 @@ class CalibratedFamily(ModelFamily):
 
 def calibrated_family(family: ModelFamily) -> CalibratedFamily:
     """Make a family of joints writable as a number of the deck."""
-    return CalibratedFamily(family.parameters, family.text, operator=family.operator)
+    return CalibratedFamily(
+        family.parameters, family.text, operator=family.operator, within=family.within
+    )
 
 
 def shared_factor(name: str, family: str, sd: float) -> Parameter:
@@ -91,37 +113,45 @@ def joint_nuisances(built: Structure) -> list[ModelFamily]:
 
 def _families(found: JointFamilies) -> list[ModelFamily]:
     return [
-        ModelFamily((shared_factor("k", text, sd),), text, operator=K)
-        for text, (K, sd) in found.items()
-        if K.nnz
+        ModelFamily(
+            (shared_factor("k", text, each.sd),), text, operator=each.operator, within=each.within
+        )
+        for text, each in found.items()
+        if each.operator.nnz
     ]
 
 
 def joint_families(built: Structure) -> JointFamilies:
     """Every family of joints that the structure has."""
-    return {name: (K, sd) for name, K, sd in (*_solids(built), *_bushes(built))}
+    return dict((*_solids(built), *_bushes(built)))
 
 
-def _solids(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
+def _solids(built: Structure) -> Iterator[tuple[str, JointFamily]]:
     """Solids in a model with shells, classified as adhesive or welds by their modulus."""
     assembly = built.assembly
-    kinds: dict[float, list[sp.csr_array]] = {}
-    used = {int(p) for group in assembly.solids for p in np.unique(group.part)}
-    for k in sorted(used if len(assembly.shells) else ()):
-        section = assembly.parts[k].section
-        if isinstance(section, SolidSection) and isinstance(section.material, Isotropic):
-            E = section.material.E
-            sd = ADHESIVE if E < SOFT else WELD
-            kinds.setdefault(sd, []).append(E * by_part(built, k, "E").K)
-    for sd, found in kinds.items():
-        yield "adhesive" if sd == ADHESIVE else "welds", sp.csr_array(sum(found[1:], found[0])), sd
+    for name, sd in (("adhesive", ADHESIVE), ("welds", WELD)) if len(assembly.shells) else ():
+        found = list(solid_parts(assembly, name == "adhesive"))
+        parts = sorted({int(assembly.solids[g].part[rows[0]]) for g, rows in found})
+        if parts:
+            each = (_modulus(assembly, k) * by_part(built, k, "E").K for k in parts)
+            ids = (int(i) for g, rows in found for i in assembly.solids[g].ids[rows])
+            yield name, JointFamily(sp.csr_array(sum(each)), within_joints(ids), sd)
 
 
-def _bushes(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
+def _modulus(assembly: Assembly, part: int) -> float:
+    section = assembly.parts[part].section
+    assert isinstance(section, SolidSection)
+    assert isinstance(section.material, Isotropic)
+    return section.material.E
+
+
+def _bushes(built: Structure) -> Iterator[tuple[str, JointFamily]]:
     """All bushes together."""
-    own = np.flatnonzero(built.assembly.bushes.ids > 0)  # not the firm springs in rigid ties
+    ids = built.assembly.bushes.ids
+    own = np.flatnonzero(ids > 0)  # not the firm springs in rigid ties
     if len(own):
-        yield "bushes", of_lumps(built, "bushes", own.tolist()).K, FASTENER
+        K = of_lumps(built, "bushes", own.tolist()).K
+        yield "bushes", JointFamily(K, within_joints(ids[own]), FASTENER)
 
 
 def _shear(built: Structure) -> Iterator[ModelFamily]:
@@ -136,12 +166,13 @@ def _shear(built: Structure) -> Iterator[ModelFamily]:
     for k in np.flatnonzero(area > FEWEST * area.sum()):
         if not isinstance(assembly.parts[k].section, ShellSection):
             continue
-        alone = only(assembly, int(k))
-        geo = shell.geometry(alone.points, alone.shells)
-        arrays = section_arrays(alone, geo)
-        A = shell.stiffness(geo, alone.shells.thickness, S=arrays.S, reference=arrays.Qm)
-        K = congruence(built.T, blocks(A, alone.shells.nodes, len(assembly.points)))
-        text = f"shear of {assembly.parts[k].name}"
-        if not K.nnz:
-            continue
-        yield ModelFamily((shared_factor("k", text, SHEAR),), text, operator=K, part=int(k))
+        mine, text = np.flatnonzero(shells.part == k), f"shear of {assembly.parts[k].name}"
+        A, nodes = shear_matrices(assembly, mine), shells.nodes[mine]
+        K = congruence(built.T, blocks(A.sum(axis=0), nodes, len(assembly.points)))
+        if K.nnz:
+            yield ModelFamily(
+                (shared_factor("k", text, SHEAR),),
+                text,
+                operator=K,
+                within=within_shear(shells, mine),
+            )

@@ -45,7 +45,8 @@ class OverConstraint(Fastener):
         """(f - 1) K_j, without a difference of nearly equal numbers."""
         k = self.parameters[0].value(x[0])
         lost = 1.0 / (1.0 + k / self.firm)
-        return (MatrixTerm("K", self.operator, -lost, np.array([lost * (1 - lost)])),)
+        slope = np.array([lost * (1 - lost)])
+        return (MatrixTerm("K", self.operator, -lost, slope, within=self.within),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CBUSH between the tie's independent grid and a new one that leads the others."""

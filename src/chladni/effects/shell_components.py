@@ -6,13 +6,14 @@ first derivative are exact.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..fem import shell
 from ..fem.shell import ShellGeometry
 from ..fem.shell_section import SectionArrays, section_arrays
-from ..model.assembly import Assembly
+from ..model.assembly import Assembly, picked
 
 COMPONENTS = {"Q11": ((0, 0),), "Q22": ((1, 1),), "Q12": ((0, 1), (1, 0)), "Q66": ((2, 2),)}
 
@@ -48,6 +49,17 @@ def component_matrices(assembly: Assembly) -> Iterator[tuple[str, Pair]]:
         )  # fmt: skip
         residual = arrays.shear_by_bending(geo, Qb)
         yield name, (linear, shell.stiffness(geo, t, Qb=Qb, S=residual, reference=reference))
+
+
+def shear_matrices(assembly: Assembly, rows: np.ndarray) -> np.ndarray:
+    """γᵀ S Z_s S γ and γᵀ S Z_r S γ of some shells (2, m, 24, 24), which grow with t and t³."""
+    shells = picked(assembly.shells, rows)
+    geo = shell.geometry(assembly.points, shells)
+    arrays = section_arrays(replace(assembly, shells=shells), geo)
+    return np.stack([
+        shell.stiffness(geo, shells.thickness, S=S, reference=arrays.Qm)
+        for S in _shear_split(arrays)
+    ])  # fmt: skip
 
 
 def _shear_split(arrays: SectionArrays) -> Pair:

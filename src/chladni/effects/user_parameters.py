@@ -28,11 +28,12 @@ from .calibration_parameters import (
     value,
     with_scaled,
 )
-from .effect import Effect, Parameter, Term, Weight
+from .effect import Effect, Parameter, Term, Weight, Within
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location
 from .joints import solid_parts
 from .linear_parameter import LinearScale, linear_scale
+from .model_families import within_joints
 
 UNITS = {
     **OF_FIELDS,
@@ -197,7 +198,18 @@ def _of_part(built: Structure, k: int, name: str) -> LinearScale:
         for h in (AWAY, -AWAY)
     )
     bent = Slope(*(v * (b - a) / (2 * AWAY) for a, b in zip(down, up, strict=True)))
-    return linear_scale(text, name, "-", 1.0, first, write, bent=bent)
+    return linear_scale(
+        text, name, "-", 1.0, first, write, bent=bent, within=_within(built.assembly, k, name)
+    )
+
+
+def _within(assembly: Assembly, k: int, name: str) -> Within:
+    """The whole of which the stiffness of a part of shells or solids is a share."""
+    shells = np.flatnonzero(assembly.shells.part == k)
+    if len(shells):
+        return Within(shells=shells)
+    ids = (i for group in assembly.solids for i in group.ids[group.part == k])
+    return replace(within_joints(ids), complete=name == "E")
 
 
 def _three(slope: Slope) -> tuple[Any, Any, Any]:
@@ -213,9 +225,11 @@ def _of_lumps(built: Structure, family: str, rows: Sequence[int]) -> LinearScale
     """K of springs or bushes, M of concentrated masses."""
     weight = sum(_mass(built.assembly, row) for row in rows) if family == "masses" else 0.0
     field = "M" if family == "masses" else "K"
+    ids = built.assembly.bushes.ids[list(rows)] if family == "bushes" else ()
     return linear_scale(
         f"{field} of {family}", field, "-", 1.0, of_lumps(built, family, rows),
         partial(_with_lumps, family=family, rows=tuple(rows)), weight_slope=weight,
+        within=within_joints(ids),
     )  # fmt: skip
 
 

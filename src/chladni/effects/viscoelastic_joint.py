@@ -108,9 +108,9 @@ class ViscoelasticJoint(JointStiffness):
         rise = Rise(a / 2, slope / 2 * e[1], self.reference, self.band, eta, eta * e[1])
         factor, _ = self.factor(x)
         return (
-            MatrixTerm("K", self.operator, -1.0, 0 * e[0]),
+            MatrixTerm("K", self.operator, -1.0, 0 * e[0], within=self.within),
             MatrixTerm("K", self.operator, factor, factor * e[0], rise),
-            *self.of_others(x),
+            *self.of_family(x),
         )
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:

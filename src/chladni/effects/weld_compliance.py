@@ -42,7 +42,7 @@ NEEDS = "welds, screws or bushes between sheets or beams"
 
 @dataclass(frozen=True, eq=False)
 class WeldCompliance(Fastener):
-    """K + (f - 1) K_j + (g - 1) Σ_{i≠j} K_i: the joint times f = s e^x, others of its family g."""
+    """The joint times f = s e^x, others of its family times g."""
 
     name = "weld-compliance"
     claim = "a weld or a fastener is softer than in the deck"
@@ -92,7 +92,7 @@ class WeldMissing(WeldCompliance):
         assert self.joint is not None
         if x[0] > NONE_LEFT:
             return super().apply(assembly, x)
-        made = with_family(assembly, self.family, self.factor_of_others(x))
+        made = with_family(assembly, self.family, self.shared(x)[0])
         return without_joint(made, self.joint)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:

@@ -18,12 +18,14 @@ from ..errors import ModelError
 from ..fem.assemble import Structure
 from ..fem.sparse_assembly import blocks, congruence
 from ..geometry.sampling import nearest_points
-from ..model.assembly import Assembly, Average, RigidBody
+from ..model.assembly import Assembly, Average, RigidBody, Shells
 from ..model.free_parameter import FreeParameter
-from .effect import Effect, MatrixTerm, Parameter, Traits
+from .effect import Effect, MatrixTerm, Parameter, Traits, Within
 from .element_groups import ElementGroups
 from .joints import fasteners
+from .model_families import within_shear
 from .property_bands import in_bands
+from .shell_components import shear_matrices
 from .stiffness_patch import softened
 
 FIELD, SPIDERS = "weld-patch", "rigid-patch"
@@ -35,14 +37,18 @@ LEAST = 0.05  # of the bell's height: shells with less of it are outside
 
 @dataclass(frozen=True, eq=False)
 class WeldPatch(Effect):
-    """K + Σ_rings (e^{x q_j(R)} - 1) K_j, parameters x and ln R."""
+    """K + Σ_rings (e^{x q_j(R)} - 1) K_j, parameters x and ln R.
+
+    The transverse shear is separate, for it has a factor of its own in every fit.
+    """
 
     name = "weld-patch"
     claim = "the sheet around welds is stiffer or softer than the part"
     kind = "calibration"
     traits = Traits(elastic=True)
 
-    operators: tuple[sp.csr_array, ...] = ()
+    operators: tuple[tuple[sp.csr_array, sp.csr_array], ...] = ()  # shear, and the rest of K_j
+    within: tuple[tuple[Within, Within], ...] = ()
     ring: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # of each shell, -1 outside
     distance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of each ring [m]
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of its shells [m²]
@@ -56,16 +62,20 @@ class WeldPatch(Effect):
         """The operators of the rings times the change of their factor."""
         q, dq = self.bell(x)
         return tuple(
-            MatrixTerm("K", A, np.expm1(x[0] * a), np.exp(x[0] * a) * np.array([a, x[0] * b]))
-            for A, a, b in zip(self.operators, q, dq, strict=True)
-        )
+            MatrixTerm(
+                "K", A, np.expm1(x[0] * a), np.exp(x[0] * a) * np.array([a, x[0] * b]),
+                within=within,
+            )
+            for both, of_both, a, b in zip(self.operators, self.within, q, dq, strict=True)
+            for A, within in zip(both, of_both, strict=True)
+        )  # fmt: skip
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """A φ of the patch as a whole, and of its innermost ring alone."""
         q, _ = self.bell(x)
-        inner = self.operators[0] @ shapes
-        whole = sum(a * (A @ shapes) for a, A in zip(q, self.operators, strict=True))
-        return sp.csr_array(np.hstack([whole, inner]).T)
+        rings = [sum(both) @ shapes for both in self.operators]
+        whole = sum(a * loads for a, loads in zip(q, rings, strict=True))
+        return sp.csr_array(np.hstack([whole, rings[0]]).T)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Give every ring of every part a property of its own."""
@@ -129,6 +139,7 @@ def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
     return kind(
         unknown, f"the patch about {len(each)} {what.split()[0]}", names, called=free.name,
         operators=tuple(_stiffness(built, groups, np.flatnonzero(ring == k)) for k in count),
+        within=tuple(_within(shells, np.flatnonzero(ring == k)) for k in count),
         ring=ring, distance=np.array([m[0] for m in mean]),
         variance=np.array([m[1] for m in mean]),
     )  # fmt: skip
@@ -178,7 +189,20 @@ def _rings(inside: np.ndarray, touching: np.ndarray, distance: np.ndarray) -> np
     return ring
 
 
-def _stiffness(built: Structure, groups: ElementGroups, rows: np.ndarray) -> sp.csr_array:
-    """Stiffness of some shells over the free dofs."""
-    matrices = groups.linear[rows] + groups.cubic[rows]
-    return congruence(built.T, blocks(matrices, groups.nodes[rows], len(built.assembly.points)))
+def _stiffness(
+    built: Structure, groups: ElementGroups, rows: np.ndarray
+) -> tuple[sp.csr_array, sp.csr_array]:
+    """Stiffness of some shells over the free dofs: that of shear, and the rest."""
+    shear = shear_matrices(built.assembly, rows).sum(axis=0)
+    rest = groups.linear[rows] + groups.cubic[rows] - shear
+    n, nodes = len(built.assembly.points), groups.nodes[rows]
+    return (
+        congruence(built.T, blocks(shear, nodes, n)),
+        congruence(built.T, blocks(rest, nodes, n)),
+    )
+
+
+def _within(shells: Shells, rows: np.ndarray) -> tuple[Within, Within]:
+    """The wholes of which both of them are shares."""
+    pieces = frozenset(("bending", int(i)) for i in shells.ids[rows])
+    return within_shear(shells, rows), Within(pieces, shells=rows)

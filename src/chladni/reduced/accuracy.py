@@ -18,8 +18,9 @@ import scipy.sparse as sp
 from ..dynamics.reduction import beyond
 from ..effects.effect import Effect, MatrixTerm, PointTerm, Term, of
 from .effect_dofs import acting_at, own_part, own_positions
-from .field_factors import limited, log_fields, mass_log, stiffness_log
+from .field_factors import log_fields, mass_log, multiplied, stiffness_log
 from .frequency_dependent_stiffness import UnrisenModes, applied
+from .modal_factors import ModalFactors, modal_factors
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import ReducedProblem
 
@@ -110,36 +111,53 @@ def products(
     system, groups = model.groups.structure.system, model.groups
     n = model.vectors.shape[0]
     n_own, u = len(q) - n, q[:n]
-    K, M = system.elastic @ u, system.M @ u
     acting = acting_at(effects, x)
+    v, factors = u, [(each, *_coordinates(model, each)) for each in modal_factors(acting)]
+    for each, modes, rows in reversed(factors):
+        v = v + modes @ (each.W @ (rows @ v))
+    K, M = system.elastic @ v, system.M @ u
     split = "" not in model.linear
     fields, slopes = log_fields(acting, len(groups), len(x), split)
-    logs = {k: v[groups.group, None, None] for k, v in fields.items()}
+    logs = {k: f[groups.group, None, None] for k, f in fields.items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces():
         change = change + sum(
             np.expm1(stiffness_log(logs, name, power)) * A
             for A, power in zip(pair, (1, 3), strict=True)
         )
-    K = K + _spread(model, np.asarray(change), u)
+    K = K + _spread(model, np.asarray(change), v)
     M = M + _spread(model, np.expm1(mass_log(logs)) * groups.mass, u)
-    K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
+    shares = [share.term for share in multiplied(acting, groups, fields, slopes, split)]
+    strained = model.deformed(v)
+    for part in shares:
+        m = part.operator.shape[0]
+        if part.matrix == "M":
+            M[:m] += part.coefficient * (part.operator @ u[:m])
+        elif part.rise is None:
+            K += model.load(part.coefficient * (part.operator @ strained[:m]))
+    for each, modes, rows in factors:
+        K = K + rows.T @ (each.W.T @ (modes.T @ K))
     frame = _without_rise(model, effects, x)
+    for part in (part for part in shares if part.rise is not None):
+        m = part.operator.shape[0]
+        K[:m] += part.coefficient * applied(part, u[:m], frame, system.M)
+    K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
     for (_, _, terms), first in zip(acting, own_positions(effects), strict=True):
         for term in of(PointTerm, terms):
-            rows = model.wide(term.rows, term.strained)
-            idle = sp.csr_array((rows.shape[0], n - rows.shape[1]))
+            idle = sp.csr_array((term.rows.shape[0], n - term.rows.shape[1]))
             own = sp.csr_array(own_part(term, first, n_own))
-            b = sp.hstack([rows, idle, own], format="csr")
+            b = sp.hstack([term.rows, idle, own], format="csr")
             added = b.T @ (term.coefficient[:, None] * (b @ q))
             K, M = (K + added, M) if term.matrix == "K" else (K, M + added)
-        for given in of(MatrixTerm, terms):
-            part = limited(given, groups.part, fields, slopes, split)[0]
-            m = part.operator.shape[0]
-            strained = applied(part, u[:m], frame, system.M)
-            added = np.pad(part.coefficient * strained, ((0, len(q) - m), (0, 0)))
-            K, M = (K + added, M) if part.matrix == "K" else (K, M + added)
     return K, M
+
+
+def _coordinates(model: Reduced, factors: ModalFactors) -> tuple[np.ndarray, sp.csr_array]:
+    """Modes Φ (n, k), and the rows (k, n) of the coordinates of all dofs in them."""
+    rows = model.wide(factors.rows, True)
+    idle = sp.csr_array((rows.shape[0], model.vectors.shape[0] - rows.shape[1]))
+    modes = model.vectors.combined(model.modes_of(factors.rows))
+    return modes, sp.csr_array(sp.hstack([rows, idle]))
 
 
 @dataclass(frozen=True, eq=False)

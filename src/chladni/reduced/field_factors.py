@@ -1,10 +1,11 @@
 """Factors on stiffness and mass of shells and beams, from their log fields."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.effect import FieldChange, MatrixTerm, of
+from ..effects.effect import FieldChange, MatrixTerm, Within, of
+from ..effects.element_groups import ElementGroups
 from ..effects.shell_components import COMPONENTS
 from ..errors import ModelError
 from .effect_dofs import Acting
@@ -45,29 +46,74 @@ def stiffness_log(fields: Fields, component: str, power: int) -> np.ndarray:
     return plain + fields[component] if component else plain
 
 
-def limited(
-    term: MatrixTerm, of_part: np.ndarray, logs: Fields, slopes: Fields, split: bool
-) -> tuple[MatrixTerm, np.ndarray]:
-    """A share of a part, not larger than the fields leave, and the slope of its logarithm (n_p,).
+@dataclass(frozen=True, eq=False)
+class TermShare:
+    """A term of an effect as the model has it: c A with ∂c/∂x (n_p,); ``at`` are its parameters."""
 
-    A share c A with c < 0 is taken from w_g A_g in each group g of the part; c min(w_g) keeps the
-    sum positive. The slope is zero where nothing is limited.
+    term: MatrixTerm
+    at: slice
+    gradient: np.ndarray
 
-    Parameters
-    ----------
-    of_part : (g,)       position of the part of each group
-    split : the model has components of the plane stiffness; shear goes with Q66
+    @property
+    def within(self) -> Within:
+        """The whole of which A is a share."""
+        return self.term.within or Within()
+
+
+def multiplied(
+    acting: Acting, groups: ElementGroups, logs: Fields, slopes: Fields, split: bool
+) -> list[TermShare]:
+    """The operators of all effects with c m in place of c, m what is left of A by the others.
+
+    Sheets leave the factor of their softest group. A term within others leaves 1 + c of what they
+    leave; of two that only overlap, a loss by the larger one counts. So the sum of all stays
+    positive where each c > -1.
     """
-    if term.part is None or term.coefficient >= 0:
-        return term, np.zeros(slopes["t"].shape[1])
-    mine = np.flatnonzero(of_part == term.part)
-    component = "Q66" if split else ""
-    every = [(stiffness_log(logs, component, p)[mine], p) for p in (1, 3)]
-    least, power = min(every, key=lambda pair: float(pair[0].min()))
-    softest = mine[int(np.argmin(least))]
+    every = [(at, term) for _, at, terms in acting for term in of(MatrixTerm, terms)]
+    done: list[TermShare] = []
+    for at, term in sorted(every, key=_size):
+        within = term.within or Within()
+        left, slope = _left_by_fields(within, groups, logs, slopes, split)
+        for other in done:
+            c = other.term.coefficient
+            if _counts(within, other.within, c):
+                left, slope = left + c, slope + other.gradient
+        if left < 0:
+            left, slope = 0.0, 0 * slope
+        gradient = term.coefficient * slope
+        gradient[at] += left * term.gradient
+        whole = replace(term, coefficient=left * term.coefficient, gradient=left * term.gradient)
+        done.append(TermShare(whole, at, gradient))
+    return done
+
+
+def _size(entry: tuple[slice, MatrixTerm]) -> int:
+    """Order of terms: the wholes before their shares."""
+    return 0 if entry[1].within is None else -len(entry[1].within.pieces)
+
+
+def _counts(mine: Within, its: Within, c: float) -> bool:
+    """True where a change c of pieces changes all of mine, or is a loss of some of them."""
+    if not (mine.pieces and its.complete):
+        return False
+    return mine.pieces <= its.pieces or (c < 0 and not mine.pieces.isdisjoint(its.pieces))
+
+
+def _left_by_fields(
+    within: Within, groups: ElementGroups, logs: Fields, slopes: Fields, split: bool
+) -> tuple[float, np.ndarray]:
+    """Factor of the softest group of some shells, and its slope (n_p,); 1 without shells."""
+    if within.shells is None:
+        return 1.0, np.zeros(slopes["t"].shape[1])
+    mine = np.unique(groups.group[within.shells])
+    options = [
+        (stiffness_log(logs, name, power)[mine], name, power)
+        for power in ((3,) if within.bending else (1, 3))
+        for name in (COMPONENTS if split else ("",))
+    ]
+    least, name, power = min(options, key=lambda option: float(option[0].min()))
     w = float(np.exp(least.min()))
-    slope = stiffness_log(slopes, component, power)[softest]
-    return replace(term, coefficient=w * term.coefficient, gradient=w * term.gradient), slope
+    return w, w * stiffness_log(slopes, name, power)[mine[int(np.argmin(least))]]
 
 
 def mass_log(fields: Fields) -> np.ndarray:

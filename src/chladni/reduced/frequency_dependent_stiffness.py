@@ -42,9 +42,8 @@ class UnrisenModes(NamedTuple):
 
 
 def applied(part: MatrixTerm, u: np.ndarray, frame: UnrisenModes, M: sp.csr_array) -> np.ndarray:
-    """A u on all dofs, or Gᵀ A G u (n, k); the rise is constant beyond the modes of the frame."""
-    if part.rise is None:
-        return np.asarray(part.operator @ u)
+    """Gᵀ A G u on all dofs (n, k); the rise is constant beyond the modes of the frame."""
+    assert part.rise is not None
     L = part.rise.log_frequency(frame.lam)
     g, rest = np.exp(part.rise.power * L)[:, None], np.exp(part.rise.power * L.max())
     modes, M_modes = frame.modes[: len(u)], M[: len(u), : len(u)] @ frame.modes[: len(u)]
@@ -117,9 +116,15 @@ class Rising:
         self.parts: list[tuple[MatrixTerm, np.ndarray, slice]] = []
 
     def add(self, part: MatrixTerm, A: np.ndarray, at: slice) -> None:
-        """Add an operator A (r, r), in K with its coefficient; ``at``: its parameters in x."""
-        if part.rise is not None:
-            self.parts.append((part, A, at))
+        """Take an operator A (r, r); ``at``: its parameters in x."""
+        self.parts.append((part, A, at))
+
+    def add_plain(self, K: np.ndarray, dK: np.ndarray) -> None:
+        """Add the parts without their rise to K (r, r) and its slopes (n_p, r, r)."""
+        for part, A, at in self.parts:
+            K += part.coefficient * A
+            if len(dK):
+                dK[at] += part.gradient[:, None, None] * A
 
     def over_basis(
         self, lam: np.ndarray, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray, M: np.ndarray,

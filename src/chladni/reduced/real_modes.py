@@ -21,13 +21,17 @@ def real_modes(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         lam, phi = sl.eigh(K, M, driver="gvd", check_finite=True)
     except (sl.LinAlgError, ValueError) as error:
         raise ModelError(f"an effect left no positive mass: {error}") from error
-    flexible = lam[lam > FLEXIBLE * lam[-1]]
-    if lam[0] < -max(1e-6 * float(np.median(flexible)), ROUNDING * lam[-1]):
+    if lam[0] < -max(1e-6 * float(np.median(lam[flexible(lam)])), ROUNDING * lam[-1]):
         raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
     rounding = np.finfo(float).eps * float(lam[-1])
     if rounding > SEEN:
         return _softest_first(K, M, 1e7 * rounding)
     return lam, phi
+
+
+def flexible(lam: np.ndarray) -> np.ndarray:
+    """Mask (m,) of the modes that are not rigid."""
+    return np.asarray(lam > FLEXIBLE * lam[-1])
 
 
 def _softest_first(K: np.ndarray, M: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:

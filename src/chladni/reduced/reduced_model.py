@@ -19,7 +19,6 @@ from ..effects.effect import (
     ChannelChange,
     Effect,
     FieldChange,
-    MatrixTerm,
     PointTerm,
     ShapeChange,
     count,
@@ -32,10 +31,12 @@ from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
-from .field_factors import limited, log_fields, mass_log, stiffness_log
+from .field_factors import log_fields, mass_log, multiplied
 from .frequency_dependent_stiffness import Dissipated, Rising
-from .matrix_stack import MatrixStack, add_slopes, bordered, whole
+from .matrix_stack import MatrixStack, bordered, whole
+from .modal_factors import modal_factors
 from .real_modes import real_modes
+from .running_sums import RunningSums
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,28 +92,63 @@ class Reduced:
             return old
         return np.hstack([old, wide @ self.vectors.blocks[-1][: wide.shape[1]]])
 
+    def modes_of(self, coordinates: sp.csr_array) -> np.ndarray:
+        """Modes Φ of the deck over the basis (r, k), from the rows ΦᵀM of their coordinates.
+
+        They lie in the basis of the deck. Vectors that were added to it are M-orthogonal to these.
+        """
+        inner = self
+        while inner._within is not None:
+            inner = inner._within
+        own = inner.rows(coordinates).T
+        return np.pad(own, ((0, self.vectors.shape[1] - len(own)), (0, 0)))
+
     def wide(self, rows: sp.csr_array, strained: bool) -> sp.csr_array:
         """The rows; ``strained`` ones get columns for clamps, less the motion that follows."""
         if not strained or self.following is None:
             return rows
         return sp.csr_array(sp.hstack([rows, sp.csr_array(-(rows @ self.following))]))
 
-    def operator(self, A: sp.csr_array) -> np.ndarray:
+    def operator(self, A: sp.csr_array, strained: bool = True) -> np.ndarray:
         """Φᵀ A Φ of a symmetric operator of the structure (r, r); projected once.
 
-        An extended model projects it on its new vectors alone.
+        An extended model projects it on its new vectors alone.  A ``strained`` operator sees only
+        deformation, without the motion that follows a released clamp.
         """
-        return self._once(A, lambda: self._projected(A))
+        return self._once(A, lambda: self._projected(A, strained))
 
-    def _projected(self, A: sp.csr_array) -> np.ndarray:
+    def _projected(self, A: sp.csr_array, strained: bool) -> np.ndarray:
+        vectors = self.deformation if strained else self.vectors
         if self._within is None:
-            return self.vectors.reduced(A)
-        old = self._within.operator(A)
+            return vectors.reduced(A)
+        old = self._within.operator(A, strained)
         r = len(old)
         if r == self.vectors.shape[1]:  # the same basis: only clamps were released
             return old
-        border = self.vectors.bordering(A)
+        border = vectors.bordering(A)
         return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
+
+    @property
+    def deformation(self) -> Basis:
+        """The basis at the dofs of the deck, less the motion that follows released clamps."""
+        if self.following is None:
+            return self.vectors
+        n = len(self.following)
+        return Basis(tuple(
+            b[:n] - self.following @ b[n:] if b[n:].any() else b[:n] for b in self.vectors.blocks
+        ))  # fmt: skip
+
+    def deformed(self, u: np.ndarray) -> np.ndarray:
+        """Motions (n, k) at the dofs of the deck, less the motion that follows released clamps."""
+        n = len(u) if self.following is None else len(self.following)
+        return u if self.following is None else np.asarray(u[:n] - self.following @ u[n:])
+
+    def load(self, f: np.ndarray) -> np.ndarray:
+        """Loads (n, k) on all dofs, of forces (m, k) on deformations."""
+        if self.following is None:
+            return np.pad(f, ((0, self.vectors.shape[0] - len(f)), (0, 0)))
+        f = np.pad(f, ((0, len(self.following) - len(f)), (0, 0)))
+        return np.concatenate([f, -self.following.T @ f])
 
     def _once(self, key: sp.csr_array, made: Callable[[], np.ndarray]) -> np.ndarray:
         known = self._seen.get(id(key))
@@ -258,41 +294,38 @@ def evaluate(
     split = "" not in model.linear
     logs, slopes = log_fields(acting, len(model.groups), n_p, split)
     r, n_own = len(model.K0), sum(effect.traits.own_dofs for effect in effects)
-    K, M, dK, dM = (with_own(A, n_own) for A in _shells(model, logs, slopes, gradient))
+    sums = RunningSums.of_fields(
+        model.K0, model.M0, (model.linear, model.cubic), model.mass, logs, slopes,
+        n_p if gradient else 0, n_own,
+    )  # fmt: skip
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
     doffset: np.ndarray | None = None
     base, rising = _participating(model, logs, slopes, n_own), Rising()
+    for share in multiplied(acting, model.groups, logs, slopes, split):
+        part = share.term
+        A = with_own(model.operator(part.operator, part.matrix == "K"), n_own)
+        if part.rise is None:
+            sums.add(share, A)
+        else:
+            rising.add(part, A, share.at)
+        if base is not None:
+            base.add_operator(part, model.vectors, share.at)
+    sums.limit_geometric()
+    for factors in modal_factors(acting):
+        U, V = model.modes_of(factors.rows), model.rows(factors.rows, strained=True)
+        factors.multiply(U, V, sums.K, sums.dK)
+    rising.add_plain(sums.K, sums.dK)
     for (effect, at, terms), first in zip(acting, own_positions(effects), strict=True):
         for term in of(PointTerm, terms):
-            seen = model.rows(term.rows, not term.moving, term.strained)
-            b = row(seen, own_part(term, first, n_own))
-            target, slope = (K, dK) if term.matrix == "K" else (M, dM)
-            target += (b.T * term.coefficient) @ b
-            moving = term.moving if gradient else {}
+            b = row(model.rows(term.rows, not term.moving), own_part(term, first, n_own))
             moved = {
                 p: np.pad(model.rows(rows, keep=False), ((0, 0), (0, n_own)))
-                for p, rows in moving.items()
+                for p, rows in (term.moving if gradient else {}).items()
             }
+            sums.add_points(term, b, moved, at)
             if base is not None:
                 base.add_points(term, b, moved, at)
-            if gradient:
-                slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, b, optimize=True)
-                for p, db in moved.items():
-                    half = (b.T * term.coefficient) @ db
-                    slope[at.start + p] += half + half.T
-        for given in of(MatrixTerm, terms):
-            part, dlog = limited(given, model.groups.part, logs, slopes, split)
-            A = with_own(model.operator(part.operator), n_own)
-            target, slope = (K, dK) if part.matrix == "K" else (M, dM)
-            rising.add(part, A, at)
-            target += part.coefficient * A
-            if base is not None:
-                base.add_operator(part, model.vectors, at)
-            if gradient:
-                slope[at] += part.gradient[:, None, None] * A
-                for k in np.flatnonzero(dlog):
-                    slope[k] += part.coefficient * dlog[k] * A
         extra, d_extra, _ = effect.weight(x[at])
         weight, dweight[at] = weight + extra, dweight[at] + d_extra
         for change in of(ChannelChange, terms):
@@ -301,10 +334,10 @@ def evaluate(
                 doffset = np.zeros((len(change.value), n_p), complex)
             offset = offset + change.value
             doffset[:, at] += change.gradient
-    lam, phi = real_modes(K, M)
-    lost: Dissipated | None = None
+    lam, phi = real_modes(sums.K, sums.M)
+    dK, dM, lost = sums.dK, sums.dM, None
     if rising.parts:
-        lam, phi, dK, dM, lost = rising.over_basis(lam, phi, dK, dM, M, gradient)
+        lam, phi, dK, dM, lost = rising.over_basis(lam, phi, dK, dM, sums.M, gradient)
     drive, ddrive = (None, None) if base is None else base.loads(phi)
     state = State(
         lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
@@ -336,33 +369,6 @@ def _participating(
         return None
     w = np.exp(mass_log(logs))
     return Participating(model.base, w, w[:, None] * mass_log(slopes), n_own)
-
-
-def _shells(
-    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], gradient: bool
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """K, M and, with ``gradient``, their derivatives (n_p, r, r) from the fields."""
-    r, n_p = len(model.K0), slopes["t"].shape[1] if gradient else 0
-    K, M, dK, dM = model.K0.copy(), model.M0.copy(), np.zeros((n_p, r, r)), np.zeros((n_p, r, r))
-    for stacks, power in ((model.linear, 1), (model.cubic, 3)):
-        for name, stack in stacks.items():
-            w = np.exp(stiffness_log(logs, name, power))
-            change = w[:, None] * stiffness_log(slopes, name, power)
-            _add(stack, w, change if gradient else None, K, dK)
-    w = np.exp(mass_log(logs))
-    _add(model.mass, w, w[:, None] * mass_log(slopes) if gradient else None, M, dM)
-    return K, M, dK, dM
-
-
-def _add(
-    stack: MatrixStack, w: np.ndarray, change: np.ndarray | None, A: np.ndarray, dA: np.ndarray
-) -> None:
-    """Add Σ_g w_g A_g to A, and the slopes Σ_g c_gp A_g to dA where ``change`` is given."""
-    if not len(w):
-        return
-    stack.add_to([A], w[None])
-    if change is not None:
-        add_slopes(stack, change, dA)
 
 
 def _weight(

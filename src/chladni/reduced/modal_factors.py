@@ -1,0 +1,91 @@
+"""Factors on the stiffness of modes: K becomes GᵀKG, which stays positive.
+
+G = I + Φ W ΦᵀM changes only motions in the modes Φ of the deck, W = Λ^-½ e^{L/2} Λ^½ - I. The
+derivative of e^{L/2} is that of a function of a matrix, by divided differences (Daleckii and Krein;
+Higham 2008, Functions of Matrices, 3.11).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..effects.effect import ModalFactor, of
+from .effect_dofs import Acting
+
+CLOSE = 1e-9  # distance of two logarithms within which a divided difference is a derivative
+TOUCHED = 1e-12  # coordinate of a vector of the basis in a mode; less is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class ModalFactors:
+    """All factors on one set of modes.
+
+    Attributes
+    ----------
+    rows : (k, n)          ΦᵀM
+    W : (k, k)
+    slopes : ∂W/∂x (k, k), by the position of the parameter
+    """
+
+    rows: sp.csr_array
+    W: np.ndarray
+    slopes: dict[int, np.ndarray]
+
+    def multiply(self, U: np.ndarray, V: np.ndarray, K: np.ndarray, dK: np.ndarray) -> None:
+        """Make GᵀKG of K (m, m), and its slopes of dK (n_p, m, m), in place.
+
+        Parameters
+        ----------
+        U, V : (r, k), (k, r)   the modes over a basis, and its coordinates in them
+        """
+        a, b = _touched(U.T), _touched(V)  # the modes are among the vectors of most bases
+        U, V = U[a], V[:, b]
+        WV = self.W @ V
+        KU = K[:, a] @ U
+        KU[b] += WV.T @ (U.T @ KU[a])
+        _congruent(K, a, b, U, WV)
+        for slope in dK:
+            if slope.any():
+                _congruent(slope, a, b, U, WV)
+        for p, dW in self.slopes.items() if len(dK) else ():
+            half = KU @ (dW @ V)
+            dK[p][:, b] += half
+            dK[p][b] += half.T
+
+
+def _touched(rows: np.ndarray) -> np.ndarray:
+    """Columns that some row (k, m) has an entry in."""
+    return np.flatnonzero(np.abs(rows).max(axis=0, initial=0.0) > TOUCHED)
+
+
+def _congruent(A: np.ndarray, a: np.ndarray, b: np.ndarray, U: np.ndarray, WV: np.ndarray) -> None:
+    """Make (I + U W V)ᵀ A (I + U W V) of A; only rows a of U and columns b of V are not zero."""
+    A[:, b] += (A[:, a] @ U) @ WV
+    A[b] += WV.T @ (U.T @ A[a])
+
+
+def modal_factors(acting: Acting) -> list[ModalFactors]:
+    """The factors of all effects, those on one set of modes as one."""
+    sets: dict[int, list[tuple[slice, ModalFactor]]] = {}
+    for _, at, terms in acting:
+        for term in of(ModalFactor, terms):
+            sets.setdefault(id(term.rows), []).append((at, term))
+    return [_together(terms) for terms in sets.values()]
+
+
+def _together(terms: list[tuple[slice, ModalFactor]]) -> ModalFactors:
+    """e^{L/2} of the sum L of some logarithms, and its slopes."""
+    _, first = terms[0]
+    ratio = first.omega / first.omega[:, None]
+    d, V = np.linalg.eigh(sum(term.log for _, term in terms))
+    root, gap = np.exp(d / 2), d - d[:, None]
+    close = np.abs(gap) < CLOSE
+    divided = root[:, None] * np.where(close, 0.5, np.expm1(gap / 2) / np.where(close, 1.0, gap))
+    slopes = {
+        at.start + p: ratio * (V @ (divided * (V.T @ dL @ V)) @ V.T)
+        for at, term in terms
+        for p, dL in enumerate(term.gradient)
+    }
+    W = ratio * ((V * root) @ V.T) - np.eye(len(d))
+    return ModalFactors(first.rows, W, slopes)
