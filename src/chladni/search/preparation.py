@@ -43,6 +43,7 @@ from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencie
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .question import Prepared, Question
+from .silent_dofs import refuse_silent
 
 ZETA = 0.08  # equalised damping for comparing hypotheses: it widens the basins of convergence
 ZETA_Q = 0.02  # equalised damping for the reported Q
@@ -92,6 +93,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
+    refuse_silent(nominal, question.outputs, question.inputs)
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
     progress("the error of its mesh", 0.5)
@@ -193,6 +195,8 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepar
     f_max = float(frequency[-1]) * 1.15
     highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
     nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))
+    if question.frf is not None:
+        refuse_silent(nominal, question.outputs, question.inputs)
     built, mesh = nominal.structure, mesh_hidden(nominal, f_max)
     reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))

@@ -9,7 +9,7 @@ import numpy as np
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..case.recordings import DEAD
-from ..errors import ChladniError, FileError
+from ..errors import ChladniError, FileError, LabelError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
@@ -254,6 +254,8 @@ def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
         return []
     try:
         screening = correlate(case, progress=progress, every_line=False).screening
+    except LabelError:  # a drive or sensor at which the model does not respond
+        raise
     except ChladniError as error:
         screening = screened_unprepared(case)
         if screening is None or not screening.faults:

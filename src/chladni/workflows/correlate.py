@@ -23,6 +23,7 @@ from ..fem.modelled import Modelled, modelled
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
+from ..search.silent_dofs import refuse_silent
 from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
@@ -114,6 +115,7 @@ def _correlated(case: Case, progress: Progress, every_line: bool) -> Correlation
     numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
         return replace(_by_poles(case, near), numbers=numbers)
+    refuse_silent(model, case.outputs, case.inputs)
     use = case.lines(test.frequency)
     use &= True if every_line else screening_lines(test)
     progress(_identifying(len(test.outputs) * len(test.inputs), int(use.sum())), 0.4)

@@ -7,6 +7,7 @@
 5. The result is written into the deck, and every number is taken from the decks as written.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -177,7 +178,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
             study = replace(study, compensating=reasons, guidance=next_, damping=lossy)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
-    seen = known.screening
+    seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         distrust = (*distrust, *instead_of_effects(result.verdict, seen))
     said = () if seen is None else seen.notes
@@ -185,6 +186,20 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     return replace(
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
     )  # fmt: skip
+
+
+FAR_OFF = 1.0  # Q of a deck whose responses are tenfold or a tenth of the recording's
+
+
+def far_off(result: DiagnosisResult) -> Iterator[str]:
+    """Reason not to trust an answer whose deck leaves a factor of ten in the responses."""
+    Q = None if result.agreement is None else result.agreement.fitted.after
+    if Q is not None and Q > FAR_OFF and result.compared == "responses":
+        yield (
+            f"the responses of the deck differ from the recording by a factor of "
+            f"{10 ** np.sqrt(Q):.2g} (rms over the fitted lines and channels, Q = {Q:.3g}), which "
+            "no calibration explains; check units, channels, places and directions"
+        )
 
 
 def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
