@@ -27,9 +27,9 @@ from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.written_hypothesis import as_written
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import diagnosis as diagnosing
-from chladni.search.candidates import candidates, repeats
+from chladni.search.candidates import candidates, proposals, repeats
 from chladni.search.deciding import on_its_own_basis
-from chladni.search.diagnosis import Diagnosis, threshold
+from chladni.search.diagnosis import Diagnosis, could_not_be_evaluated, threshold
 from chladni.search.search_round import _of_the_same_lump, on_common_basis, search_round
 from chladni.search.several import _begun_with, _More, _paying, _revised, _same, several
 
@@ -324,3 +324,43 @@ def test_a_deck_far_off_in_frequency_is_calibrated(reduced, shift):
     problem = replace(problem, data=replace(data, values=data.model(state)))
     _, null = diagnosing.without_effects(problem)
     assert null.fit.x[0] == pytest.approx(shift, abs=0.03)
+
+
+class Sinking(PointMass):
+    """A spring to ground of negative stiffness, wherever it begins."""
+
+    name = "sinking"
+
+    def terms(self, x):
+        return tuple(
+            replace(t, matrix="K", coefficient=-1e12 * np.ones(1)) for t in super().terms(x)
+        )
+
+
+def test_what_fails_numerically_is_one_hypothesis_lost(reduced):
+    """In the scan or in every fit of it; all other families are found as without it."""
+
+    def raises(context):
+        raise np.linalg.LinAlgError("singular matrix")
+
+    def sinks(context):
+        k = at(reduced, *HERE)
+        effect = Sinking(**vars(PointMass.near(context.where, k)))
+        return [Candidate(effect, np.zeros(3), context.bases[0])]
+
+    own = {f.name: f for f in FEW}["point-mass"]
+    broken = replace(
+        own, effect=type("Broken", (PointMass,), {"name": "broken"}), candidates=raises
+    )
+    sinking = replace(own, effect=Sinking, candidates=sinks, closer=None)
+    weight = 0.03 * mass_properties(reduced.structure.assembly)[0]
+    problem = problem_of(reduced, [lump(reduced, HERE, 1.0)], weight)
+    problem = replace(problem, families=(broken, sinking, own))
+    null = null_of(problem)
+    tried = proposals(problem, null)
+    singles = search_round(problem, null, tried.candidates, lambda text, share: None)
+    assert [t.effect.name for t in singles] == ["point-mass"]
+    assert sorted(could_not_be_evaluated(tried, singles)) == [
+        "the hypothesis broken could not be evaluated: singular matrix",
+        "the hypothesis sinking could not be evaluated: no start of its fit is a structure",
+    ]

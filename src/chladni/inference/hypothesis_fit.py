@@ -10,6 +10,7 @@ from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
 from ..effects.family import Family
 from ..effects.registry import catalogue
+from ..errors import ModelError
 from ..reduced.reduced_model import Reduced, State, evaluate
 from ..reduced.reduced_problem import ReducedProblem
 from .complex_modes import ModeCoupling
@@ -19,6 +20,7 @@ from .likelihood import Data, Responses
 from .map_fit import Fit, MassMeasurement, constants, fit, linearised_fit, prior_residuals
 from .pole_data import SCALE, SCALE_SD, Poles
 
+FAILED = (ModelError, np.linalg.LinAlgError)  # of a fit: its hypothesis is lost, and no other
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 

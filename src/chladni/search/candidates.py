@@ -1,6 +1,6 @@
 """The most promising of every family of effects, and the services by which families find them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -9,10 +9,10 @@ import numpy as np
 
 from ..effects.effect import Effect, MatrixTerm, of
 from ..effects.effect_context import EffectContext, ElementGrids
+from ..effects.family import Family
 from ..effects.joints import Connection
 from ..effects.search_context import Candidate
-from ..errors import ModelError
-from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
+from ..inference.hypothesis_fit import FAILED, HypothesisFit, UpdatingProblem
 from ..inference.likelihood import Responses
 from ..inference.pole_data import Poles
 from ..inference.scan import (
@@ -33,6 +33,14 @@ APART = 1 / 6  # of the structure's size: effects nearer to each other are one
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
 
+@dataclass(frozen=True, eq=False)
+class Proposals:
+    """Candidates of all families, and reasons why a family has none although it acts here."""
+
+    candidates: list[Candidate]
+    lost: Mapping[str, str]
+
+
 def candidates(
     problem: UpdatingProblem, null: HypothesisFit, most: int | None = None
 ) -> list[Candidate]:
@@ -42,14 +50,24 @@ def candidates(
     ----------
     most : so many of them alone, those that score best where they begin
     """
-    context = UpdatingContext(problem, null).ready()
-    every = [
-        c
-        for proposed in in_parallel(lambda family: family.proposed(context), problem.families)
-        for c in proposed
-        if not already_there(problem, c.effect, c.start)
-    ]
-    return every if most is None else _leading(context, every, most)
+    every = proposals(problem, null).candidates
+    return every if most is None else _leading(UpdatingContext(problem, null), every, most)
+
+
+def proposals(problem: UpdatingProblem, null: HypothesisFit) -> Proposals:
+    """The most promising of every family; one that fails numerically is lost, and no other."""
+    context, lost = UpdatingContext(problem, null).ready(), {}
+
+    def proposed(family: Family) -> list[Candidate]:
+        try:
+            return family.proposed(context)
+        except FAILED as error:
+            lost[family.name] = str(error)
+            return []
+
+    every = [c for some in in_parallel(proposed, problem.families) for c in some]
+    every = [c for c in every if not already_there(problem, c.effect, c.start)]
+    return Proposals(every, lost)
 
 
 def already_there(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
@@ -137,7 +155,16 @@ class UpdatingContext:
         kinds = [
             e.kind == "calibration" or e in found for e in self.problem.base for _ in e.parameters
         ]
-        return nominal, np.where(kinds, self.null_fit.fit.x, nominal)
+        calibrated = np.where(kinds, self.null_fit.fit.x, nominal)
+        return nominal, calibrated if self._stands(calibrated) else self.null_fit.fit.x
+
+    def _stands(self, x: np.ndarray) -> bool:
+        """True if base parameters x are a structure."""
+        try:
+            evaluate(self.problem.reduced.model, self.problem.base, x, False)
+        except FAILED:
+            return False
+        return True
 
     @property
     def null(self) -> np.ndarray:
@@ -205,7 +232,7 @@ class UpdatingContext:
             x = np.concatenate([base.x, start])
             try:
                 state = evaluate(model, [*base.effects, effect], x, False)
-            except ModelError:
+            except FAILED:
                 continue
             if isinstance(data, Poles):
                 prior = _prior(effect, start)

@@ -8,7 +8,7 @@
 6. Sets of several effects (``several``), if an effect is named or nothing fits.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -38,7 +38,7 @@ from ..inference.rows_of_fits import row_of, row_of_null
 from ..progress import within
 from ..reduced.reduced_model import evaluate
 from ..sparse.freed_memory import give_back_freed_memory
-from .candidates import candidates, unasked
+from .candidates import Proposals, proposals, unasked
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
 
@@ -143,12 +143,13 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
     plain = fit_of_the_deck(problem, null)
     progress("scan of the catalogue", 0.2)
-    tried = candidates(problem.begun_wide(), null)
+    tried = proposals(problem.begun_wide(), null)
     give_back_freed_memory()
-    hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
+    hypotheses = search_round(problem, null, tried.candidates, within(progress, 0.3, 0.8))
+    notes = (*unasked(problem), *could_not_be_evaluated(tried, hypotheses))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
-    found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=unasked(problem))
+    found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=notes)
     found = named_by_fits(problem, found)
     whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
     found = _names_alone(problem, found, whole)
@@ -156,6 +157,16 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     give_back_freed_memory()
     found = _with_sets_of_effects(problem, found, within(progress, 0.8, 1.0))
     return _names_alone(problem, found, 1)
+
+
+def could_not_be_evaluated(found: Proposals, hypotheses: Sequence[HypothesisFit]) -> Iterator[str]:
+    """Sentences on families that failed numerically, where they were scanned or fitted."""
+    fitted_ones = {t.effect.name for t in hypotheses}
+    proposed = dict.fromkeys(c.effect.name for c in found.candidates)
+    unfit = {name: "no start of its fit is a structure" for name in proposed}
+    for name, why in {**unfit, **found.lost}.items():
+        if name not in fitted_ones:
+            yield f"the hypothesis {name} could not be evaluated: {why}"
 
 
 def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:

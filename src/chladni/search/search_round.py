@@ -13,8 +13,7 @@ import numpy as np
 from ..decision.decision_rules import TIED
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
-from ..errors import ModelError
-from ..inference.hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
+from ..inference.hypothesis_fit import FAILED, ROUGH, HypothesisFit, UpdatingProblem, fitted
 from ..inference.likelihood import Responses
 from ..inference.map_fit import Status
 from ..inference.rows_of_fits import simplest_first
@@ -94,7 +93,7 @@ def _tried(
     for x in (base, null.fit.x):
         if out and out[0].neg2_log_evidence < null.neg2_log_evidence + BEHIND:
             break
-        with suppress(ModelError):
+        with suppress(*FAILED):
             out.append(problem.fitted_with(effect, start, x, ROUGH))
     return out
 
@@ -139,7 +138,10 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
     if not isinstance(problem.data, Responses) or (at_rest and not running):
         return hypothesis
     model, begun = hypothesis.model, hypothesis.fit
-    fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
+    try:
+        fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
+    except FAILED:
+        return hypothesis
     if fit.neg2_log_evidence < hypothesis.fit.neg2_log_evidence:
         return replace(hypothesis, fit=fit)
     return hypothesis
@@ -151,7 +153,9 @@ def _settled(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisF
     if not isinstance(data, Responses) or data.identified is None:
         return hypothesis
     for _ in range(PASSES):
-        before, hypothesis = hypothesis, problem.about_itself(hypothesis)
+        before = hypothesis
+        with suppress(*FAILED):
+            hypothesis = problem.about_itself(hypothesis)
         if abs(hypothesis.fit.neg2_log_evidence - before.fit.neg2_log_evidence) < 1:
             break
     return hypothesis
@@ -163,13 +167,13 @@ def _closer(
     """The leader begun anew about the place it moved to, or at a better one, while it moves."""
     out: list[HypothesisFit] = []
     for _ in range(3):
-        again = _again(problem, null, lead)
-        if again is None:
-            break
         try:
+            again = _again(problem, null, lead)
+            if again is None:
+                break
             hypothesis = problem.fitted_with(again.effect, again.start, again.base)
             hypothesis = _settled(problem, hypothesis)
-        except ModelError:
+        except FAILED:
             break
         out.append(hypothesis)
         if hypothesis.fit.neg2_log_evidence > lead.fit.neg2_log_evidence - 1:
@@ -195,7 +199,7 @@ def _of_the_same_lump(
     for family in problem.families:
         begun = None if family.of_lump is None else family.of_lump(problem.where, *lump)
         if begun is not None and not already_there(problem, *begun):
-            with suppress(ModelError):
+            with suppress(*FAILED):
                 out.append(problem.fitted_with(*begun, base))
     return out
 
