@@ -55,6 +55,31 @@ def test_the_span_holds_its_columns_and_nothing_else(made):
     assert_allclose(span.projected(across), 0, atol=1e-9)
 
 
+ONE_LINE = np.arange(LINES) == 3
+DEGENERATE = {  # factors on the columns of channels and in common, and lines in use
+    "no error of a channel": (0.0, 1.0, np.ones(LINES, bool)),
+    "no error in common": (1.0, 0.0, np.ones(LINES, bool)),
+    "no error at all": (0.0, 0.0, np.ones(LINES, bool)),
+    "a silent channel": (np.array([1.0, 0.0, 1.0])[:, None], 1.0, np.ones(LINES, bool)),
+    "one line": (1.0, 1.0, ONE_LINE),
+}
+
+
+@pytest.mark.parametrize("case", DEGENERATE)
+def test_columns_that_others_hold_already_span_nothing_more(case):
+    """Else the rounding that is left of them would count as errors: ln det 293 for one line."""
+    on_own, on_common, lines = DEGENERATE[case]
+    rng = np.random.default_rng(4)
+    use = np.repeat(lines[:, None], OUTPUTS, axis=1)
+    data = Plain(use, np.ones((LINES, OUTPUTS, INPUTS), complex))
+    own, common, sd = drawn(rng, 3) * on_own, drawn(rng, 4) * on_common, np.ones_like(data.values)
+    span, V = spanned(data, own, common, sd.real), dense(data, own, common)
+    assert span.leverage.sum() == pytest.approx(np.linalg.matrix_rank(V))
+    made = whitening(data, own, common, span)
+    due = np.linalg.slogdet(np.eye(V.shape[1]) + V.T @ V)[1]
+    assert made.log_det == pytest.approx(due, abs=1e-6)
+
+
 @pytest.mark.parametrize("within", [False, True])
 def test_whitened_errors_have_unit_covariance(made, within):
     """W (P + V Vᵀ) Wᵀ = P, with P the projection on the span, or 1 without one."""

@@ -6,9 +6,13 @@ from dataclasses import replace
 import pytest
 
 import chladni
+from chladni.inference.result import Agreement, Scores
 from chladni.io.package_files import mesh_path
 from chladni.io.tables.read_tables import read_recordings
 from chladni.io.tables.write_tables import write_npz
+from chladni.report.next_steps import next_steps
+from chladni.workflows.diagnosis_pipeline import far_off
+from chladni.workflows.diagnosis_result import DiagnosisResult
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +69,17 @@ def test_a_table_that_contradicts_its_labels_is_told(frf, tmp_path):
     (tmp_path / "sensors.csv").write_text(all_along_x(frf))
     (note,) = [n for n in chladni.load_case(tmp_path).notes if said in n]
     assert note.startswith("1:-Y, 620:+Y, 240:+Y, 382:-Y, 14:n, 207:n and 14 more say ")
+
+
+@pytest.mark.parametrize(("Q", "doubts"), [(None, 0), (0.9, 0), (1.1, 1), (274.0, 1)])
+def test_no_deck_a_factor_of_ten_off_is_recommended(Q, doubts):
+    """Q = 1 is one decade squared: such a deck is in doubt whatever the verdict."""
+    scores = Agreement(fitted=Scores(nominal=Q, calibrated=Q, with_effect=Q))
+    result = DiagnosisResult(
+        verdict="calibration only", agreement=scores, files={"deck": "updated.bdf"}
+    )
+    assert len(tuple(far_off(result))) == doubts
+    said = replace(result, distrust=tuple(far_off(result)))
+    steps = " ".join(next_steps(said))
+    assert ("Use updated.bdf" in steps) == (not doubts)
+    assert tuple(far_off(replace(result, compared="frequencies"))) == ()

@@ -124,8 +124,7 @@ def spanned(data: Stacks, own: np.ndarray, common: np.ndarray, sd: np.ndarray) -
         within.append((at, Q))
         log_det += size
     of_outputs, scaled = _sparse(basis, data), _sparse(within, data)
-    rest = data.stacked(common)
-    rest = _basis(rest - of_outputs @ (of_outputs.T @ rest)) / spread[:, None]
+    rest = _basis(_beyond(of_outputs, data.stacked(common))) / spread[:, None]
     Q, size = _orthogonal(rest - scaled @ (scaled.T @ rest))
     return Span(scaled, Q, log_det + size)
 
@@ -182,6 +181,13 @@ def _less(U: np.ndarray | sp.csc_array, less: np.ndarray, r: np.ndarray) -> np.n
     """Remove from r its share along each column."""
     along = U.T @ r
     return r - U @ (less[:, None] * along if along.ndim > 1 else less * along)
+
+
+def _beyond(U: sp.csc_array, V: np.ndarray) -> np.ndarray:
+    """Columns of V less their share along orthonormal U; those with only rounding left are out."""
+    left = V - U @ (U.T @ V)
+    length, before = (np.sqrt((A**2).sum(axis=0)) for A in (left, V))
+    return np.asarray(left[:, length > KNOWN * before])
 
 
 def _basis(V: np.ndarray) -> np.ndarray:
