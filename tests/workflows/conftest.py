@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.builders.cases import SENSORS, write_case
-from tests.builders.quick_runs import coarse_pictures, few_starts, identified_once
+from tests.builders.quick_runs import few_starts, identified_once, unrendered_pictures
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
@@ -14,7 +14,7 @@ from chladni.fem import modelled as fem_modelled
 
 @pytest.fixture(scope="module", autouse=True)
 def _quick():
-    with coarse_pictures(), identified_once():
+    with unrendered_pictures(), identified_once():
         yield
 
 
