@@ -63,6 +63,13 @@ def few_starts() -> Iterator[None]:
 
 
 @contextmanager
+def quick_runs() -> Iterator[None]:
+    """What the tests of commands and workflows need: their words, numbers and files."""
+    with unrendered_pictures(), identified_once(), few_starts():
+        yield
+
+
+@contextmanager
 def coarse_pictures() -> Iterator[None]:
     """Pictures of a quarter of the pixels each way, for tests that look at them."""
 

@@ -1,10 +1,10 @@
-"""Commands render no pictures and identify a recording once: tests read their words and numbers."""
+"""Commands render no pictures and identify a recording once: tests read words and numbers."""
 
 import pytest
-from tests.builders.quick_runs import identified_once, unrendered_pictures
+from tests.builders.quick_runs import quick_runs
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _quick():
-    with unrendered_pictures(), identified_once():
+    with quick_runs():
         yield

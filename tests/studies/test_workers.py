@@ -75,6 +75,7 @@ def test_a_worker_killed_costs_no_other_sample(deck, straight, tmp_path):
     assert not [p for p in children if p.is_running()], "workers outlived the study"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ended", [2, 99])
 def test_a_worker_that_ends_in_its_start(model, straight, monkeypatch, ended):
     """Others are started in its place, two in turn; then it is one sentence."""
@@ -145,6 +146,7 @@ FOUND = """[str(t.key) for s in __import__("distributed").Scheduler._instances
             for t in s.transition_log if t.finish == "memory"]"""
 
 
+@pytest.mark.slow
 def test_a_cluster_of_others_that_gets_workers_and_loses_one(deck, straight, tmp_path):
     """Without any it is said once, and waited for; one that is lost costs what it had not handed
     over, and few samples are on the cluster at a time."""
@@ -219,6 +221,7 @@ def test_jobs_of_a_batch_system(deck, straight, tmp_path):
     agrees(tmp_path / "out", straight)
 
 
+@pytest.mark.slow
 def test_a_sample_that_ends_every_worker_has_failed_and_costs_no_other():
     """Each time the sample that waited behind it goes to the next worker."""
     study = SimpleNamespace(assembly=call)  # a sample of which does what its values say

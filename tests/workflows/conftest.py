@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.builders.cases import SENSORS, write_case
-from tests.builders.quick_runs import few_starts, identified_once, unrendered_pictures
+from tests.builders.quick_runs import quick_runs
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
@@ -14,14 +14,7 @@ from chladni.fem import modelled as fem_modelled
 
 @pytest.fixture(scope="module", autouse=True)
 def _quick():
-    with unrendered_pictures(), identified_once():
-        yield
-
-
-@pytest.fixture(scope="module")
-def few():
-    """Calibrations begin at two points, as that of ``calibrated`` does."""
-    with few_starts():
+    with quick_runs():
         yield
 
 
@@ -58,8 +51,7 @@ def diagnosed(diagnosis):
 
 @pytest.fixture(scope="session")
 def calibrated(case):
-    with few_starts():
-        return chladni.calibrate(case)
+    return chladni.calibrate(case)
 
 
 @pytest.fixture
