@@ -1,6 +1,8 @@
 """Every result explains itself: in words, drawn, saved as its command does, in a notebook."""
 
 import json
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -15,8 +17,9 @@ from chladni.workflows.diagnosis_result import DiagnosisResult
 
 def with_own_modes(case):
     """The model against the shapes it wrote itself."""
-    folder = chladni.modes(case, 12).save(case.path.parent / "own")
-    return chladni.other_modes(case, folder / "modes.unv")
+    with TemporaryDirectory() as folder:
+        own = chladni.modes(case, 12).save(Path(folder) / "own")
+        return chladni.other_modes(case, own / "modes.unv")
 
 
 MADE = {  # (file of the result, a picture): call
