@@ -32,7 +32,7 @@ CALLERS = (  # names under which modules hold the function that identifies
     "chladni.workflows.screening_of_case.identify",
 )
 _KNOWN: dict[bytes, Identified] = {}
-_PHOTO, _SAVE = canvas._photo, Figure.savefig
+_PHOTO, _SAVE, _WORDS = canvas._photo, Figure.savefig, paper._no_formulas
 
 
 @contextmanager
@@ -82,6 +82,7 @@ def coarse_pictures() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(canvas, "_photo", coarse)
         patch.setattr(Figure, "savefig", small)
+        patch.setattr(paper, "_no_formulas", _WORDS)
         yield
 
 
