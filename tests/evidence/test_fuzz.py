@@ -14,14 +14,14 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs processes
 GOOD = "BEGIN BULK\nSPOINT,1\nCELAS4,1,1000.,1\nCMASS4,2,1.,1\nENDDATA\n"
 
 
-def test_two_injured_inputs_of_every_kind(tmp_path):
+def test_an_injured_input_of_every_kind(tmp_path):
     """The same as the evidence run of ten thousand: python -m chladni_evidence fuzz."""
-    said, inputs = [], (one for kind in KINDS for one in fuzz_inputs(2, 11, [kind]))
+    said, inputs = [], (one for kind in KINDS for one in fuzz_inputs(1, 11, [kind]))
     counts = fuzz(inputs, tmp_path, said.append)
     wrong = {n: c for count in counts.values() for n, c in count.items() if n not in DUE}
     assert not wrong, said
-    assert {kind: sum(count.values()) for kind, count in counts.items()} == dict.fromkeys(KINDS, 2)
-    assert sum(count["refused"] for count in counts.values()) > 10  # the injuries are felt
+    assert {kind: sum(count.values()) for kind, count in counts.items()} == dict.fromkeys(KINDS, 1)
+    assert sum(count["refused"] for count in counts.values()) > 5  # the injuries are felt
 
 
 def test_the_same_seed_makes_the_same_inputs():

@@ -22,7 +22,7 @@ SENSORS = (2, 4, 7, 18, 24, 30, 36, 43, 47)
 def place(tmp_path_factory):
     """A plate whose article carries a mass of a tenth of it that the deck lacks."""
     folder = tmp_path_factory.mktemp("chain")
-    write_case(folder, 6, SENSORS, np.linspace(15, 250, 900), 240.0)
+    write_case(folder, 6, SENSORS, np.linspace(15, 250, 450), 240.0)
     return folder
 
 
