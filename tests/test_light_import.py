@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from functools import cache
 
 import pytest
 
@@ -26,16 +27,20 @@ HEAVY = {
 }
 
 
+@cache
 def loaded_by(code):
+    """The packages that some code loads; it prints nothing."""
     code = f"import sys; {code}; print(*{{m.split('.')[0] for m in sys.modules}})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    (line,) = done.stdout.splitlines()
+    assert done.stderr == ""
+    return set(line.split())
 
 
 @pytest.mark.parametrize(
     "code", ["import chladni", "from chladni.cli.app import application; application()"]
 )
-def test_import_is_light(code):
+def test_import_is_light_and_prints_nothing(code):
     """Neither the package nor its command line loads graphics, learning or file libraries."""
     assert not loaded_by(code) & HEAVY
 
@@ -45,8 +50,3 @@ def test_the_package_loads_none_that_builds_on_it():
     built = {"chladni_planning", "chladni_bench", "chladni_studies", "chladni_specimens"}
     assert not loaded_by("import chladni") & (built | {"chladni_evidence", "chladni_envs"})
     assert loaded_by("import chladni; chladni.study") & built == {"chladni_studies"}
-
-
-def test_nothing_is_printed():
-    done = subprocess.run([sys.executable, "-c", "import chladni"], capture_output=True, check=True)
-    assert done.stdout == done.stderr == b""

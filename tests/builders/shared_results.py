@@ -22,7 +22,7 @@ def shared_folder(run: Path, name: str, write: Callable[[Path], object]) -> Path
     with _alone(run, name):
         if not place.exists():
             part = run / f"part-{name}"
-            part.mkdir()
+            part.mkdir(exist_ok=True)  # it is there where the making failed before
             write(part)
             part.rename(place)
     return place
