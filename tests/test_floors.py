@@ -21,8 +21,8 @@ PACKAGES = {  # every package of ours and where its source is
     "chladni_envs": ROOT / "envs",
 }
 GROUND = {
-    "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "parallel",
-    "results", "extensions"
+    "address_space", "errors", "arguments", "arrays", "dofs", "units", "output", "progress",
+    "parallel", "results", "extensions",
 }  # fmt: skip
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},

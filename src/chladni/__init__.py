@@ -14,7 +14,8 @@ channels are placed by ``Sensor``, a ``PoleTable`` or a ``Recording``. ``CaseWor
 arguments. The command of the same name takes the same road, so that numbers are equal.
 
 ``modes``, ``frf``, ``plan`` and ``study`` need a model alone, ``identify`` and
-``evaluate_recordings`` a recording alone. ``load`` gives a model with ``.modes(count)``,
+``evaluate_recordings`` a recording alone. Whatever takes a deck takes its path with ``units=``, a
+loaded model, or an ``Assembly`` in SI. ``load`` gives a model with ``.modes(count)``,
 ``.frf(output, input, frequency)``, ``.show(mode)``, ``.variant(t=0.8e-3)`` and ``.write(path)``.
 
 Every result has ``summary()``, ``plot(name)`` and ``save(folder)``, and shows itself in a notebook.

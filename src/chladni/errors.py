@@ -21,6 +21,10 @@ class LabelError(ChladniError, LookupError):
     """A degree of freedom, part, grid or parameter that does not exist."""
 
 
+class ArgumentError(ChladniError, TypeError):
+    """An argument of another type than the function takes, or one that it does not have."""
+
+
 class FileError(ChladniError, ValueError):
     """A deck, recording or case file that cannot be used as it stands."""
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from .arguments import checked
 from .errors import LabelError, ModelError, did_you_mean, named
 from .output import atomic, run_folder
 
@@ -83,6 +84,7 @@ class Result:
         """Return the result in words: one sentence, then the main tables as text."""
         return self._view.summary(self)
 
+    @checked
     def plot(self, name: str = "") -> DrawnPicture:
         """Draw a picture of the page of the command.
 
@@ -113,6 +115,7 @@ class Result:
         drawn: Mapping[str, bytes] = self.__dict__["_drawn"]
         return drawn
 
+    @checked
     def save(self, folder: Path | str) -> Path:
         """Write the files that the command writes: JSON, tables, pictures, ``report.html``.
 

@@ -68,7 +68,7 @@ def lead(result: PlanSummary) -> str:
 def notes(found: Plan) -> list[str]:
     """List decisions of the planning, and warnings."""
     centres = int((~found.places.is_grid).sum())
-    out = _places_notes(found.places)
+    out = [*found.notes, *_places_notes(found.places)]
     if len(found.layout) == len(found.places):
         out.append(f"Every place has a sensor: there is room for only {len(found.places)}.")
     if centres:

@@ -76,6 +76,16 @@ class StudyStore:
         return self.folder / FRFS / f"{number:06d}.npz"
 
 
+def write_samples(path: Path, table: Mapping[str, list[Any]]) -> Path:
+    """Write one line per sample, as ``pandas.read_csv`` reads it; missing values are empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table)
+    for row in zip(*table.values(), strict=True):
+        writer.writerow(["" if v is None else v for v in plain(row)])
+    return write_text(path, text.getvalue())
+
+
 def row_of(result: SampleResult, values: Mapping[str, float]) -> dict[str, Any]:
     """A sample as one flat row: number, status, sentence, parameters, results."""
     status = "failed" if result.why else "done"

@@ -12,6 +12,7 @@ from typing import get_args
 
 import numpy as np
 
+from ..arguments import checked
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
 from ..errors import ChladniError, FileError, did_you_mean, named
@@ -117,6 +118,7 @@ class Case:
         return np.asarray(use)
 
 
+@checked
 def load_case(path: str | Path) -> Case:
     """Read a case from its folder or its case.toml.
 

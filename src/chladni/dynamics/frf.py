@@ -6,6 +6,7 @@ from typing import Literal, Self, get_args
 
 import numpy as np
 
+from ..arguments import checked
 from ..arrays import readonly
 from ..dofs import label as text_of
 from ..dofs import positions
@@ -86,6 +87,7 @@ class FRF:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         object.__setattr__(self, "inputs", tuple(self.inputs))
 
+    @checked
     def sel(
         self,
         outputs: Sequence[str] | None = None,
@@ -95,6 +97,8 @@ class FRF:
         """Select labels (in this order) and a band [Hz]."""
         outputs = self.outputs if outputs is None else tuple(outputs)
         inputs = self.inputs if inputs is None else tuple(inputs)
+        if band[0] > band[1]:
+            raise LabelError(f"band = {band} is empty; give (low, high) in Hz")
         k = np.flatnonzero((band[0] <= self.frequency) & (self.frequency <= band[1]))
         cut = np.ix_(k, positions(outputs, self.outputs), positions(inputs, self.inputs))
         return replace(
@@ -107,6 +111,7 @@ class FRF:
             coherence=None if self.coherence is None else self.coherence[cut],
         )
 
+    @checked
     def to(self, quantity: Quantity) -> Self:
         """Convert to another kinematic quantity: each derivative is a factor iω.
 
@@ -193,6 +198,7 @@ def _weighted(h: np.ndarray, phi_out: np.ndarray, phi_in: np.ndarray) -> np.ndar
     return H.reshape(shape)
 
 
+@checked
 def synthesise(
     modal: ModalModel,
     phi_out: np.ndarray,

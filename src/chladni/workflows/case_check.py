@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from ..arguments import checked
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..case.recordings import DEAD
@@ -80,6 +81,7 @@ class CaseCheck(Result):
         return tuple(f for f in self.findings if f.fault)
 
 
+@checked
 @one_blas_thread()
 def check(
     source: Source,

@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from ..arguments import checked
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..dynamics.frf import FRF
@@ -75,6 +76,7 @@ class Correlation(Result):
     likeness: tuple[Likeness, ...] = ()
 
 
+@checked
 def correlate(
     source: Source,
     recording: Measured | Sequence[Measured] = (),

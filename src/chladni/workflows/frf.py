@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from ..case import Case, load_case
+from ..arguments import checked
+from ..case import Case
 from ..case.sensor_places import ROLES, placed, sensor_masses, weight_of_sensors
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift, transfer
-from ..errors import FileError
+from ..errors import FileError, LabelError, ShapeError
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, modelled, node_points
 from ..fem.solve import base_response, inertia_load
@@ -24,7 +25,8 @@ from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
 from .case_model import REACH, model_frf
-from .loaded_model import DeckModels, Model, as_model, is_case, load_deck, similar_names
+from .given_case import Source
+from .loaded_model import DeckModels, Model, as_model, opened, similar_names
 
 Side = Sequence[str] | MeasuredDofs  # outputs, or inputs
 MOST_DOFS, MOST_NAMED = (
@@ -41,11 +43,12 @@ class FrequencyResponses(Result):
     notes: tuple[str, ...] = ()
 
 
+@checked
 @one_blas_thread()
 def frf(
-    source: Case | Model | DeckModels | str | Path,
-    outputs: Side = (),
-    inputs: Side = (),
+    source: Source,
+    outputs: str | Side = (),
+    inputs: str | Side = (),
     frequency: np.ndarray | None = None,
     damping: float = 0.01,
     *,
@@ -56,8 +59,8 @@ def frf(
 
     Parameters
     ----------
-    source : a case (lines and places of its recording), a deck (its own loads), a model, or the
-        path of a case or deck
+    source : a case (lines and places of its recording), a deck (its own loads), a model, an
+        Assembly, or the path of a case or deck
     outputs, inputs : labels as 55:+Z, 12:n or base:+Z, or places as ``placed_layout`` makes them;
         without inputs those of the source
     frequency : (n_f,) [Hz]     with inputs
@@ -69,10 +72,25 @@ def frf(
     FileError
         If the places of excitation or response are missing.
     """
-    if isinstance(source, str | Path):
-        source = load_case(source) if is_case(Path(source)) else load_deck(Path(source), units)
-    found = _responses(source, outputs, inputs, frequency, damping, progress)
-    return replace(found, origin=source)
+    to: Side = (outputs,) if isinstance(outputs, str) else outputs
+    by: Side = (inputs,) if isinstance(inputs, str) else inputs
+    if damping < 0:
+        raise LabelError(f"damping = {damping:g}; a ratio is 0 or more")
+    if frequency is not None:
+        frequency = _lines(frequency)
+    found_in = opened(source, units)
+    found = _responses(found_in, to, by, frequency, damping, progress)
+    return replace(found, origin=found_in)
+
+
+def _lines(frequency: np.ndarray) -> np.ndarray:
+    """Return frequencies [Hz] as a list of at least one; ShapeError for others."""
+    lines = np.asarray(frequency, float)
+    if lines.ndim != 1 or not len(lines) or not (np.isfinite(lines) & (lines >= 0)).all():
+        raise ShapeError(
+            "argument frequency takes a list of one or more frequencies [Hz], 0 or more"
+        )
+    return lines
 
 
 def _responses(
@@ -83,7 +101,7 @@ def _responses(
         if frequency is None or not _labels(outputs):
             raise FileError("--input needs at least one --output, as --output 55:+Z")
         model = as_model(source)
-        found = _between(model, outputs, inputs, np.asarray(frequency, float), damping, progress)
+        found = _between(model, outputs, inputs, frequency, damping, progress)
         return replace(found, notes=(*model.notes, *found.notes))
     if isinstance(source, Case):
         return _of_recording(source, damping, progress)

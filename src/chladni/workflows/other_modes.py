@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..case import Case
+from ..arguments import checked
 from ..dofs import parse
 from ..dynamics.modes import rigid_modes
 from ..ema.correlation import mac, subspace_mac
@@ -19,7 +19,8 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
-from .loaded_model import DeckModels, Model, as_model, similar_names
+from .given_case import Source
+from .loaded_model import Model, as_model, similar_names
 
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both
 CLOSE = 0.01  # relative distance of frequencies within which shapes may mix
@@ -95,9 +96,10 @@ def _universal(path: Path) -> PunchModes:
     return PunchModes(np.asarray(shapes.frequency), ids, values)
 
 
+@checked
 @one_blas_thread()
 def other_modes(
-    source: Case | Model | DeckModels | str | Path,
+    source: Source,
     path: Path | str,
     *,
     units: str | Units | None = None,
@@ -107,7 +109,7 @@ def other_modes(
 
     Parameters
     ----------
-    source : a model, a case, or the path of a deck or case
+    source : a model, a case, an Assembly, or the path of a deck or case
     path : OP2, punch or universal file (dataset 55)
     units : of a deck given by its path
 

@@ -7,12 +7,14 @@ from typing import IO, Any
 
 import numpy as np
 
+from ...arguments import checked
 from ...dynamics.frf import FRF
 from ...ema.level_table import LevelTable
 from ...ema.setup import PoleTable
 from ...output import atomic
 
 
+@checked
 def write_npz(path: str | Path, frf: FRF) -> None:
     """Write responses as NPZ, every digit kept.
 
@@ -35,6 +37,7 @@ def write_npz(path: str | Path, frf: FRF) -> None:
     _replace(path, "wb", lambda file: np.savez_compressed(file, **arrays))
 
 
+@checked
 def write_csv(path: str | Path, frf: FRF) -> None:
     """Write responses as CSV, one row per line and channel, every digit kept.
 

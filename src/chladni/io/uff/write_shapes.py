@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arguments import checked
 from .write_uff import uff_text, write_sets
 
 
+@checked
 def write_shapes(
     path: str | Path,
     frequency: np.ndarray,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 
+from ....arguments import checked
 from ....errors import FileError
 from ....output import atomic
 from ..text.deck import Deck
@@ -18,6 +19,7 @@ from .rewrite_card import raw_lines, rewritten
 Lines = dict[int, list[str]]  # new lines in place of a line (from 1)
 
 
+@checked
 def write_deck(
     deck: Deck, path: Path | str, changes: Sequence[Change], home: Path | str | None = None
 ) -> Path:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+from ....arguments import checked
 from ....errors import FileError, nearest
 from .card_layout import BOM, tables
 from .case_control import SELECTS, CaseControl, case_control, selects_one
@@ -42,6 +43,7 @@ class Deck:
         return sum(map(len, self.cards.values()))
 
 
+@checked
 def read_deck(path: Path | str, allow: Sequence[str] = ()) -> Deck:
     """Read a deck and all it includes.
 
