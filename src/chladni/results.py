@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -54,12 +55,23 @@ _FRAME = (
     '<iframe srcdoc="{}" sandbox="" title="{}" '
     'style="width:100%;height:{}rem;border:1px solid #ccc;border-radius:8px"></iframe>'
 )
-_views: dict[type, Callable[[], View]] = {}
+_views: dict[str, Callable[[], View]] = {}  # by the full name of the type
+_later: list[str] = []  # modules that fill it
 
 
-def show_by(kind: type, view: Callable[[], View]) -> None:
-    """Let results of this type be shown by what the call returns at the first use."""
-    _views[kind] = view
+def full_name(kind: type) -> str:
+    """Module and name of a type, by which it is known before it is loaded."""
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def show_by(kind: type | str, view: Callable[[], View]) -> None:
+    """Let results of a type, or of its full name, be shown by what the call returns."""
+    _views[kind if isinstance(kind, str) else full_name(kind)] = view
+
+
+def show_later(module: str) -> None:
+    """Name a module that is loaded, and fills in views, when a result without one is shown."""
+    _later.append(module)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,7 +87,10 @@ class Result:
 
     @property
     def _view(self) -> View:
-        return next(_views[kind] for kind in type(self).__mro__ if kind in _views)()
+        names = [full_name(kind) for kind in type(self).__mro__]
+        while not any(name in _views for name in names):
+            import_module(_later.pop())
+        return next(_views[name] for name in names if name in _views)()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.summary().partition(chr(10))[0]}>"

@@ -16,7 +16,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.stats import kstest, norm
 
 from chladni.case import load_case
 from chladni.effects.calibration_parameters import (
@@ -181,6 +180,8 @@ def interval_evidence(
 
 def table(answers: Sequence[CalibratedArticle]) -> list[str]:
     """Coverage of 90 % intervals, and Kolmogorov-Smirnov p of uniformity, by noise and value."""
+    from scipy.stats import kstest, norm
+
     lines = [f"{'noise':11} {'value':12} number  inside 90 %  rms off  sd/prior  uniform p"]
     for noise in NOISES:
         mine = [a for a in answers if a.noise == noise]

@@ -17,8 +17,6 @@ its modal damping would scatter more than that of one structure.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
-from scipy.stats import norm
 
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
@@ -119,6 +117,8 @@ class _Linear(LinearModel):
 
 def _along_lines(z: np.ndarray) -> np.ndarray:
     """White noise (n_f, ...) made similar on neighbouring lines; its variance stays one."""
+    from scipy.signal import lfilter
+
     scale = np.sqrt(1 - ALIKE**2)
     fresh = np.concatenate([z[:1], scale * z[1:]])
     return np.asarray(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0))
@@ -215,6 +215,8 @@ def of_poles(data: Poles, state: State) -> FitTest:
     and of at least as many poles without a partner among the modes of ``state``. Each pole is
     spurious with its own probability.
     """
+    from scipy.stats import norm
+
     closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
     alone = np.setdiff1d(poles, data.pairs(state)[0])

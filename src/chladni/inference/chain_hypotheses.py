@@ -15,7 +15,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from ..dynamics.frf import FRF
 from ..dynamics.modal_sum import modal_sum
@@ -275,6 +274,8 @@ def _read_otherwise(
 
 def _relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list[Hypothesis]:
     """The outputs under each other's labels, as many as it takes; of two, shapes tell better."""
+    from scipy.optimize import linear_sum_assignment
+
     best: tuple[float, np.ndarray] = (np.inf, np.arange(len(labels)))
     for H in seen.answers():
         log_H = _logarithm(H)

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm, t
 
 from ..effects.calibration_parameters import RandomField
 from ..effects.effect import Effect
@@ -143,6 +142,8 @@ def _summary(
 
     The mean of A articles is off μ by τ/√A, where τ is known from A - 1 differences: Student's t.
     """
+    from scipy.stats import norm, t
+
     fit, (tau, low, high) = mean.fit, spread
     own, count = calibration_positions(fit.effects), len(names)
     z, form = norm.ppf(0.975), np.diag(fit.covariance)

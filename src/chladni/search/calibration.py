@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from ..effects.effect import Effect
 from ..errors import ModelError
@@ -149,6 +148,8 @@ def latin_hypercube(problem: UpdatingProblem, count: int) -> list[np.ndarray]:
 
     McKay, Beckman and Conover (1979), Technometrics 21, 239-245; a fixed seed.
     """
+    from scipy.stats import qmc
+
     own, every = calibration_positions(problem.base), unknowns(problem.base)
     if not len(own):
         return []

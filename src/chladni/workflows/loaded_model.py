@@ -162,8 +162,6 @@ def opened(
     FileError
         If there is no such file, it is neither a deck nor a case, or has other units.
     """
-    from ..case import Case, load_case
-
     found: Case | Model | DeckModels
     if isinstance(source, str | Path):
         path = Path(source)
@@ -171,20 +169,30 @@ def opened(
             raise FileError(f"no file or folder {path}{similar_names(path)}")
         if not is_case(path):
             return load_deck(path, units, allow)
+        from ..case import load_case
+
         found = load_case(path)
     elif isinstance(source, Deck):
         return DeckModels(source.path, source, None if units is None else unit_system(units))
     elif isinstance(source, Assembly):
         found = Model(Path("assembly"), source, units=UNITS["SI"])
-    elif isinstance(source, Case | Model | DeckModels):
+    elif isinstance(source, Model | DeckModels):
         found = source
     else:
-        raise ArgumentError(f"a model is no {type(source).__name__}; give {SOURCES}")
+        found = _loaded_case(source)
     if units is not None and (found.units is None or found.units != unit_system(units)):
-        path = found.path if isinstance(found, Case) else found.source
+        path = found.source if isinstance(found, Model | DeckModels) else found.path
         known = "none" if found.units is None else found.units.name
         raise FileError(f"argument units: {path} was loaded before, with units {known}")
     return found
+
+
+def _loaded_case(source: object) -> "Case":
+    from ..case import Case
+
+    if not isinstance(source, Case):
+        raise ArgumentError(f"a model is no {type(source).__name__}; give {SOURCES}")
+    return source
 
 
 def as_model(

@@ -1,6 +1,7 @@
 """Normal modes of a model: frequencies, shapes, mass, the energy of each part."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
-from .given_case import Source
 from .loaded_model import LEAST_MODES, Model, as_model
+
+if TYPE_CHECKING:
+    from .given_case import Source
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +63,7 @@ class NormalModes(Result):
 @checked
 @one_blas_thread()
 def modes(
-    source: Source,
+    source: "Source",
     count: int = 20,
     *,
     units: str | Units | None = None,

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +20,10 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
-from .given_case import Source
 from .loaded_model import Model, as_model, similar_names
+
+if TYPE_CHECKING:
+    from .given_case import Source
 
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both
 CLOSE = 0.01  # relative distance of frequencies within which shapes may mix
@@ -99,7 +102,7 @@ def _universal(path: Path) -> PunchModes:
 @checked
 @one_blas_thread()
 def other_modes(
-    source: Source,
+    source: "Source",
     path: Path | str,
     *,
     units: str | Units | None = None,

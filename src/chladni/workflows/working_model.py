@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Self, cast
+from typing import TYPE_CHECKING, Self, cast
 
 import numpy as np
 
@@ -22,9 +22,11 @@ from ..model.free_parameter import FreeParameter
 from ..results import DrawnPicture
 from ..units import Units
 from .frf import frf
-from .given_case import Source
 from .loaded_model import DeckModels, Model, as_model, opened
 from .modes import NormalModes, at_least_one, modes
+
+if TYPE_CHECKING:
+    from .given_case import Source
 
 OF_PARTS = tuple(name for name in FIELDS if name not in ("K", "M"))
 
@@ -173,7 +175,7 @@ class WorkingModel(Model):
 
 @checked
 def load(
-    source: Source,
+    source: "Source",
     units: str | Units | None = None,
     *,
     allow: Sequence[str] = (),

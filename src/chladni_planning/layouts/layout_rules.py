@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chladni.errors import LabelError, ShapeError, named
 
@@ -20,6 +19,8 @@ def too_near(points: np.ndarray, distance: float) -> np.ndarray:
     points : (n, 2) or (n, 3)   places of the candidates [m]
     distance : least distance between two sensors [m]
     """
+    from scipy.spatial import cKDTree
+
     near = np.zeros((len(points), len(points)), bool)
     pairs = cKDTree(points).query_pairs(np.nextafter(distance, 0.0), output_type="ndarray")
     near[pairs[:, 0], pairs[:, 1]] = near[pairs[:, 1], pairs[:, 0]] = True

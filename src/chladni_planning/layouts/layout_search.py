@@ -1,7 +1,6 @@
 """Layouts by searches that may leave a local optimum: annealing and random-key evolution."""
 
 import numpy as np
-from scipy.optimize import differential_evolution
 
 from .deletion import greedy, start
 from .exchange import _joinable, _regular, _swapped, exchange
@@ -73,6 +72,8 @@ def evolved(
     The keys make any crossing of two layouts a layout (Bean 1994, ORSA J. Computing 6, 154-160);
     they are evolved by differential evolution (scipy), ``population`` times n individuals.
     """
+    from scipy.optimize import differential_evolution
+
     c = candidates(phi, noise)
     _, checked = start(c, n_sensors, rules)
 
