@@ -1,6 +1,7 @@
 """Every result explains itself: in words, drawn, saved as its command does, in a notebook."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -47,6 +48,8 @@ def subclasses(kind: type) -> set[type]:
 def test_every_type_of_result_has_a_view():
     """No result can be added that prints as a heap of arrays; a package brings its own views."""
     assert all(hasattr(chladni, name) for name in chladni.__all__)  # loads the packages
+    for name in _PAGES:
+        import_module(name.rpartition(".")[0])
     assert set(_views) == {full_name(kind) for kind in subclasses(Result) - {Result}}
     packages = {name: name.split(".")[0] for name in _views}
     own = {name for name, package in packages.items() if package == "chladni"}
