@@ -206,13 +206,14 @@ def level_checks(
         found.append(_quantity(identified, order))
     level = float(np.median(rest))
     opposite = positive if abs(order) == 2 else 1 - positive  # two derivatives turn every sign
-    if opposite > 0.8 and abs(order) != 1:
+    if known_gain and opposite > 0.8 and abs(order) != 1:
         text = (
             f"{100 * opposite:.0f} % of the modes have the sign opposite to the model's: the force "
             "gauge (or every sensor) is reversed."
         )
         mend = f"in sensors.csv reverse the direction of input {identified.inputs[0]}"
-        found.append(Finding("reversed force", text, "fault", (), mend, -1.0))
+        undo = ("factor", "-1")
+        found.append(Finding("reversed force", text, "fault", (), mend, -1.0, undo))
     if known_gain and abs(level) > np.log(LOUD):
         found.append(_unit(level))
     said = f"{np.exp(np.median(size)):.3g} times the model, over {len(gains)} modes"
@@ -256,6 +257,7 @@ def _unit(level: float) -> Finding:
     said = f"the recording is {np.exp(level):.3g} times the model"
     if abs(level + np.log(factor)) < NEAR_FACTOR:
         mend = f"in case.toml, [test]: factor = {factor:.7g}"
-        return Finding("wrong units", f"{said}: {why}.", "fault", (), mend, factor)
+        undo = ("factor", f"{factor:.7g}")
+        return Finding("wrong units", f"{said}: {why}.", "fault", (), mend, factor, undo)
     mend = 'check the calibration, or in case.toml, [test]: gain = "unknown"'
     return Finding("level", f"{said}, which no unit explains.", "warning", (), mend, np.exp(level))

@@ -12,6 +12,7 @@ import numpy as np
 from ..dynamics.frf import FRF
 from .finding import Check, Finding
 from .screening import noise_of
+from .value_checks import cut_off, without_phase
 
 LEAST_LINES = 12
 NOISE_ONLY = 0.3  # noise over power of the median line: nothing but noise has more
@@ -41,7 +42,8 @@ def channel_checks(
     findings: list[Finding] = []
     checks: list[Check] = []
     for found, check in (
-        dead(frf, alive), incoherent(frf), reversed_drive(frf), reciprocity(frf)
+        dead(frf, alive), incoherent(frf), reversed_drive(frf), reciprocity(frf),
+        without_phase(frf), cut_off(frf),
     ):  # fmt: skip
         findings += found
         checks.append(check)

@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
+from .axis_shift import axis_check
 from .chain_checks import (
     LEAST_MODES,
     LOUD,
@@ -68,6 +69,10 @@ def screened(
         more, one = _phases(frf, strong, use)
         findings += more
         checks.append(one)
+        if not more:
+            more, one = axis_check(frf, found, use)
+            findings += more
+            checks.append(one)
         checks.append(_lines(strong, frf.frequency))
     return Screening(recording.name, tuple(findings), tuple(checks))
 

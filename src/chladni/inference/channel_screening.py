@@ -52,11 +52,12 @@ def against_model(
     found : what was identified from it, its outputs in the order of ``outputs``; None where nothing
     model : up to ``REACH`` times the band at least
     """
-    faults, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
-    if faults:
+    found_in, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
+    faults = [f for f in found_in if f.severity == "fault"]
+    if found_in:
         kept = tuple(f for f in before.findings if f.kind not in _FOLLOWS)
         before = replace(before, findings=kept)
-    before = before.with_more(faults, [check])
+    before = before.with_more(found_in, [check])
     return (
         before
         if faults or found is None
@@ -64,7 +65,8 @@ def against_model(
     )
 
 
-_FOLLOWS = ("wrong quantity", "reversed sign", "not reciprocal", "delay", "equal channels")
+_FOLLOWS = ("wrong quantity", "reversed sign", "not reciprocal", "delay", "equal channels",
+            "cut off")  # fmt: skip
 
 
 def _by_modes(

@@ -262,8 +262,12 @@ def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
     if screening is None:
         return []
     return [
-        CaseFinding(f.text.rstrip("."), f.repair, f.severity == "fault") for f in screening.findings
+        CaseFinding(f.text.rstrip("."), f.repair + _ITSELF * bool(f.mend), f.severity == "fault")
+        for f in screening.findings
     ]
+
+
+_ITSELF = " (calibrate and diagnose undo it themselves)"
 
 
 def _band(case: Case, elastic: np.ndarray) -> list[CaseFinding]:

@@ -31,6 +31,7 @@ from .identify import firm
 from .output_only import with_natural_frequencies
 from .question_of_case import nothing_measured
 from .screening_of_case import screened_by_model
+from .sign_of_gain import with_sign_of_gain
 from .unit_check import refuse_other_units
 
 BANDS = 6
@@ -108,6 +109,8 @@ def _correlated(case: Case, progress: Progress, every_line: bool) -> Correlation
     f_max = _f_max(case, test)
     progress("modes of the model", 0.1)
     model = modelled(case.tested(case.assembly), REACH * f_max)
+    case = with_sign_of_gain(case, model)
+    test = case.frfs[0] if case.frfs else None
     f = model.modes.frequency
     inside = ~rigid_modes(model.modes) & (f > RIGID * f_max) & (f <= 1.3 * f_max)
     near = model.modes.sel(np.flatnonzero(inside))

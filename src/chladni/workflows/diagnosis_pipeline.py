@@ -15,7 +15,7 @@ from ..case import Case
 from ..decision.decide import RULES
 from ..decision.decision_rules import odds_of_something_else
 from ..dynamics.frf import FRF
-from ..ema.finding import Screening
+from ..ema.finding import Finding, Screening
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
@@ -63,6 +63,7 @@ from ..sparse.freed_memory import give_back_freed_memory
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
+from .mended_case import undone, with_undone
 from .over_levels import over_levels
 from .question_of_case import question_of
 from .screening_of_case import (
@@ -72,6 +73,7 @@ from .screening_of_case import (
     screened_unprepared,
     unmendable,
 )
+from .sign_of_gain import with_sign_of_gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +99,8 @@ def searched(
 ) -> Explained:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
+    A fault of the recording that is beyond doubt and that a map undoes is undone first.
+
     Parameters
     ----------
     known : posterior of the shared parameters from other states
@@ -105,8 +109,26 @@ def searched(
     Raises
     ------
     RecordingAtFault
-        If the recording shows a fault that a fit cannot compensate.
+        If the recording shows a fault that neither a map nor a fit can compensate.
     """
+    case, faults = with_sign_of_gain(case), tuple[Finding, ...]()
+    while True:
+        try:
+            made = _searched(case, diagnosing, progress, known, settings, faults)
+            return replace(made, screening=with_undone(made.screening, faults))
+        except RecordingAtFault as found:
+            mended = undone(case, found.screening, faults)
+            if mended is None:
+                seen = with_undone(found.screening, faults)
+                raise RecordingAtFault(seen or found.screening) from None
+            case, faults = mended, (*faults, *(f for f in found.screening.faults if f.mend))
+
+
+def _searched(
+    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None,
+    settings: CalibrationSettings, faults: tuple[Finding, ...],
+) -> Explained:  # fmt: skip
+    """Fit the recording as it is; ``faults`` were undone already."""
     progress("identifying the recording", 0.0)
     if diagnosing and not len(case.assembly.shells) + len(case.assembly.beams):
         raise FileError(
@@ -124,8 +146,9 @@ def searched(
     if prepared.identified is not None:
         refuse_turned_axes(case, prepared.identified, prepared.nominal)
     screening = screened_prepared(case, prepared)
-    if diagnosing and screening is not None and unmendable(screening):
-        raise RecordingAtFault(screening)
+    if screening is not None and unmendable(screening):
+        if diagnosing or undone(case, screening, faults) is not None:
+            raise RecordingAtFault(screening)
     if known:
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
@@ -159,7 +182,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     found = with_deck(prepared, known.found)
     give_back_freed_memory()
     progress("the updated deck", 0.85)
-    stages, lost = _updated(case, question, prepared, found)
+    mended = () if known.screening is None else known.screening.mended
+    stages, lost = _updated(case, question, prepared, found, mended)
     progress("scores", 0.95)
     result = _result(question, prepared, found, stages)
     result = over_levels(question, prepared, stages, result, diagnosing)
@@ -205,15 +229,21 @@ def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple
 
 
 def _updated(
-    case: Case, question: Question, prepared: Prepared, found: Diagnosis
+    case: Case, question: Question, prepared: Prepared, found: Diagnosis, mended: tuple[str, ...]
 ) -> tuple[UpdatedModels, list[str]]:
-    """Return the structures before and after, each solved once, as their decks describe them."""
+    """Return the structures before and after, each solved once, as their decks describe them.
+
+    Comments of a changed deck say what of the recording was ``mended``.
+    """
     stages, nominal = models(question, found), as_it_is(question, prepared.nominal)
     calibrated, lost = _deck(case, question, nominal, stages.calibrated)
     final = calibrated
     if stages.final is not stages.calibrated:
         final, lost = _deck(case, question, nominal, stages.final)
         final = _commented(final, found.as_deck)
+    if final.changes:
+        comments = tuple(Add((), f"Recording mended: {text}") for text in mended)
+        final = replace(final, changes=(*final.changes, *comments))
     test = measured_modes(prepared)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared), test=test)
     return replace(made, curves=_curves(case, made, test)), lost

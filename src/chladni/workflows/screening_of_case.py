@@ -11,13 +11,15 @@ from ..ema.recording_screening import screened
 from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
-from ..inference.chain_hypotheses import explains, smoothed
+from ..inference.chain_hypotheses import explains
 from ..inference.channel_screening import against_model
 from ..inference.result import NamedEffect
+from ..inference.smoothed_responses import smoothed
 from ..model.point_masses import with_mass_pairs
 from ..search.question import Prepared
 from .case_model import REACH
 from .diagnosis_result import DiagnosisResult
+from .sign_of_gain import with_sign_of_gain
 
 HEAVY = 0.1  # of the structure: sensors seldom weigh more
 POUND, NEAR_POUND = 0.45359237, 0.1  # [kg], ln: what no scatter of sheets reaches
@@ -106,6 +108,7 @@ def screened_unprepared(case: Case) -> Screening | None:
     """Screen the first recording when its preparation failed; None without an FRF."""
     if not case.frfs:
         return None
+    case = with_sign_of_gain(case)
     frf = case.frfs[0]
     try:
         found = identify(frf, case.band, use=case.lines(frf.frequency))
@@ -116,7 +119,7 @@ def screened_unprepared(case: Case) -> Screening | None:
 
 
 def unmendable(screening: Screening) -> bool:
-    """Return True if a fault was found that a fit cannot compensate."""
+    """Return True if a fault was found that a fit alone cannot compensate."""
     faults = screening.faults
     return len(faults) > 1 or any(f.kind not in FITTED for f in faults)
 
