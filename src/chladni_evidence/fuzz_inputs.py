@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from .contradictions import CONTRADICTIONS
+from .contradictory_recordings import contradictory
 from .fuzz_input import FuzzInput, Maker
 from .mutations import WORDS, injured_archive, injured_bytes, injured_text
 from .sound_files import Files, sound_files
@@ -121,5 +122,6 @@ _MAKERS: dict[str, Maker] = {
     "wav": _wav,
     "mesh": _mesh,
     **CONTRADICTIONS,
+    "contradictory": contradictory,
 }
 KINDS = tuple(_MAKERS)

@@ -40,3 +40,21 @@ def test_a_sound_recording_passes_however_few_digits_it_has(digits):
     scale = 10.0 ** (digits - np.ceil(np.log10(np.abs(frf.values).max())))
     rounded = with_values(frf, np.round(frf.values * scale) / scale)
     assert [f.kind for f in channel_checks(rounded)[0] if f.kind in ("cut off", "no phase")] == []
+
+
+def test_phases_that_jump_are_no_dead_channels():
+    """Degrees read as radians turn 3 % of noise into two radians, and leave the magnitudes."""
+    frf, rng = plate_like(), np.random.default_rng(2)
+    phase = np.angle(frf.values) + 0.03 * rng.normal(size=frf.values.shape)
+    wrong = np.abs(frf.values) * np.exp(1j * np.degrees(phase))
+    kinds = [f.kind for f in channel_checks(with_values(frf, wrong))[0]]
+    assert "jumping phase" in kinds
+    assert "dead channel" not in kinds
+
+
+def test_noise_alone_is_dead_whatever_its_phase():
+    frf, rng = plate_like(), np.random.default_rng(2)
+    noise = rng.normal(size=frf.values.shape) + 1j * rng.normal(size=frf.values.shape)
+    kinds = [f.kind for f in channel_checks(with_values(frf, noise))[0]]
+    assert "dead channel" in kinds
+    assert "jumping phase" not in kinds

@@ -70,6 +70,16 @@ def test_what_breaks_a_rule_is_told_and_kept(called, tmp_path, monkeypatch):
         assert (kept / "command.txt").read_text().startswith("chladni modes a.bdf --out out\n")
 
 
+@pytest.mark.parametrize(("said", "called"), [("it is conjugated", "answered"), ("fine", "silent")])
+def test_an_answer_without_the_cause_of_a_contradiction_is_silent(said, called, monkeypatch):
+    import runpy
+
+    code = f"import os; os.mkdir('out'); open('out/a', 'w'); print({said!r})"
+    monkeypatch.setattr(runpy, "run_module", lambda *_, **__: exec(code))
+    one = FuzzInput("contradictory", {}, ("check", "."), "conjugated|unlike")
+    assert outcome(one).called == called
+
+
 def test_an_unknown_kind_is_refused(tmp_path, capsys):
     assert main(["fuzz", "--kinds", "poem", "--out", str(tmp_path)]) == 2
     assert "no kind poem; there are deck" in capsys.readouterr().err

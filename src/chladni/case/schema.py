@@ -94,7 +94,7 @@ SCHEMA = (
     Key("test", "quantity", "word", "", "as in the file", "Quantity of the FRFs.",
         '"accelerance"', _READ, get_args(Quantity)),
     Key("test", "gain", "word", "", "known",
-        "Unknown: one real factor common to all channels is free.", '"unknown"', _SCORE,
+        "Unknown: one real factor common to all channels is free, its sign included.", '"unknown"', _SCORE,
         ("known", "unknown")),
     Key("test", "factor", "number, not 0", "", "1",
         "Factor on all FRFs: 9.80665 where g were read as m/s².", "9.80665", _READ),

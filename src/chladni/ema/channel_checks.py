@@ -12,7 +12,7 @@ import numpy as np
 from ..dynamics.frf import FRF
 from .finding import Check, Finding
 from .screening import noise_of
-from .value_checks import cut_off, without_phase
+from .value_checks import cut_off, jumping_phase, without_phase
 
 LEAST_LINES = 12
 NOISE_ONLY = 0.3  # noise over power of the median line: nothing but noise has more
@@ -42,11 +42,13 @@ def channel_checks(
     findings: list[Finding] = []
     checks: list[Check] = []
     for found, check in (
-        dead(frf, alive), incoherent(frf), reversed_drive(frf), reciprocity(frf),
-        without_phase(frf), cut_off(frf),
+        jumping_phase(frf, NOISE_ONLY), dead(frf, alive), incoherent(frf), reversed_drive(frf),
+        reciprocity(frf), without_phase(frf), cut_off(frf),
     ):  # fmt: skip
         findings += found
         checks.append(check)
+    if findings and findings[0].kind == "jumping phase":
+        findings = [f for f in findings if f.kind != "dead channel"]
     silent = {c for f in findings if f.kind == "dead channel" for c in f.channels}
     alive = [o for o in frf.outputs if o not in silent]
     if alive:

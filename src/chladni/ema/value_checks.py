@@ -1,14 +1,18 @@
 """Check the numbers of a recording: FRFs without a phase, magnitudes cut off."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import named
 from .finding import Check, Finding
+from .screening import roughness
 
 LEVEL = 1e-4  # of the largest magnitude: lines that near are one level
 BENT = 10.0  # times the phase that so small a change of magnitude leaves near a maximum
 LEAST_CUT = 3  # lines of one level
+JUMPING = 0.1  # roughness of magnitudes over that of the FRFs; of noise it is a fifth and more
 
 
 def without_phase(frf: FRF) -> tuple[list[Finding], Check]:
@@ -33,6 +37,30 @@ def without_phase(frf: FRF) -> tuple[list[Finding], Check]:
         found = [Finding("no phase", text, "fault", (), "export complex FRFs again")]
     said = "one part is zero" if found else "real and imaginary parts"
     return found, Check("phase", said, not found)
+
+
+def jumping_phase(frf: FRF, rough: float) -> tuple[list[Finding], Check]:
+    """Magnitudes that are smooth over frequency while phases jump from line to line.
+
+    The magnitude of noise is as rough as its parts: noise over power of |H| is then as large.
+
+    Parameters
+    ----------
+    rough : noise over power of the median line, beyond which FRFs are nothing but noise
+    """
+    noisy = [
+        float(np.median(roughness(one) / np.maximum(np.abs(one.values) ** 2, 1e-300)))
+        for one in (frf, replace(frf, values=np.abs(frf.values) + 0j))
+    ]
+    if noisy[0] <= rough or noisy[1] > JUMPING * noisy[0]:
+        return [], Check("phase over frequency", f"noise over power {noisy[0]:.2g}")
+    text = (
+        "the magnitudes of the FRFs are smooth over frequency, but their phases jump from line to "
+        "line: the phases are wrong, as those in degrees that were read in radians are."
+    )
+    mend = "export the phases again, or real and imaginary parts"
+    found = Finding("jumping phase", text, "fault", (), mend)
+    return [found], Check("phase over frequency", "jumps from line to line", False)
 
 
 def cut_off(frf: FRF) -> tuple[list[Finding], Check]:

@@ -11,7 +11,7 @@ from ..ema.chain_checks import level_checks, modal_gains
 from ..ema.channel_checks import left_out
 from ..ema.finding import Check, Finding, Screening
 from ..ema.identification import Identified
-from ..ema.recording_screening import strong_modes
+from ..ema.recording_screening import other_readings, strong_modes
 from ..ema.shape_faults import LEAST_CHANNELS, LEAST_MODES, ModelShapes, shape_faults
 from ..ema.shapes import real_shapes
 from ..fem.assemble import Structure
@@ -27,6 +27,7 @@ AWAY = 0.12  # of the structure: a patch that the model lacks bends shapes as a 
 PLACES = 400  # of the shells where a misplaced sensor may sit
 EQUAL_LINES, EQUAL_DAMPING = 200, 0.02  # of the model's responses at two channels that are equal
 UNLIKE = 0.3  # 1: nothing in common; the recorded difference below this share of the model's
+FAR_BELOW = 1.5  # times: a deck that is so much too stiff has E more than twice too large
 REACH = 1.3  # times the band: modes of the model that may mix with those of the test
 
 
@@ -54,17 +55,48 @@ def against_model(
     """
     found_in, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
     faults = [f for f in found_in if f.severity == "fault"]
-    if found_in:
-        kept = tuple(f for f in before.findings if f.kind not in _FOLLOWS)
+    if not faults and found is not None:
+        alone = other_readings(frf, strong_modes(found), lines)
+        found_in, faults = (alone, alone) if alone else (found_in, faults)
+    follows = _FOLLOWS if found_in else _CONFIRMED
+    if found_in or any(f.kind in _CONFIRMED for f in before.findings):
+        kept = tuple(f for f in before.findings if f.kind not in follows)
         before = replace(before, findings=kept)
     before = before.with_more(found_in, [check])
-    return (
-        before
-        if faults or found is None
-        else _by_modes(before, found, model, outputs, inputs, gain_known)
+    if faults or found is None:
+        return before
+    before = before.with_more(*_supports(strong_modes(found), model))
+    return _by_modes(before, found, model, outputs, inputs, gain_known)
+
+
+def _supports(strong: Identified, model: Modelled) -> tuple[list[Finding], list[Check]]:
+    """Modes of the test far below the first elastic mode of a deck without supports.
+
+    A free structure has none there. Cords do, and are softer than supports; both are said.
+    """
+    f, rigid = model.modes.frequency, rigid_modes(model.modes)
+    count = int(rigid.sum())
+    if not count or rigid.all() or not strong.order:
+        return [], []
+    first = float(f[~rigid].min())
+    low = strong.frequency[strong.frequency < first / FAR_BELOW]
+    said = f"{count} motions of the deck are free, {len(low)} modes of the test far below the rest"
+    if not len(low):
+        return [], [Check("supports", said)]
+    text = (
+        f"the deck is free to move ({count} motions without stiffness; first elastic mode "
+        f"{first:.4g} Hz), but the test has {len(low)} modes below, from {low.min():.4g} Hz: the "
+        "article was held, or hangs on stiff cords."
     )
+    mend = (
+        "check that the case control selects the SPC set of the test, or name the cords' grids "
+        "under [test] hangers"
+    )
+    found = Finding("supports", text, "warning", (), mend, float(len(low)))
+    return [found], [Check("supports", said, False)]
 
 
+_CONFIRMED = ("wrong quantity",)  # phases speak for it, and the model says whether it is so
 _FOLLOWS = ("wrong quantity", "reversed sign", "not reciprocal", "delay", "equal channels",
             "cut off")  # fmt: skip
 

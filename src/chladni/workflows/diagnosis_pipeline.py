@@ -71,6 +71,7 @@ from .screening_of_case import (
     instead_of_effects,
     screened_prepared,
     screened_unprepared,
+    unlike,
     unmendable,
 )
 from .sign_of_gain import with_sign_of_gain
@@ -203,7 +204,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen = known.screening
     if diagnosing:
-        distrust = (*distrust, *instead_of_effects(result.verdict, seen))
+        doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
+        distrust = (*distrust, *doubts)
     said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     return replace(

@@ -23,6 +23,7 @@ from .sign_of_gain import with_sign_of_gain
 
 HEAVY = 0.1  # of the structure: sensors seldom weigh more
 POUND, NEAR_POUND = 0.45359237, 0.1  # [kg], ln: what no scatter of sheets reaches
+UNLIKE = "nothing fits"  # no interpretation of the recording does
 FITTED = ("reversed sign",)  # of one channel: diagnosis weighs and measures it
 
 
@@ -47,7 +48,9 @@ def screened_by_model(
     """
     frf = case.frfs[0]
     lines = case.lines(frf.frequency) if use is None else use
-    alone = screened(case.recordings[0], found, case.recordings[1:], _places(case), use)
+    alone = screened(
+        case.recordings[0], found, case.recordings[1:], _places(case), use, alone=False
+    )
     if masses := _masses(case, frf, lines, model):
         return alone.with_more(masses, [Check("given masses", "check them", False)])
     return against_model(
@@ -122,6 +125,20 @@ def unmendable(screening: Screening) -> bool:
     """Return True if a fault was found that a fit alone cannot compensate."""
     faults = screening.faults
     return len(faults) > 1 or any(f.kind not in FITTED for f in faults)
+
+
+def unlike(result: DiagnosisResult, screening: Screening | None) -> tuple[str, ...]:
+    """Return a doubt where the recording fits nothing, and the result explains less than half."""
+    fits_nothing = screening is not None and any(f.kind == UNLIKE for f in screening.findings)
+    fit = None if result.agreement is None else result.agreement.fitted
+    if not fits_nothing or fit is None or fit.nominal is None or fit.after is None:
+        return ()
+    if explains(fit.after, fit.nominal):
+        return ()
+    return (
+        f"recording and model are unlike and stay so (Q {fit.nominal:.2g} before, {fit.after:.2g} "
+        "after): places, supports or the recording may be wrong",
+    )
 
 
 def instead_of_effects(verdict: str, screening: Screening | None) -> tuple[str, ...]:
