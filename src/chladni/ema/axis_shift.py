@@ -1,7 +1,7 @@
 """Check that the frequency axis of a recording begins at 0 Hz.
 
-H(s) = s^q [Σ_r R_r/(s-p_r) + R̄_r/(s-p̄_r) + L/s² + U] ties the axis to zero in three ways: by s^q,
-by the poles p̄_r below zero and by the inertia line L/s². An axis that is off by δ fits none at
+H(s) = s^q [Σ_r R_r/(s-p_r) + R̄_r/(s-p̄_r) + L/s² + U]. The factor s^q, the poles p̄_r below zero and
+the inertia line L/s² tie the axis to zero. An axis that is off by δ fits none at
 s = iω, but all at s = i(ω - 2π δ). The sum of squares as a function of δ gives the shift with its
 standard deviation. A factor on the axis leaves H of this form: no recording shows it by itself, and
 no model whose stiffness is free.

@@ -1,8 +1,8 @@
 """Maps of FRFs, each of which undoes one way of writing them wrongly, by name.
 
-Right numbers under a wrong description are a family of maps: another quantity, the other sign, the
-other direction of time, real for imaginary part, radians for degrees, decibels for a ratio. A map
-is a word and its arguments, as ``("factor", "-1")``, so that a finding can hold it.
+Right numbers under a wrong description are a family of maps. The quantity, the sign or the direction
+of time is another; parts are exchanged; radians stand for degrees, decibels for a ratio. A map is
+a word and its arguments, as ``("factor", "-1")``, so that a finding can hold it.
 """
 
 from collections.abc import Callable, Iterator
@@ -64,9 +64,9 @@ def _polar(frf: FRF, magnitude: np.ndarray, phase: np.ndarray) -> FRF:
 def _decibels(frf: FRF) -> FRF:
     """10^(±|v|/20) e^(±iφ) of v = 20 log10|H| e^(iφ), the sign of the decibels by continuity.
 
-    Below 0 dB the phase of v is that of -H. At a line where v changes sign, its phase jumps by π
-    while that of H does not: the sign with the smaller step of log H is taken. Of both courses that
-    are left, the right one falls in phase where it is large: so it is at every stable pole.
+    Below 0 dB the phase of v is that of -H. Where v changes sign, its phase jumps by π and that of
+    H does not, so the sign with the smaller step of log H is taken. Two courses are left. The phase
+    of the right one falls where it is large, as at every stable pole.
     """
     v = frf.values
     plus = np.log(10) / 20 * np.abs(v) + 1j * np.angle(v)

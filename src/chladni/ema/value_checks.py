@@ -56,7 +56,7 @@ def jumping_phase(frf: FRF, rough: float) -> tuple[list[Finding], Check]:
         return [], Check("phase over frequency", f"noise over power {noisy[0]:.2g}")
     text = (
         "the magnitudes of the FRFs are smooth over frequency, but their phases jump from line to "
-        "line: the phases are wrong, as those in degrees that were read in radians are."
+        "line: phases in degrees that were read in radians look like this."
     )
     mend = "export the phases again, or real and imaginary parts"
     found = Finding("jumping phase", text, "fault", (), mend)

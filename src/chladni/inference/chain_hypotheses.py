@@ -98,8 +98,8 @@ def _nothing_fits(declared: float, best: Hypothesis) -> Finding:
         f"{best.finding.kind}, {best.Q:.2g})."
     )
     mend = (
-        "check in this order: supports of the deck against those of the test, places and "
-        "directions of sensors and force, which force each output belongs to, phases in the file"
+        "check in this order: supports of the deck, places and directions of sensors and force, "
+        "the force of each output, phases in the file"
     )
     return Finding("nothing fits", text, "warning", (), mend, declared)
 

@@ -28,7 +28,7 @@ from .smoothed_responses import (
 
 PLACES = 400  # where the force may act
 MOVED = 0.02  # of the structure: places nearer than that to their mirror images are the same
-OFF = 0.05  # of the structure: mirror images farther from every grid are none
+OFF = 0.05  # of the structure: mirror images farther from every grid are off it
 
 
 def relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list[Hypothesis]:
@@ -147,7 +147,7 @@ def mirrored(
 ) -> list[Hypothesis]:
     """Sensors and forces at the mirror images of their places, about the middle or through zero.
 
-    Of images that fit equally well, as on a symmetric structure, the one of fewest axes is taken.
+    Several images fit equally well on a symmetric structure: that of the fewest axes is taken.
     """
     points = model.structure.assembly.points
     centres = (points.min(axis=0) + points.max(axis=0)) / 2, np.zeros(3)
@@ -177,7 +177,7 @@ def mirrored(
 def _image(
     at: MeasuredDofs, turn: np.ndarray, middle: np.ndarray, model: Modelled
 ) -> MeasuredDofs | None:
-    """Dofs at the nearest grids of their mirror images; None where these are none, or the same."""
+    """Dofs at the grids nearest to their mirror images; None off the structure, or unmoved."""
     made = model.structure.assembly
     if at.base.any():
         return None

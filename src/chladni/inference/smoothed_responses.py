@@ -96,7 +96,7 @@ class Smoothed:
 
 
 def log10_of(H: np.ndarray) -> np.ndarray:
-    """log10 of responses, -300 where there is none."""
+    """log10 of responses, -300 of zero."""
     return np.asarray(np.log(np.where(H == 0, 1e-300, H)) / LN10)
 
 
