@@ -1,8 +1,8 @@
 """Maps of FRFs, each of which undoes one way of writing them wrongly, by name.
 
-Right numbers under a wrong description are a family of maps. The quantity, the sign or the direction
-of time is another; parts are exchanged; radians stand for degrees, decibels for a ratio. A map is
-a word and its arguments, as ``("factor", "-1")``, so that a finding can hold it.
+Right numbers under a wrong description are a family of maps. The quantity, the sign or the
+direction of time is another; parts are exchanged; radians stand for degrees, decibels for a ratio.
+A map is a word and its arguments, as ``("factor", "-1")``, so that a finding can hold it.
 """
 
 from collections.abc import Callable, Iterator

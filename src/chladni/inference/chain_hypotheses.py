@@ -40,6 +40,7 @@ from .smoothed_responses import (
 REACH = 2.0  # times the highest line: modes the model must have
 BEYOND_DOUBT = 1 / 2  # of Q of the next best interpretation, at most, before a map is applied
 STIFFNESS = tuple(np.arange(-0.5, 0.51, 0.06))  # ln of frequencies: what E and rho may be off by
+NOTHING_FITS = "nothing fits"  # no interpretation of the recording does
 FLAT = 1e-3  # of Q: responses that vary by 7 % about a power of frequency show no mode
 
 
@@ -101,7 +102,7 @@ def _nothing_fits(declared: float, best: Hypothesis) -> Finding:
         "check in this order: supports of the deck, places and directions of sensors and force, "
         "the force of each output, phases in the file"
     )
-    return Finding("nothing fits", text, "warning", (), mend, declared)
+    return Finding(NOTHING_FITS, text, "warning", (), mend, declared)
 
 
 def without_modes(frf: FRF, lines: np.ndarray) -> float:
@@ -140,9 +141,11 @@ def other_readings(
         tried.append(Hypothesis(Q, Q / declared, late))
     inside = (seen.omega > 0) & (seen.omega <= 2 * np.pi * seen.f[-1])
     if len(outputs.labels) >= LEAST_CHANNELS and inside.sum() >= LEAST_MODES:
-        tried += relabelled(seen, declared, outputs.labels)
+        swaps = relabelled(seen, declared, outputs.labels)
+        mixed = two_forces(seen, model, outputs, inputs)
+        tried += swaps
         tried += driven_elsewhere(seen, model, inputs)
-        tried += two_forces(seen, model, outputs, inputs)
+        tried += [h for h in mixed if not any(BEYOND_DOUBT * s.Q < h.Q for s in swaps)]
         tried += mirrored(frf, lines, declared, model, outputs, inputs)
     return tried
 

@@ -20,7 +20,7 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..geometry.grid_normals import grid_normals
 from ..geometry.sampling import farthest_point_sample
-from .chain_hypotheses import chain_faults
+from .chain_hypotheses import NOTHING_FITS, chain_faults
 
 ACROSS = 0.9  # cosine to the normal: a sensor is glued flat on its sheet
 AWAY = 0.12  # of the structure: a patch that the model lacks bends shapes as a shorter move would
@@ -55,9 +55,10 @@ def against_model(
     """
     found_in, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
     faults = [f for f in found_in if f.severity == "fault"]
-    if not faults and found is not None:
+    if found is not None and not any(f.mend for f in faults):
         alone = other_readings(frf, strong_modes(found), lines)
-        found_in, faults = (alone, alone) if alone else (found_in, faults)
+        if alone and (not faults or alone[0].kind == faults[0].kind):
+            found_in = faults = alone
     follows = _FOLLOWS if found_in else _CONFIRMED
     if found_in or any(f.kind in _CONFIRMED for f in before.findings):
         kept = tuple(f for f in before.findings if f.kind not in follows)
@@ -126,6 +127,8 @@ def _by_modes(
         return before.with_more([], [Check("channels against the model", why, None)])
     gains, omega = modal_gains(strong, phi_o, phi_i, near.frequency)
     findings, check = level_checks(strong, gains, omega, gain_known, len(phi_o))
+    if any(f.kind == NOTHING_FITS for f in before.findings):
+        findings = []  # the level of responses that are unlike the model's has no meaning
     bad = {c for f in before.findings for c in f.channels if f.kind in _UNUSABLE}
     keep = np.array([k for k, label in enumerate(labels) if label not in bad], int)
     shapes = ModelShapes(

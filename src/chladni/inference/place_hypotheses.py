@@ -33,7 +33,8 @@ OFF = 0.05  # of the structure: mirror images farther from every grid are off it
 
 def relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list[Hypothesis]:
     """The outputs under each other's labels, as many as it takes; of two, shapes tell better."""
-    best: tuple[float, np.ndarray] = (np.inf, np.arange(len(labels)))
+    itself = np.arange(len(labels))
+    best: tuple[float, np.ndarray, np.ndarray] = (np.inf, itself, np.zeros((0, 0)))
     for H in seen.answers():
         log_H = level_free(H)
         apart = np.stack(
@@ -42,10 +43,12 @@ def relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list
         _, place = linear_sum_assignment(apart)
         Q = float(np.median(apart[np.arange(len(labels)), place]))
         if Q < best[0]:
-            best = (Q, place)
-    Q, place = best
-    moved = np.flatnonzero(place != np.arange(len(labels)))
-    if len(moved) <= 2:
+            best = (Q, place, apart)
+    Q, place, apart = best
+    moved = np.flatnonzero(place != itself)
+    if len(moved) == 2:
+        return _exchanged(apart[itself, itself], apart[itself, place], moved, labels)
+    if not len(moved):
         return []
     rows = [f"{labels[k]} that of {labels[place[k]]}" for k in moved]
     text = (
@@ -55,6 +58,23 @@ def relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list
     mend = f"in sensors.csv give each the grid and direction of the other: {listed(rows, 6)}"
     channels = tuple(labels[k] for k in moved)
     return [Hypothesis(Q, Q / declared, Finding("permuted labels", text, "fault", channels, mend))]
+
+
+def _exchanged(
+    before: np.ndarray, after: np.ndarray, pair: np.ndarray, labels: tuple[str, ...]
+) -> list[Hypothesis]:
+    """Two outputs under each other's label; Q is the mean over outputs, before and after (n,)."""
+    if before[pair].mean() < EXPLAINED * CHANCE:
+        return []
+    Q, declared = float(after.mean()), float(before.mean())
+    names = tuple(labels[k] for k in pair)
+    text = (
+        f"outputs {names[0]} and {names[1]} are exchanged: after the exchange mean Q against the "
+        f"model is {Q:.2g}, as declared {declared:.2g}."
+    )
+    mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
+    found = Finding("swapped channels", text, "fault", names, mend, mend=("exchanged", *names))
+    return [Hypothesis(Q, Q / declared, found)]
 
 
 def _drives(model: Modelled, way: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

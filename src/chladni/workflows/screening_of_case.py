@@ -11,7 +11,7 @@ from ..ema.recording_screening import screened
 from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
-from ..inference.chain_hypotheses import explains
+from ..inference.chain_hypotheses import NOTHING_FITS, explains
 from ..inference.channel_screening import against_model
 from ..inference.result import NamedEffect
 from ..inference.smoothed_responses import smoothed
@@ -23,7 +23,6 @@ from .sign_of_gain import with_sign_of_gain
 
 HEAVY = 0.1  # of the structure: sensors seldom weigh more
 POUND, NEAR_POUND = 0.45359237, 0.1  # [kg], ln: what no scatter of sheets reaches
-UNLIKE = "nothing fits"  # no interpretation of the recording does
 FITTED = ("reversed sign",)  # of one channel: diagnosis weighs and measures it
 
 
@@ -129,7 +128,7 @@ def unmendable(screening: Screening) -> bool:
 
 def unlike(result: DiagnosisResult, screening: Screening | None) -> tuple[str, ...]:
     """Return a doubt where the recording fits nothing, and the result explains less than half."""
-    fits_nothing = screening is not None and any(f.kind == UNLIKE for f in screening.findings)
+    fits_nothing = screening is not None and any(f.kind == NOTHING_FITS for f in screening.findings)
     fit = None if result.agreement is None else result.agreement.fitted
     if not fits_nothing or fit is None or fit.nominal is None or fit.after is None:
         return ()
