@@ -27,7 +27,6 @@ from ..inference.likelihood import Responses
 from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
 from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
-from ..io.nastran.edit.changes import Add
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -62,8 +61,9 @@ from ..search.written_scores import noise_Q, written_Q
 from ..sparse.freed_memory import give_back_freed_memory
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
+from .deck_comments import with_mended, with_remarks
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
-from .mended_case import undone, with_undone
+from .mended_case import mending, undone, with_undone
 from .over_levels import over_levels
 from .question_of_case import question_of
 from .screening_of_case import (
@@ -112,17 +112,11 @@ def searched(
     RecordingAtFault
         If the recording shows a fault that neither a map nor a fit can compensate.
     """
-    case, faults = with_sign_of_gain(case), tuple[Finding, ...]()
-    while True:
-        try:
-            made = _searched(case, diagnosing, progress, known, settings, faults)
-            return replace(made, screening=with_undone(made.screening, faults))
-        except RecordingAtFault as found:
-            mended = undone(case, found.screening, faults)
-            if mended is None:
-                seen = with_undone(found.screening, faults)
-                raise RecordingAtFault(seen or found.screening) from None
-            case, faults = mended, (*faults, *(f for f in found.screening.faults if f.mend))
+    made, faults = mending(
+        with_sign_of_gain(case),
+        lambda case, faults: _searched(case, diagnosing, progress, known, settings, faults),
+    )
+    return replace(made, screening=with_undone(made.screening, faults))
 
 
 def _searched(
@@ -242,10 +236,8 @@ def _updated(
     final = calibrated
     if stages.final is not stages.calibrated:
         final, lost = _deck(case, question, nominal, stages.final)
-        final = _commented(final, found.as_deck)
-    if final.changes:
-        comments = tuple(Add((), f"Recording mended: {text}") for text in mended)
-        final = replace(final, changes=(*final.changes, *comments))
+        final = with_remarks(final, found.as_deck)
+    final = with_mended(final, mended)
     test = measured_modes(prepared)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared), test=test)
     return replace(made, curves=_curves(case, made, test)), lost
@@ -275,15 +267,6 @@ def _deck(
         known = modelled(question.tested(changed), nominal.band)
         return ChangedDeck(known, None), [f"no updated deck was written: {error}"]
     return ChangedDeck(modelled(question.tested(written), nominal.band), edits), []
-
-
-def _commented(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
-    """Add to the deck, as comments, the parts of named effects that cards cannot hold."""
-    if named is None or deck.changes is None:
-        return deck
-    said = [e.remarks(named.fit.of(e)).comment for e in named.effects]
-    comments = tuple(Add((), text) for text in said if text)
-    return replace(deck, changes=(*deck.changes, *comments))
 
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:
