@@ -215,6 +215,6 @@ def test_a_sample_that_ends_every_worker_has_failed_and_costs_no_other():
 
 def test_a_fault_of_the_program_ends_the_study(capfd):
     study = SimpleNamespace(assembly=call)
-    with pytest.raises(FileError, match="could not run a sample .TypeError"):
+    with pytest.raises(FileError, match=r"could not run a sample \(TypeError"):
         list(results(study, [partial(int, None)] * 3, range(3), 2))
     assert "Traceback" not in capfd.readouterr().err
