@@ -56,7 +56,7 @@ MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_pl
 LIBRARIES = {
     "progress": {"rich"},
     "parallel": {"threadpoolctl"},
-    "sparse": {"sksparse"},
+    "sparse": {"pymetis", "sksparse"},
     "geometry": {"pyvista", "trimesh"},
     "io": {"meshio", "pandas", "pyyeti", "pyuff", "trimesh", "xarray"},
     "view": {"pyvista", "matplotlib", "PIL"},
