@@ -24,7 +24,7 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
 from ..units import HERTZ, UNITS, Units
-from .bands import bands, held_out, noise_is_identified, searched_effects
+from .bands import bands, held_out, searched_effects
 from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
 from .mended_recordings import mended, read_as, record_length, with_frf
@@ -63,7 +63,6 @@ class Case:
     keys : KeyFile            the same with what they say
     sensor_masses : (grid, kg) pairs of known mass: on the article while it was measured
     effects : names           that a diagnosis tries; empty: all
-    identified_noise : bool   whether evidence counts the covariance of the identification
     """
 
     path: Path
@@ -87,7 +86,6 @@ class Case:
     keys: KeyFile = field(default_factory=lambda: KeyFile(Path(), {}))
     sensor_masses: tuple[tuple[int, float], ...] = ()
     effects: tuple[str, ...] = ()
-    identified_noise: bool = False
 
     @property
     def frfs(self) -> tuple[FRF, ...]:
@@ -199,7 +197,7 @@ def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
     )
     _base_and_quantity(test, recordings, inputs)
     notes += unrecorded(setup, outputs, inputs)
-    tried, narrow = searched_effects(keys, notes), noise_is_identified(keys, notes)
+    tried = searched_effects(keys, notes)
     return Case(
         path=path,
         deck=deck,
@@ -222,7 +220,6 @@ def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
         keys=keys,
         sensor_masses=sensor_masses(made, outputs, inputs),
         effects=tried,
-        identified_noise=narrow,
     )
 
 

@@ -161,10 +161,6 @@ SCHEMA = (
     Key("search", "effects", "list of effects", "", "all of the catalogue",
         "Effects that are tried; no other effect is named. Faults of the recording are always "
         "tried.", '["point-mass", "stiffness-patch"]', ("diagnose",)),
-    Key("search", "noise", "word", "", "lines",
-        "`lines`: every spectral line has independent noise. `identified`: the noise is that of "
-        "the identified modes. It is narrower: smaller effects are found, with more false alarms.",
-        '"identified"', ("diagnose",), ("lines", "identified")),
     Key("parameter", "name", "text", "", "the field", "Name on the page.", '"E steel"',
         _VARIED),
     Key("parameter", "parts", "list of parts", "", "all that have the field",

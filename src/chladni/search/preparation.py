@@ -22,7 +22,7 @@ from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
 from ..ema.level_words import level_notes
-from ..ema.recording_noise import equalised_error, equalised_noise, sample_noise
+from ..ema.recording_noise import equalised_noise, sample_noise
 from ..ema.response_variance import noise_source
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -106,13 +106,11 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
         use = left_out.training(f)
         H = equalised(found, s)
         noise, spread = sample_noise(found, frf, s), measured_spread(H, others, s)
-        counts = counted(frf, question.exclude)
-        error = equalised_error(found, frf, s, counts) if question.identified_noise else None
         spreads.append(spread)
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
-            identified=error, level=rms_over_lines(H[use.any(axis=1)]),
+            level=rms_over_lines(H[use.any(axis=1)]),
             direct=question.outputs.moved_with_base(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.rebased(reduced.model))
