@@ -180,3 +180,11 @@ def test_the_quantity_must_be_known(tmp_path, H):
         read_recordings(tmp_path / "a.csv")
     with pytest.raises(FileError, match=r"end in .uff, .unv, .npz, .csv, .mat or .wav, not '.txt'"):
         read_recordings(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize("text", ["1_0", "\u0661\u0660", "nan", "inf", "1e999", "0x10", "1\u00b2"])
+def test_what_python_alone_takes_for_a_number_is_none(tmp_path, text):
+    path = tmp_path / "poles.csv"
+    path.write_text(f"mode,frequency_hz\n1,5.\n2,{text}\n", encoding="utf-8")
+    with pytest.raises(FileError, match=r"line 3: frequency_hz is .* not a number"):
+        read_poles(path)

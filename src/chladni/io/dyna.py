@@ -103,7 +103,7 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
     words[words == ""] = "0"
     try:
         values: np.ndarray = words.astype(kind)
-        if np.isfinite(values).all():
+        if np.isfinite(values).all() and _plain("".join(words.ravel())):
             return values
     except (ValueError, OverflowError):
         pass
@@ -120,11 +120,16 @@ def _split(line: str, widths: Sequence[int]) -> list[str]:
     return [line[a:b].strip() for a, b in pairwise(edges)]
 
 
+def _plain(word: str) -> bool:
+    """False for digits with underscores or of other scripts, which Python takes for a number."""
+    return word.isascii() and "_" not in word
+
+
 def _first_bad(words: np.ndarray, kind: type) -> tuple[int, str]:
     for row, line in enumerate(words):
         for word in line:
             try:
-                bad = not np.isfinite(np.array([word]).astype(kind)[0])
+                bad = not (_plain(word) and np.isfinite(np.array([word]).astype(kind)[0]))
             except (ValueError, OverflowError):
                 bad = True
             if bad:

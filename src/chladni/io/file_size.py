@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from ..arrays import real_number
 from ..errors import FileError
 
 LARGEST = 1.0  # GB; a deck of a million grids has 0.3, an hour of 16 channels at 5 kHz 2.3
@@ -19,7 +20,7 @@ def most_gigabytes() -> float:
     """
     text = os.environ.get(OVERRIDE, "")
     try:
-        return float(text) if text else LARGEST
+        return real_number(text) if text else LARGEST
     except ValueError:
         raise FileError(f"{OVERRIDE} = {text[:20]!r} is not a number of gigabytes") from None
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arrays import real_number
 from ...errors import FileError, named, not_text
 from ..file_size import refuse_large
 
@@ -25,7 +26,10 @@ class CsvTable:
 
     def numbers(self, name: str, empty: float = np.nan) -> np.ndarray:
         """(n,) finite numbers; an empty cell is ``empty``."""
+        every = "".join(self.columns[name])
         try:  # the quick way, for a hundred thousand rows
+            if "_" in every or not every.isascii():
+                raise ValueError
             values = np.array(self.columns[name], dtype=float)
         except ValueError:
             values = np.array([self.number(name, k, empty) for k in range(len(self.line))])
@@ -40,7 +44,7 @@ class CsvTable:
         if not text:
             return empty
         try:
-            value = float(text)
+            value = real_number(text)
         except ValueError:
             value = np.nan
         if not np.isfinite(value):
