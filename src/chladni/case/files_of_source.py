@@ -25,7 +25,7 @@ def _deck(path: Path) -> tuple[Path, ...]:
     if path.suffix.lower() in ENDINGS or not path.is_file():
         return (path,)
     try:
-        return tuple(s.path for s in sources(path))
+        return tuple(s.path for s in sources(path).sources)
     except ChladniError:
         return (path,)
 

@@ -45,11 +45,11 @@ def write_deck(
     edits, footer = _edits(deck, changes), _footer(deck, changes)
     if len(footer) > sum(len(s.lines) for s in deck.sources):
         footer = _apart(deck, path, final, footer)
-    places = _places(deck, final, set(edits))
+    places = _places(deck, final, {*edits, *([deck.begins] if footer else [])})
     for k in sorted(places, reverse=True):
         source = deck.sources[k]
         new = {**edits.get(k, {}), **_includes(deck, source, places[k], places)}
-        text = _text(source, new, footer if k == 0 else [])
+        text = _text(source, new, footer if k == deck.begins else [])
         target = path.parent / places[k].relative_to(final.parent)
         atomic(target, lambda part, text=text: part.write_bytes(text))  # type: ignore[misc]
     return path

@@ -12,7 +12,7 @@ from .materials import unlike_moduli
 from .shell_elements import second_axes
 from .springs_and_masses import one_sided_inertia
 from .static_loads import loads, motions
-from .supports import missing_sets
+from .supports import selection_notes
 
 _LEFT_OUT = {
     "PLOAD1": "distributed loads on beams", "RFORCE": "centrifugal loads", "TEMP": "temperatures",
@@ -73,7 +73,7 @@ def remarks(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
         for cards in deck.present(name):
             yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"
     yield from _unheeded(deck)
-    yield from missing_sets(deck)
+    yield from selection_notes(deck)
     yield from one_sided_inertia(deck)
     yield from unlike_moduli(deck)
 

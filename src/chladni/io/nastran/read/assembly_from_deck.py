@@ -18,9 +18,14 @@ from .sections import Parts
 from .shell_elements import filled_thickness, shells, solids
 from .supports import selected, supports
 
-_ELEMENTS = """CQUAD4 CQUADR CQUAD1 CQUAD2 CTRIA3 CTRIAR CTRIA1 CTRIA2 CHEXA CPENTA CTETRA CBAR
-    CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CDAMP1 CDAMP2 CDAMP3 CDAMP4 CMASS1 CMASS2
-    CMASS3 CMASS4 CVISC CBUSH""".split()
+_STIFF = """CQUAD4 CQUADR CQUAD1 CQUAD2 CTRIA3 CTRIAR CTRIA1 CTRIA2 CHEXA CPENTA CTETRA CBAR
+    CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH""".split()
+_ELEMENTS = (  # those of one kind have no id in common
+    _STIFF,
+    "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),
+    "CMASS1 CMASS2 CMASS3 CMASS4".split(),
+    ["CONM1", "CONM2"],
+)
 
 
 def assembly(
@@ -42,7 +47,7 @@ def assembly(
     ctx = context(deck, units)
     if not len(ctx.ids):
         raise FileError(f"{deck.path}: there is no GRID, so there is no model")
-    for names in (_ELEMENTS, ("CONM1", "CONM2")):
+    for names in _ELEMENTS:
         _unique_elements(deck, names)
     made = _made(ctx, subcase)
     if not loose:
@@ -91,7 +96,7 @@ def _k6rot(deck: Deck) -> float | None:
 
 
 def _unique_elements(deck: Deck, names: Sequence[str]) -> None:
-    """An element's id is its own among all elements."""
+    """An element's id is its own among those of its kind; solvers run decks with no more."""
     tables = list(deck.present(*names))
     if not tables:
         return

@@ -6,7 +6,7 @@ from ....model.assembly import Beams, concatenated
 from ....model.properties import BeamSection, Part
 from ..text.table import Cards
 from .bar_sections import refuse_impossible
-from .context import Context, digits
+from .context import Context, digits, only_one
 from .sections import Parts
 
 _FAMILY = {"CBAR": "bar", "CBEAM": "beam", "CROD": "rod", "CTUBE": "tube"}
@@ -73,7 +73,7 @@ def _conrods(ctx: Context, parts: Parts, cards: Cards) -> Beams:
 def _defaults(ctx: Context, cards: Cards, k: int) -> bytes:
     """Text of field k on BAROR or BEAMOR."""
     name = "BAROR" if cards.name == "CBAR" else "BEAMOR"
-    found = ctx.deck[name]
+    found = only_one(ctx.deck, name)
     return bytes(found.words(k)[0]) if len(found) else b""
 
 

@@ -1,5 +1,6 @@
 """Shell elements: corners, thickness, material direction, offset."""
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,6 +12,7 @@ from .context import Context
 from .sections import Parts
 
 _QUADS = ("CQUAD4", "CQUADR", "CQUAD1", "CQUAD2")
+_WHOLE = re.compile(rb"[+-]?[0-9]+")
 _TRIANGLES = ("CTRIA3", "CTRIAR", "CTRIA1", "CTRIA2")
 NORMAL = 1e-6  # length of what is left of a unit vector laid on an element: it stands normal to it
 
@@ -48,7 +50,7 @@ def _made(
     X = ctx.places[nodes]
     corners = 3 if cards.name in _TRIANGLES else 4
     normal = _normals(ctx, cards, nodes[:, :corners])
-    pid = cards.properties(None)
+    pid = cards.properties()
     part = parts.of("shell", cards, pid)
     offset = np.zeros(len(cards)) if zoffs is None else cards.reals(zoffs, 0.0) * ctx.scale.length
     return Shells(
@@ -132,7 +134,14 @@ def _axis(ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int)
 
 def _by_system(cards: Cards, k: int) -> np.ndarray:
     """(n,) bool, True where field k is an integer: MCID, not THETA."""
-    return np.array([w.isdigit() for w in cards.words(k).tolist()], bool)
+    words = cards.words(k).tolist()
+    whole = np.array([bool(_WHOLE.fullmatch(w)) for w in words], bool)
+    for i in np.flatnonzero(whole):
+        if words[i].startswith(b"-"):
+            said = words[i].decode("latin-1")
+            why = f"is the integer {said}, so a coordinate system, and none has a negative number"
+            raise cards.refuse(int(i), f"{cards.field_name(k)} {why}; an angle is {said}.")
+    return whole
 
 
 def _from_systems(
