@@ -380,7 +380,7 @@ def cards() -> str:
     from chladni.io.nastran.text import known_cards
     from chladni.io.nastran.text.cards import FIELDS, LEGACY
 
-    left_out = analysis_requests._LEFT_OUT
+    left_out = analysis_requests.LEFT_OUT
     harmless = known_cards.HARMLESS.keys() - left_out.keys()
     on_sol = sorted(set(known_cards.FOLLOWS_TEMPERATURE))
     return "\n".join(

@@ -7,7 +7,7 @@ import pytest
 
 from chladni.errors import ChladniError, FileError
 from chladni.io.nastran import assembly, read_deck
-from chladni.io.nastran.read.analysis_requests import _LEFT_OUT, STRUCTURAL, remarks
+from chladni.io.nastran.read.analysis_requests import LEFT_OUT, STRUCTURAL, remarks
 from chladni.io.nastran.text.card_layout import tables
 from chladni.io.nastran.text.known_cards import refusal
 from chladni.io.nastran.text.source_files import sources
@@ -37,7 +37,7 @@ def test_a_misspelt_card_is_told_what_is_meant(name, meant):
 
 
 def test_what_is_left_out_with_a_note_is_known():
-    assert not [name for name in _LEFT_OUT if refusal(name, 1)]
+    assert not [name for name in LEFT_OUT if refusal(name, 1)]
 
 
 @pytest.mark.parametrize(

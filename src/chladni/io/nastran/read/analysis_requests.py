@@ -14,7 +14,7 @@ from .springs_and_masses import one_sided_inertia
 from .static_loads import loads, motions
 from .supports import selection_notes
 
-_LEFT_OUT = {
+LEFT_OUT = {
     "PLOAD1": "distributed loads on beams", "RFORCE": "centrifugal loads", "TEMP": "temperatures",
     "TEMPD": "temperatures",
     "TLOAD1": "loads in time", "TLOAD2": "loads in time", "ACCEL": "acceleration fields",
@@ -67,11 +67,11 @@ def _subcases(deck: Deck) -> Iterator[Subcase]:
         yield Subcase(case.id, *chosen, outputs=case.outputs, residual=wanted)
 
 
-def remarks(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
+def remarks(deck: Deck, names: Iterable[str] = LEFT_OUT) -> Iterator[str]:
     """Cards and parameters that are not heeded or contradict others, one sentence each."""
     for name in names:
         for cards in deck.present(name):
-            yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"
+            yield f"{cards.where(0)}: {name} ({LEFT_OUT[name]}) is left out"
     yield from _unheeded(deck)
     yield from selection_notes(deck)
     yield from one_sided_inertia(deck)

@@ -50,7 +50,7 @@ class CaseControl:
 def case_control(control: Sequence[tuple[str, str]], sections: bool) -> CaseControl:
     """Parse (file:line, text) above BEGIN BULK; ``sections``: there is a case control at all."""
     stated = [_solution(m[1]) for _, text in control if (m := _SOL.match(text.split("$")[0]))]
-    reading = _Reading()
+    reading = _CaseReading()
     every = commands(control)
     for command in reversed(every):  # a set may be asked for above the line that defines it
         if command.name == "SET":
@@ -68,7 +68,7 @@ def case_control(control: Sequence[tuple[str, str]], sections: bool) -> CaseCont
     )
 
 
-class _Reading:
+class _CaseReading:
     """A case control being read."""
 
     def __init__(self) -> None:

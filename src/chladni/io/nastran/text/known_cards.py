@@ -122,6 +122,20 @@ def refusal(name: str, count: int) -> str:
     return f"{name} ({cards}) is not understood and may change the structure{meant}"
 
 
+def meaning(name: str) -> tuple[str, str]:
+    """(use, meaning) of a card: read, passed over, or not understood.
+
+    >>> meaning("DESVAR"), meaning("CWELD")[1]
+    (('passed over', 'design optimisation and random variables'), 'spot welds, fasteners and seams')
+    """
+    if name in FIELDS or name in LEGACY:
+        return "read", ""
+    what = HARMLESS.get(name) or SELECTED.get(name)
+    if what or name in FOLLOWS_TEMPERATURE:
+        return "passed over", what or "materials that follow temperature"
+    return "not understood", REFUSED.get(name, "")
+
+
 def counted(count: int) -> str:
     """1 card, 2 cards."""
     return f"{count} card{'' if count == 1 else 's'}"

@@ -58,7 +58,7 @@ class DeckFiles:
 
 def sources(path: Path) -> DeckFiles:
     """Read the deck and all it includes."""
-    deck = _Reading(Path(path))
+    deck = _DeckReading(Path(path))
     deck.load(deck.path, (), "")
     found = tuple(source for source in deck.found if source is not None)
     if deck.cend and deck.begins < 0:
@@ -67,7 +67,7 @@ def sources(path: Path) -> DeckFiles:
 
 
 @dataclass
-class _Reading:
+class _DeckReading:
     """The files of a deck while they are gone through in the solver's order."""
 
     path: Path
