@@ -412,7 +412,7 @@ def cards() -> str:
             "These cards carry stiffness, mass or a tie and are not understood. A card with any "
             "other name is refused too, because it may change the structure.\n",
             table(("cards", "meaning"), _grouped(known_cards.REFUSED, known_cards.REFUSED)),
-            "These are refused where the case control selects them, or where there is none.\n",
+            "These are refused where the case control selects them, and in a deck without one.\n",
             table(("cards", "meaning"), _grouped(known_cards.SELECTED, known_cards.SELECTED)),
             "`--allow NAME`, or `allow = [\"NAME\"]` in `[model]` of a case, passes "
             "over a card although it is not understood.\n",

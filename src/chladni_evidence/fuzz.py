@@ -68,6 +68,8 @@ def outcome(one: FuzzInput, patience: float = PATIENCE) -> FuzzOutcome:
         seconds = used.ru_utime + used.ru_stime
         output, said = (_read(folder / n) for n in ("stdout.txt", "stderr.txt"))
         called = _called(status, output, said, size, folder / "out")
+        if one.sound and called in DUE[1:]:
+            called = "sound, and not answered"
         return FuzzOutcome(called, said or output, min(seconds, time.monotonic() - begun), size)
 
 

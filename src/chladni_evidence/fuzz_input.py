@@ -14,6 +14,7 @@ class FuzzInput:
     kind: str
     files: dict[str, bytes]
     arguments: tuple[str, ...]
+    sound: bool = False  # nothing was injured: to be answered, not refused
 
 
 Maker = Callable[[random.Random, Files], FuzzInput]

@@ -7,6 +7,7 @@ from pathlib import Path
 from .contradictions import CONTRADICTIONS
 from .fuzz_input import FuzzInput, Maker
 from .mutations import WORDS, injured_archive, injured_bytes, injured_text
+from .recoded_text import recoded
 from .sound_files import Files, sound_files
 
 
@@ -120,6 +121,7 @@ _MAKERS: dict[str, Maker] = {
     "punch": _punch,
     "wav": _wav,
     "mesh": _mesh,
+    "recoded": recoded,
     **CONTRADICTIONS,
 }
 KINDS = tuple(_MAKERS)

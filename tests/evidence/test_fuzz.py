@@ -70,6 +70,14 @@ def test_what_breaks_a_rule_is_told_and_kept(called, tmp_path, monkeypatch):
         assert (kept / "command.txt").read_text().startswith("chladni modes a.bdf --out out\n")
 
 
+def test_a_sound_deck_written_otherwise_is_answered(tmp_path):
+    """Encoded, cut down, included: what is refused there is a fault, and no injury."""
+    counts = fuzz(fuzz_inputs(4, 3, ["recoded"]), tmp_path, lambda text: None)
+    assert counts == {"recoded": {"answered": 4}}
+    no = FuzzInput("recoded", {"a.bdf": b"BEGIN BULK\nXYZ,1\n"}, ("modes", "a.bdf"), sound=True)
+    assert outcome(no).called == "sound, and not answered"
+
+
 def test_an_unknown_kind_is_refused(tmp_path, capsys):
     assert main(["fuzz", "--kinds", "poem", "--out", str(tmp_path)]) == 2
     assert "no kind poem; there are deck" in capsys.readouterr().err

@@ -114,7 +114,7 @@ class _Case:
         self.residual: bool | None = None
 
     def copy(self) -> "_Case":
-        """The same, to be read on by itself."""
+        """A subcase of the same selections."""
         new = _Case(self.id)
         new.selects, new.matrices = {**self.selects}, {**self.matrices}
         new.outputs, new.residual = self.outputs, self.residual

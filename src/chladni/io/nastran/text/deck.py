@@ -173,7 +173,7 @@ def _matrices(deck: Deck) -> Iterator[Unknown]:
 
 
 def _commands_unknown(deck: Deck) -> Iterator[Unknown]:
-    """What of the case control might choose other supports, masses or joints."""
+    """Commands that might choose other supports, masses or joints."""
     if not deck.case.present:
         for cards in deck.present("TEMP", "TEMPD"):
             why = f"the case control does not select {cards.name} sets"

@@ -16,7 +16,7 @@ SELECTS: Final = {
     "K2GG": "K2GG", "M2GG": "M2GG", "B2GG": "B2GG", "K2PP": "K2PP", "M2PP": "M2PP", "B2PP": "B2PP",
 }  # fmt: skip
 SUBCASES: Final = ("SUBCASE", "SUBCOM", "SYM", "SYMCOM", "REPCASE")
-_ACTED_UPON: Final = (*SUBCASES, *"SET PARAM SUBSEQ SYMSEQ STEP AUTOSPC RESVEC".split())
+_HEEDED: Final = (*SUBCASES, *"SET PARAM SUBSEQ SYMSEQ STEP AUTOSPC RESVEC".split())
 _MOTIONS: Final = ("DISPLACEMENT", "VELOCITY", "ACCELERATION", "VECTOR")
 _TITLES: Final = """TITLE SUBTITLE STITLE LABEL PLOTID TCURVE XTITLE YTITLE YTTITLE
     YBTITLE""".split()
@@ -43,7 +43,7 @@ _OTHER_ANALYSES: Final = """ANALYSIS CMETHOD FMETHOD SMETHOD RANDOM TSTEP TSTEPN
     TEMPERATURE DEFORM CLOAD ALOAD BC MODES RIGID TERM SUPER SEALL SEDR SEDV SEEXCLUDE SEFINAL
     SEKREDUCE SELGENERATE SELREDUCE SEMGENERATE SEMREDUCE SERESP AESYMXY AESYMXZ AECONFIG AECSSSET
     AEUXREF CSSCHD ADAPT HADAPT ADACT TSTRU FLSFSEL FLSPOUT FLSTCNT ENDCASE MASTER END""".split()
-_NAMED: Final = (*SELECTS, *_ACTED_UPON, "TEMPERATURE", "STATSUB")
+_NAMED: Final = (*SELECTS, *_HEEDED, "TEMPERATURE", "STATSUB")
 _FOUR: Final = {  # what the first four letters of a longer word can only mean
     name[:4]: name
     for name in _NAMED
@@ -51,10 +51,10 @@ _FOUR: Final = {  # what the first four letters of a longer word can only mean
 }
 _FIRST_FOUR: Final = frozenset(
     name[:4]
-    for names in (_ACTED_UPON, _MOTIONS, _EXECUTIVE, _TITLES, _REQUESTS, _OTHER_ANALYSES)
+    for names in (_HEEDED, _MOTIONS, _EXECUTIVE, _TITLES, _REQUESTS, _OTHER_ANALYSES)
     for name in names
 )  # fmt: skip
-MEANINGS: Final = {  # of commands that change the structure and are not acted upon
+MEANINGS: Final = {  # of commands that change the structure and are refused
     "NSM": "nonstructural mass", "STATSUB": "stiffness of a loaded state",
     "MFLUID": "the mass of a fluid", "TFL": "transfer functions",
     "K42GG": "a matrix of structural damping", "A2GG": "a matrix that couples a fluid",
@@ -91,19 +91,19 @@ class Command:
 
     @property
     def described(self) -> str:
-        """What stands in the parentheses behind the name."""
+        """The text in the parentheses behind the name."""
         return self.rest[1 : _closing(self.rest) - 1] if self.rest.startswith("(") else ""
 
     @property
     def value(self) -> str:
-        """What stands behind the equals sign."""
+        """The text behind the equals sign."""
         after = self.rest[_closing(self.rest) :] if self.rest.startswith("(") else self.rest
         after = after.strip()
         return after[1:].strip() if after.startswith("=") else ""
 
 
 def named(word: str) -> str:
-    """The name in full of a command that is acted upon, else the word.
+    """The name in full of a command that has an effect, else the word.
 
     >>> named("METH"), named("SPCF"), named("SUBC"), named("SUBCO"), named("LOADS"), named("LOAD")
     ('METHOD', 'SPCF', 'SUBCASE', 'SUBCOM', 'LOADSET', 'LOAD')

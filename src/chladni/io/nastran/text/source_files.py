@@ -75,7 +75,7 @@ class _DeckReading:
     control: list[tuple[str, str]] = field(default_factory=list)
     cend: str = ""  # file:line of CEND
     begins: int = -1
-    bulk: bool = False  # BEGIN BULK is behind, or there is none
+    bulk: bool = False  # behind BEGIN BULK, or in a deck without it
     texts: dict[Path, bytes] = field(default_factory=dict)
 
     def load(self, path: Path, above: tuple[Path, ...], prefix: str) -> int:
@@ -259,9 +259,8 @@ def _decoded(data: bytes) -> bytes:
 
 def _utf16_unmarked(head: bytes) -> str:
     """The code of plain text of which every other byte is zero, else nothing."""
-    even, odd = (head[k::2].count(0) for k in (0, 1))
-    most = 0.4 * len(head)
-    return "utf-16-le" if odd > most > even == 0 else "utf-16-be" if even > most > odd == 0 else ""
+    even, odd = (head[k::2].count(0) / max(len(head), 1) for k in (0, 1))
+    return "utf-16-le" if even < 0.2 < 0.4 < odd else "utf-16-be" if odd < 0.2 < 0.4 < even else ""
 
 
 def text_of(line: bytes) -> str:
