@@ -32,6 +32,8 @@ MISTAKES = {
     "second GRDSET": (("MAT1", "GRDSET,,,,,,,12\nGRDSET,,,,,,,3\nMAT1"), r":8: a second GR.*:7"),
     "second BAROR": (("MAT1", "CBAR,8,1,1,2\nPBAR,1,5,1.\nBAROR,,,,,0.,0.,1.\nBAROR\nMAT1"),
                      r":10: a second BAROR"),
+    "BAROR's vector": (("MAT1", "CBAR,8,1,1,2\nPBAR,1,5,1.\nBAROR,,,,,0.,x,1.\nMAT1"),
+                       "BAROR.*X2 is 'X', not a number"),
     "THETA as a system": (("3,4\n", "3,4,-45\n"), "THETA is the integer -45, .* angle is -45[.]"),
     "duplicate across kinds": (("MAT1", "CELAS2,7,1.,1,1\nMAT1"), "id is already taken by CQUAD4"),
     "duplicate property": (("MAT1", "PCOMP,101\n,5,1.\nMAT1"), "PCOMP 101: .*already taken"),
@@ -180,6 +182,14 @@ def test_subcases_with_other_supports_are_noted(bulk, control, held, said):
 def test_components_may_stand_apart(bulk, word):
     deck = bulk(f"{PLATE}SPC1    7       {word:8}1\n", before="CEND\nSPC = 7\n", fold=False)
     assert assembly(deck).supports.tolist() == [[0, c] for c in (1, 2, 4, 5, 6)]
+
+
+@pytest.mark.parametrize("vector", ["0.,0.,1.-3", "0,0,1", "0,0.,1.+0"])
+def test_the_usual_vector_of_bars_is_written_as_any_other(bulk, vector):
+    """Short exponents; an integer X1 is a grid only where X2 and X3 are blank."""
+    bar = "CBAR,8,1,1,2\nPBAR,1,5,1.,1.,1.,1.\n"
+    up = assembly(bulk(f"{PLATE}{bar}BAROR,,,,,{vector}\n")).beams.up[0]
+    assert np.allclose(up / np.linalg.norm(up), [0, 0, 1])
 
 
 def test_a_damper_may_have_the_id_of_a_spring(bulk):

@@ -245,6 +245,14 @@ def test_a_deck_whose_bulk_data_begin_in_an_include_is_edited_there(written, tmp
     assert text.index("CONM2         77") < text.index("ENDDATA")
 
 
+@pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r"])
+def test_added_lines_end_as_the_others_do(written, tmp_path, end):
+    main, _ = written(WHOLE.encode().replace(b"\n", end))
+    new = write_deck(read_deck(main), tmp_path / "new.bdf", [Add([["CONM2", 77, 1, None, 1.0]])])
+    assert {line[-len(end) :] for line in new.read_bytes().splitlines(keepends=True)} == {end}
+    assert 77 in read_deck(new)["CONM2"].integers(1)
+
+
 def test_fields_beyond_the_ninth_are_edited_in_place(tmp_path):
     """A free-field line that goes on for the next keeps its other fields."""
     path = tmp_path / "deck.bdf"

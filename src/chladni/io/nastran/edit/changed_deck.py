@@ -122,7 +122,8 @@ def _apart(deck: Deck, path: Path, final: Path, footer: list[str]) -> list[str]:
 
 def _text(source: Source, new: Lines, footer: list[str]) -> bytes:
     """The file's bytes with lines replaced and others added at the end of its bulk data."""
-    end = b"\r\n" if source.lines and source.lines[0].endswith(b"\r\n") else b"\n"
+    first = source.lines[0] if source.lines else b"\n"
+    end = next((e for e in (b"\r\n", b"\r") if first.endswith(e)), b"\n")
     out: list[bytes] = []
     for number, line in enumerate(source.lines, start=1):
         if number == source.bulk[1] + 1:
