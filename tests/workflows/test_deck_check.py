@@ -55,3 +55,8 @@ def test_what_is_not_understood_stands_first_with_its_meaning(deck, tmp_path):
     found = check_deck(path, ("CWELD", "STATSUB"))
     assert not found.refused
     assert found.cards[0].use == "allowed"
+
+
+def test_a_deck_of_known_cards_that_is_no_structure_is_refused_as_everywhere(deck, tmp_path):
+    ran("check", deck(CARDS.replace("1,2,3,4\n", "1,2,3,9\n")), "--out", tmp_path / "x", code=2)
+    assert not (tmp_path / "x").exists()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import ChladniError
+from ..errors import FileError
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class CardUse:
 
 @dataclass(frozen=True)
 class DeckCheck:
-    """The table of a deck's cards and the sentence that refuses it, "" where none does."""
+    """The table of a deck's cards and the sentence that refuses some, "" where all are known."""
 
     cards: tuple[CardUse, ...]
     refused: str
@@ -30,8 +30,8 @@ def check_deck(path: Path, allow: Sequence[str] = ()) -> DeckCheck:
 
     Raises
     ------
-    FileError
-        If the text is no deck.
+    FileError, ModelError
+        If the text is no deck, or its cards are understood and make no structure.
     """
     from ..io.nastran import assembly, read_deck
     from ..io.nastran.read.analysis_requests import LEFT_OUT
@@ -58,7 +58,8 @@ def check_deck(path: Path, allow: Sequence[str] = ()) -> DeckCheck:
     order = ("not understood", "allowed", "left out", "read", "passed over")
     out.sort(key=lambda row: (order.index(row.use), row.name))
     try:
-        assembly(read_deck(path, allow))
-    except ChladniError as error:
+        made = read_deck(path, allow)
+    except FileError as error:
         return DeckCheck(tuple(out), str(error))
+    assembly(made)
     return DeckCheck(tuple(out), "")
