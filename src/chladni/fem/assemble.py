@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..dofs import rows as label_rows
 from ..dynamics.system import System
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
@@ -234,6 +235,17 @@ def supported(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
     T, dofs = _transformation(assembly)
     held = _held(replace(assembly, scalar_points=None), dofs)
     return sp.csr_array(T[:, held]), dofs[held]
+
+
+def idle_motions(built: Structure) -> tuple[sp.csr_array, np.ndarray]:
+    """Unit motions of all points (6n, k) of the dofs left out as without stiffness, with their rows.
+
+    The rows (k,) count six dofs a point, in displacement frames.
+    """
+    T, dofs = _transformation(built.assembly)
+    labels = np.column_stack([built.assembly.ids[dofs[:, 0]], dofs[:, 1]])
+    idle = (label_rows(labels, built.system.dofs) < 0) & ~_held(built.assembly, dofs)
+    return sp.csr_array(T[:, idle]), (6 * dofs[:, 0] + dofs[:, 1] - 1)[idle]
 
 
 def frames(assembly: Assembly) -> sp.csr_array:
