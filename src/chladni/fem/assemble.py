@@ -238,7 +238,7 @@ def supported(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
 
 
 def idle_motions(built: Structure) -> tuple[sp.csr_array, np.ndarray]:
-    """Unit motions of all points (6n, k) of the dofs left out as without stiffness, with their rows.
+    """Unit motions of all points (6n, k) of dofs left out as without stiffness, and their rows.
 
     The rows (k,) count six dofs a point, in displacement frames.
     """

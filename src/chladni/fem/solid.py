@@ -14,9 +14,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import ModelError, named
+from ..geometry.solid_shapes import FAMILIES, SolidFamily, jacobians
 from ..model.assembly import Assembly, Solids
 from ..model.properties import Isotropic, SolidSection
-from .solid_shapes import FAMILIES, SolidFamily
 
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # of strain components
 
@@ -91,9 +91,8 @@ def elasticity_derivative(material: Isotropic, name: str) -> np.ndarray:
 
 def _check(X: np.ndarray, solids: Solids, assembly: Assembly) -> None:
     """Raise if an element has no volume or is turned inside out."""
-    family = FAMILIES[X.shape[1]]
-    dV = np.stack([np.linalg.det(family.gradients(xi) @ X) for xi in family.mass_points])
-    bad = (np.abs(dV).max(axis=0) == 0) | (dV.min(axis=0) < 0) & (dV.max(axis=0) > 0)
+    dV = jacobians(X)
+    bad = (np.abs(dV).max(axis=1) == 0) | (dV.min(axis=1) <= 0) & (dV.max(axis=1) >= 0)
     if np.any(bad):
         raise ModelError(
             f"solid {named(solids.ids[bad], 3)} has no volume or turns inside out; "

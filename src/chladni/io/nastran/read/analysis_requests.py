@@ -9,7 +9,7 @@ from ..text.known_cards import FOLLOWS_TEMPERATURE
 from . import excitation, response_frequencies
 from .context import context, parameter
 from .materials import unlike_moduli
-from .shell_elements import second_axes
+from .shell_elements import second_axes, warped_solids
 from .springs_and_masses import one_sided_inertia
 from .static_loads import loads, motions
 from .supports import selection_notes
@@ -54,7 +54,7 @@ def analysis(deck: Deck, units: Units | str | None = None) -> Analysis:
         damping=excitation.damping(ctx),
         eigen=excitation.eigenvalues(ctx),
         dynamic=excitation.dynamic(ctx, static, moved),
-        notes=(*remarks(deck), *second_axes(ctx)),
+        notes=tuple(remarks(deck)),
     )
 
 
@@ -76,6 +76,9 @@ def remarks(deck: Deck, names: Iterable[str] = LEFT_OUT) -> Iterator[str]:
     yield from selection_notes(deck)
     yield from one_sided_inertia(deck)
     yield from unlike_moduli(deck)
+    places = context(deck, None)
+    yield from second_axes(places)
+    yield from warped_solids(places)
 
 
 def _unheeded(deck: Deck) -> Iterator[str]:
