@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import ModelError, named
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Material, Orthotropic, ShellSection
-from .shell import ShellGeometry, geometry, turned
+from .shell import LEAST, ShellGeometry, geometry, turned
 
 DRILLING = 0.1  # of G t: MacNeal-Harder's twisted beam to 0.1 %; 1e-3 is 30 % too soft
 PENALTY = 1e-6  # of G t: a unit of K6ROT at the corners, exact (see .shell_drilling)
@@ -199,7 +199,8 @@ def _check(assembly: Assembly) -> None:
     for k in np.unique(shells.part):
         if not isinstance(assembly.parts[k].section, ShellSection):
             raise ModelError(f"part {assembly.parts[k].name!r} has shells but no shell section")
-    if (thin := (shells.thickness <= 0).any(axis=1)).any():
+    t = shells.thickness  # a wedge may have none at some of its corners
+    if (thin := (t < 0).any(axis=1) | ~(t.mean(axis=1) > 0)).any():
         raise ModelError(f"shells {named(shells.ids[thin])} have no thickness")
 
 
@@ -228,7 +229,12 @@ def _flexibility(section: ShellSection) -> np.ndarray:
     """Inverse of the transverse moduli (2, 2) [1/Pa]; a small value for rigid shear."""
     if section.bending is None:
         return np.zeros((2, 2))
-    least = STIFF / section.bending.plane_stress()[2, 2] * np.eye(2)
+    Q = section.bending.plane_stress()
+    mean = (Q[0, 0] + Q[1, 1]) / 4  # E/2(1+nu) of an isotropic sheet with nu = 0
+    modulus = Q[2, 2] if Q[2, 2] > LEAST * mean else mean
+    if not modulus > 0:
+        return np.zeros((2, 2))
+    least = STIFF / modulus * np.eye(2)
     shear = section.shear or section.bending
     G = shear.transverse() if not section.rigid_shear else np.zeros((2, 2))
     given = np.diag(G) > 0
@@ -255,5 +261,5 @@ def _diagonal(d: np.ndarray) -> np.ndarray:
 
 def _inverse(Z: np.ndarray, Qb: np.ndarray) -> np.ndarray:
     """Z⁻¹ for shells with bending stiffness, zero for pure membranes."""
-    bends = (Qb[:, 0, 0] > 0)[:, None, None, None]
+    bends = (_pair(Qb).max(axis=1) > 0)[:, None, None, None]
     return np.where(bends, np.linalg.inv(np.where(bends, Z, np.eye(2))), 0.0)

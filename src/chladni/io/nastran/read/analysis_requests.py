@@ -8,7 +8,8 @@ from ..text.deck import Deck
 from ..text.known_cards import FOLLOWS_TEMPERATURE
 from . import excitation, response_frequencies
 from .context import context, parameter
-from .materials import unlike_moduli
+from .materials import lone_moduli, unlike_moduli
+from .rigid_elements import partial_bars
 from .shell_elements import second_axes, warped_solids
 from .springs_and_masses import one_sided_inertia
 from .static_loads import loads, motions
@@ -76,6 +77,8 @@ def remarks(deck: Deck, names: Iterable[str] = LEFT_OUT) -> Iterator[str]:
     yield from selection_notes(deck)
     yield from one_sided_inertia(deck)
     yield from unlike_moduli(deck)
+    yield from lone_moduli(deck)
+    yield from partial_bars(deck)
     places = context(deck, None)
     yield from second_axes(places)
     yield from warped_solids(places)

@@ -109,10 +109,9 @@ def _thickness(
     t = np.where(np.isnan(own), nominal[:, None], own)
     if np.any(bad := ~(t.mean(axis=1) > 0) | (t < 0).any(axis=1)):
         i = int(np.argmax(bad))
-        missing = np.isnan(t[i]).any()
-        why = (
-            "neither it nor its property gives a thickness" if missing else "its thickness is zero"
-        )
+        why = "its thickness is negative" if (t[i] < 0).any() else "its thickness is zero"
+        if np.isnan(t[i]).any():
+            why = "neither it nor its property gives a thickness"
         raise cards.refuse(i, why)
     return t if corners == 4 else t[:, [0, 1, 2, 2]]
 
