@@ -199,9 +199,23 @@ def _check(assembly: Assembly) -> None:
     for k in np.unique(shells.part):
         if not isinstance(assembly.parts[k].section, ShellSection):
             raise ModelError(f"part {assembly.parts[k].name!r} has shells but no shell section")
+        if _couples_too_much(assembly.parts[k].section):
+            raise ModelError(
+                f"part {assembly.parts[k].name!r} has a coupling (MID4) that its membrane and "
+                "bending cannot hold: the stiffness of the sheet has a negative eigenvalue"
+            )
     t = shells.thickness  # a wedge may have none at some of its corners
     if (thin := (t < 0).any(axis=1) | ~(t.mean(axis=1) > 0)).any():
         raise ModelError(f"shells {named(shells.ids[thin])} have no thickness")
+
+
+def _couples_too_much(section: ShellSection) -> bool:
+    """True if [A B; B D] has a negative eigenvalue, whatever the thickness."""
+    if section.coupling is None:
+        return False
+    A, D, B = _constants(section)[:3]
+    value = np.linalg.eigvalsh(np.block([[A, B], [B, D / 12]]))
+    return bool(value[0] < -LEAST * np.abs(value).max())
 
 
 def _constants(section: object) -> tuple:

@@ -134,7 +134,7 @@ REFUSED = {
     "sheet, NU = 4": (plate(material="MAT1,1,1000.,100.,,7.85-9\n"), "PSHELL 1: NU 4 of mat"),
     "MID4": (
         plate("PSHELL,1,1,2.,1,,1\n,,,2\n", STEEL + "MAT2,2,1.+6,0.,0.,1.+6,,3.+5\n"),
-        "PSHELL 1: its MID4 is too large",
+        "has a coupling .MID4. that its membrane",
     ),
     "K1 < 0": (line("PBAR,1,1,100.,800.,900.,9.\n,\n,-1.,1."), "PBAR 1: K1 -1 and K2 1 cannot"),
     "T1 < 0": (plate(quads=QUADS.replace("5,4\n", "5,4\n,,,-2.\n")), "CQUAD4 1: .*negative"),

@@ -8,6 +8,7 @@ import numpy as np
 from ....errors import FileError
 from ....model.assembly import Assembly
 from ....units import Units
+from ..export.whole_deck import is_written_here
 from ..text.deck import Deck
 from . import springs_and_masses
 from .beam_elements import beams
@@ -26,6 +27,7 @@ _ELEMENTS = (  # those of one kind have no id in common
     "CMASS1 CMASS2 CMASS3 CMASS4".split(),
     ["CONM1", "CONM2"],
 )
+_K6ROT = 100.0
 
 
 def assembly(
@@ -86,10 +88,17 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
 
 
 def _k6rot(deck: Deck) -> float | None:
-    """PARAM,K6ROT; None where it is not given, or for CQUADR and CTRIAR, which do not heed it."""
-    if parameter(deck, "K6ROT") in ("", "AUTO") or any(deck.present("CQUADR", "CTRIAR")):
+    """PARAM,K6ROT, 100 where a deck is silent (MSC Nastran's default since 2004).
+
+    None, the drilling field, stands for AUTO, for CQUADR and CTRIAR, which do not heed the
+    parameter, and for decks that were written here without it.
+    """
+    text = parameter(deck, "K6ROT")
+    if text == "AUTO" or any(deck.present("CQUADR", "CTRIAR")):
         return None
-    value = real_parameter(deck, "K6ROT", 0.0)
+    if not text and is_written_here(deck):
+        return None
+    value = real_parameter(deck, "K6ROT", _K6ROT)
     if value < 0:
         raise FileError(f"{deck.path}: PARAM,K6ROT is {value:g}; a stiffness cannot be negative")
     return value

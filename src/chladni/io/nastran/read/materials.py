@@ -143,8 +143,8 @@ def lone_moduli(deck: Deck) -> Iterator[str]:
         for i in np.flatnonzero(~nu & (E != G)):
             alone, other = "EG" if E[i] else "GE"
             yield (
-                f"{cards.where(int(i))}: MAT1 {cards.integers(1)[i]} has {alone} alone, so {other} and "
-                f"NU are 0, as in Nastran"
+                f"{cards.where(int(i))}: MAT1 {cards.integers(1)[i]} has {alone} alone, so "
+                f"{other} and NU are 0, as in Nastran"
             )
 
 

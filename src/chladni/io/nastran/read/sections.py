@@ -4,15 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ....model.properties import (
-    Anisotropic,
-    BeamSection,
-    Material,
-    Part,
-    Section,
-    ShellSection,
-    SolidSection,
-)
+from ....model.properties import Anisotropic, BeamSection, Part, Section, ShellSection, SolidSection
 from ..text.table import Cards
 from . import bar_sections
 from .context import Context
@@ -120,8 +112,6 @@ def _pshell(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
     blank = card.words(3)[0] == b""
     ratio = _positive(card, 5, "bending ratio 12I/T3", 1.0)
     ts = _positive(card, 7, "shear ratio TS/T", 0.833333)
-    if found[3] is not None:
-        _refuse_coupling(card, found, ratio)
     return ShellSection(
         np.nan if blank else _positive(card, 3, "thickness") * ctx.scale.length,
         found[0],
@@ -133,14 +123,6 @@ def _pshell(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
         float(card.reals(8, 0.0)[0]) * ctx.scale.inertia / ctx.scale.length**2,
         rigid_shear=found[2] is None,
     )
-
-
-def _refuse_coupling(card: Cards, found: list[Material | None], ratio: float) -> None:
-    """Refuse a MID4 with which [A B; B D] has a negative eigenvalue, whatever the thickness."""
-    A, D, B = (np.zeros((3, 3)) if m is None else m.plane_stress() for m in (*found[:2], found[3]))
-    sheet = np.block([[A, B], [B, ratio / 12 * D]])
-    if np.linalg.eigvalsh(sheet)[0] < -1e-9 * np.abs(sheet).max():
-        raise card.refuse(0, "its MID4 is too large: bending and membrane cannot hold its coupling")
 
 
 def _plies(ctx: Context, materials: Materials, card: Cards) -> list[Ply]:
