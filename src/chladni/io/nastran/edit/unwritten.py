@@ -1,4 +1,4 @@
-"""What of an assembly a changed deck does not hold: found by reading it again, field by field."""
+"""Changes of an assembly that a deck does not hold; the written deck is read and compared."""
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
@@ -105,7 +105,7 @@ def _old(family: Any, ids: np.ndarray) -> Any:
 
 
 def _alike_section(a: Any, b: Any) -> bool:
-    """The same numbers; ids of materials do not count, nor T, as elements have their own."""
+    """Compare numbers without ids of materials and without T; elements have their own thickness."""
     if not is_dataclass(a) or type(a) is not type(b):
         return _equal(a, b)
     names = [f.name for f in fields(a) if f.name not in ("id", "thickness")]

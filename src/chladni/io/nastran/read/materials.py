@@ -52,14 +52,14 @@ class Materials:
         return self._made[id]
 
     def sheet(self, asker: Cards, i: int, id: int) -> Material:
-        """The same, for shells, whose plane stiffness needs |ν| < 1."""
+        """A material for shells, whose plane stiffness needs |ν| < 1."""
         found = self.get(asker, i, id)
         if isinstance(found, Isotropic):
             self._refuse_ratio(asker, i, found, 1.0, "shells")
         return found
 
     def solid(self, asker: Cards, i: int, id: int) -> Isotropic:
-        """The same, for solids, which take MAT1 with -1 < ν < 0.5."""
+        """A material for solids, which take MAT1 with -1 < ν < 0.5."""
         found = self.isotropic(asker, i, id)
         self._refuse_ratio(asker, i, found, 0.5, "solids")
         return found

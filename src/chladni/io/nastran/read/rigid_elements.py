@@ -167,7 +167,7 @@ def partial_bars(deck: Deck) -> Iterator[str]:
             more = f" and {len(few) - 1} others have" if few[1:] else " has"
             yield (
                 f"{cards.where(few[0])}: RBAR {cards.integer(few[0], 1)}{more} fewer than six "
-                "components in CNA and CNB: the same components of the other end move alike, the "
+                "components in CNA and CNB: the other end moves equally in these components, the "
                 "rest is not tied"
             )
 
