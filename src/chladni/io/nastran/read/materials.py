@@ -152,10 +152,9 @@ def _orthotropic(card: Cards, scale: Units) -> Orthotropic:
     """MAT8."""
     E1, E2 = card.block(2, 2)[0]
     nu12, G12, G1z, G2z = card.block(4, 4, 0.0)[0]
-    if not (E1 > 0 and E2 > 0 and G12 >= 0):  # a blank G12 is 0
-        raise card.refuse(
-            0, f"E1 {E1:g} and E2 {E2:g} are to be positive, G12 {G12:g} not negative"
-        )
+    none = G12 == 0 and card.words(5)[0] != b""  # written as such; a blank is an omission
+    if not (E1 > 0 and E2 > 0 and (G12 > 0 or none)):
+        raise card.refuse(0, f"E1 {E1:g}, E2 {E2:g} and G12 {G12:g} are to be positive")
     if nu12**2 * E2 >= E1:
         raise card.refuse(0, f"NU12 {nu12:g} is too large for E1/E2 {E1 / E2:g}")
     s = scale.stress
