@@ -122,6 +122,8 @@ _FILES = """\
 - Where a table moves the supports, the input is `base:+X`, `base:+Y` or `base:+Z` and the quantity
   transmissibility, acceleration per acceleration (unit 1). All grids that the deck holds by SPC
   move together, and so does everything that is held to ground.
+- Tables are UTF-8, UTF-16 or CP1252, separated by commas, semicolons or tabs. Numbers have a
+  decimal point. Where semicolons or tabs separate, they may have a decimal comma.
 - Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (noted,
   never fitted), `state` (the first is compared, or the one `use` names).
 - Time data, whose FRFs are estimated as `chladni test` does it. Hits, bursts, multisines, random

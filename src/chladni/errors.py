@@ -58,7 +58,9 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 def not_text(error: UnicodeDecodeError) -> str:
     """Where a file ceases to be UTF-8 text, in words."""
-    return f"not UTF-8 text: byte {error.start + 1} is {error.object[error.start]:#04x}"
+    line = error.object[: error.start].count(b"\n") + 1
+    byte = f"byte {error.start + 1} (line {line}) is {error.object[error.start]:#04x}"
+    return f"not UTF-8 text: {byte}; save it as UTF-8"
 
 
 class ModelError(ChladniError, ValueError):

@@ -44,6 +44,37 @@ def test_order_of_rows_and_columns_is_free(tmp_path, H):
     np.testing.assert_array_equal(again.values, H.values)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_tables_as_windows_programs_write_them(tmp_path, encoding, mark):
+    """Code page, separator and decimal comma change nothing."""
+    lines = ["frequency_hz,output,input,real,imag,article"]
+    lines += [f"{f},1:+Z,2:+Z,{f},-1e-3,Tür µ" for f in (1.5, 2.25)]
+    text = "\r\n".join(lines).replace(",", mark)
+    text = text if mark == "," else text.replace(".", ",")
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    (read,) = read_recordings(tmp_path / "a.csv", "accelerance")
+    np.testing.assert_allclose(read.frf.values[:, 0, 0], np.array([1.5, 2.25]) - 1e-3j)
+    assert read.article == "Tür µ"
+
+
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_time_data_as_windows_programs_write_them(tmp_path, mark):
+    rows = ["time_s,1:+Z [N],2:+Z [m/s²]", *(f"{k / 64},{k % 7}.5,{k % 5}.25" for k in range(64))]
+    text = "\n".join(rows).replace(",", mark)
+    text = text if mark == "," else text.replace(".", ",")
+    (tmp_path / "a.csv").write_bytes(text.encode("cp1252"))
+    (read,) = read_recordings(tmp_path / "a.csv")
+    assert (read.time.rate, read.time.quantity) == (64.0, "accelerance")
+    np.testing.assert_allclose(read.time.response[0, 0, :3], [0.25, 1.25, 2.25])
+
+
+def test_a_decimal_comma_beside_a_decimal_point_is_not_guessed(tmp_path):
+    (tmp_path / "a.csv").write_text("mode;frequency_hz\n1;1,234\n2;2.5\n")
+    with pytest.raises(FileError, match="line 2: frequency_hz is '1,234', which is not a number"):
+        read_recordings(tmp_path / "a.csv")
+
+
 def test_levels_and_articles_are_recordings_of_their_own(tmp_path):
     """Each level may have its own frequencies, as a stepped sine has."""
     lines = ["frequency_hz,output,input,real,imag,level,article"]

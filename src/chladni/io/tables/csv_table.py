@@ -2,6 +2,7 @@
 
 import csv
 import difflib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,8 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from ...arrays import real_number
-from ...errors import FileError, named, not_text
+from ...errors import FileError, named
+from ..encoded_text import encoding_of
 from ..file_size import refuse_large
+
+DELIMITERS = ",;\t"  # Excel separates by semicolons where numbers have a decimal comma
 
 
 @dataclass(frozen=True)
@@ -73,12 +77,11 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -
         )
         raise FileError(f"no file {path}; the folder has {named(near)}")
     refuse_large(path)
+    cut, encoding = delimiter(path), encoding_of(path)
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, skipinitialspace=True)
+        with path.open(encoding=encoding, newline="") as file:
+            reader = csv.reader(file, delimiter=cut, skipinitialspace=True)
             rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is {not_text(error)}") from error
     except csv.Error as error:
         raise FileError(f"{path.name} is not a table: {error}") from error
     if not rows:
@@ -91,9 +94,38 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -
                 f"{path.name}, line {line}: {len(row)} cells, the header has {len(header)}"
             )
     columns = {name: [row[k].strip() for _, row in rows[1:]] for k, name in enumerate(header)}
+    if cut != ",":
+        columns = {name: _with_points(cells) for name, cells in columns.items()}
     if len(rows) == 1:
         raise FileError(f"{path.name} has a header but no rows")
     return CsvTable(path, columns, [line for line, _ in rows[1:]])
+
+
+def delimiter(path: Path) -> str:
+    """What separates the names in the first line of a file: a comma, a semicolon or a tab."""
+    first = first_line(path)
+    return max(DELIMITERS, key=first.count)
+
+
+def first_line(path: Path) -> str:
+    """The first line of a text file."""
+    with path.open(encoding=encoding_of(path)) as file:
+        return file.readline().strip()
+
+
+def names_of(path: Path) -> list[str]:
+    """The names in the first line of a table, in lower case."""
+    return [name.strip().lower() for name in first_line(path).split(delimiter(path))]
+
+
+def _with_points(cells: list[str]) -> list[str]:
+    """Numbers with a decimal comma as numbers with a point; a column that has both stays."""
+    if any("." in cell for cell in cells):
+        return cells
+    return [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in cells]
+
+
+_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 
 
 def files_next_to(path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""Recordings as tables in: FRF in CSV and NPZ, poles in CSV (SI, UTF-8)."""
+"""Recordings as tables in: FRF in CSV and NPZ, poles in CSV (SI)."""
 
 import zipfile
 from collections.abc import Iterable, Sequence
@@ -18,7 +18,7 @@ from ..damage import DAMAGED
 from ..file_size import refuse_large
 from ..time.read_time import named_arrays, read_mat, read_time_csv, read_wav
 from ..time.time_channels import is_time, only_known
-from .csv_table import CsvTable, files_next_to, read_table
+from .csv_table import CsvTable, files_next_to, names_of, read_table
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
 ENDINGS = (".npz", ".csv", ".wav", ".mat", *_UNIVERSAL)
@@ -49,7 +49,7 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
         refuse_large(path)
     elif ending in ENDINGS and ending not in _UNIVERSAL:
         raise FileError(f"no file {path}; the folder has {named(files_next_to(path))}")
-    if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
+    if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in names_of(path)):
         return (_timed(path, _TIMED[ending](path), quantity),)
     if ending == ".npz":
         return (read_npz(path, quantity),)
@@ -91,7 +91,7 @@ def _as_quantity(r: Recording, quantity: str | None) -> Recording:
 def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
     """FRFs (one recording per article and level) or poles, told apart by the header."""
     path = Path(path)
-    head = _first_line(path) - {""} if path.is_file() else set()
+    head = set(names_of(path)) - {""} if path.is_file() else set()
     if head and head.isdisjoint({*_CARTESIAN, "output", "input", "magnitude"}):
         if "mode" not in head:
             raise FileError(
@@ -144,11 +144,6 @@ def _responses(table: CsvTable, parts: tuple[str, str]) -> np.ndarray:
 
 def _quantities() -> str:
     return ", ".join(get_args(Quantity))
-
-
-def _first_line(path: Path) -> set[str]:
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return {name.strip().lower() for name in file.readline().split(",")}
 
 
 def _recording(

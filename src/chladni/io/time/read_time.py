@@ -13,10 +13,11 @@ from typing import Any, Literal
 import numpy as np
 
 from ...ema.time_record import TimeRecord
-from ...errors import FileError, named, not_text
+from ...errors import FileError, named
 from ..damage import DAMAGED
+from ..encoded_text import encoding_of
 from ..file_size import refuse_large
-from ..tables.csv_table import read_table
+from ..tables.csv_table import delimiter, first_line, read_table
 from .time_channels import TimeChannel, assembled, from_arrays, rate_of
 
 _UNSTATED = 0xFFFFFFFF  # length of a chunk that is not known yet
@@ -169,12 +170,12 @@ def read_time_csv(path: Path) -> Read:
     FileError
         With the line of what is no number, or the head that says no unit.
     """
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        head = [cell.strip() for cell in file.readline().strip().split(",")]
+    cut = delimiter(path)
+    head = [cell.strip() for cell in first_line(path).split(cut)]
     try:
-        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is {not_text(error)}") from error
+        with path.open(encoding=encoding_of(path)) as file:
+            lines = file if cut == "," else (line.replace(",", ".") for line in file)
+            rows = np.loadtxt(lines, delimiter=cut, skiprows=1, ndmin=2)
     except ValueError as error:
         raise FileError(f"{path.name}: a line after the first is not {len(head)} numbers "
                         f"({str(error).split(';')[0]})") from error  # fmt: skip
