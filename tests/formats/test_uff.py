@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.dynamics.frf import FRF
+from chladni.ema.channel_checks import drive_points
 from chladni.errors import FileError
 from chladni.io.uff.read_uff import read_uff, write_uff
 from chladni.io.uff.uff_units import ratio
@@ -133,6 +134,34 @@ def test_labels_of_units(length, rate):
     kind, a, b = ratio(f"({length}{rate}) / N")
     assert kind == {"": "receptance", "/s": "mobility"}.get(rate, "accelerance")
     assert (a, b) == ({"m": 1.0, "mm": 1e-3, "in": 0.0254}[length], 1.0)
+
+
+def test_node_0_is_a_base_only_of_a_transmissibility(tmp_path):
+    """Its quantity says so, or the case does; else the file does not know where the force acts."""
+    path = foreign(tmp_path / "a.uff", record(ref_node=0))
+    assert read_uff(path).frf.inputs == ("0:+Z",)
+    assert "node 0, so the file does not say where the force acts" in read_uff(path).notes[0]
+    assert read_uff(path, "transmissibility").frf.inputs == ("base:+Z",)
+    moved = foreign(tmp_path / "b.uff", record(ref_node=0, orddenom_spec_data_type=12))
+    assert read_uff(moved).frf.inputs == ("base:+Z",)
+    assert not read_uff(moved).notes
+
+
+def test_points_that_have_a_name_in_place_of_a_number_are_no_repeats(tmp_path):
+    """Response entities tell points of node 0 apart, and nodes of one number on two parts."""
+    named = [record(rsp_node=0, ref_node=0, rsp_ent_name=n) for n in ("P 1", "P2", "P3")]
+    frf = read_uff(foreign(tmp_path / "a.uff", *named)).frf
+    assert (frf.outputs, frf.inputs) == (("P_1:+Z", "P2:+Z", "P3:+Z"), ("0:+Z",))
+    parts = [record(rsp_ent_name="LEFT"), record(rsp_ent_name="RIGHT"), record(rsp_node=7)]
+    frf = read_uff(foreign(tmp_path / "b.uff", *parts)).frf
+    assert frf.outputs == ("LEFT:1:+Z", "RIGHT:1:+Z", "7:+Z")
+    alone = record(rsp_ent_name="WING", ref_ent_name="SHAKER")
+    assert read_uff(foreign(tmp_path / "c.uff", alone)).frf.outputs == ("1:+Z",)
+
+
+def test_node_0_at_both_ends_is_no_drive_point(tmp_path):
+    frf = read_uff(foreign(tmp_path / "a.uff", record(rsp_node=0, ref_node=0))).frf
+    assert drive_points(frf) == []
 
 
 def test_opposite_signs_of_one_dof_are_one_channel(tmp_path):

@@ -139,7 +139,7 @@ def _drive(identified: Identified) -> tuple[int, int, int] | None:
         return identified.outputs.index(same[0]), identified.inputs.index(same[0]), 1
     for j, (node, component, sign) in enumerate(inputs):
         for i, (n, c, s) in enumerate(outputs):
-            if (n, c) == (node, component):
+            if (n, c) == (node, component) and node:  # node 0 is no place
                 return i, j, s * sign
     return None
 

@@ -82,7 +82,7 @@ def matched(
         ("output", recording.frf.outputs), ("input", recording.frf.inputs),
     )  # fmt: skip
     rest = [label for role, labels in sides for label in labels if (label, role) not in own]
-    counted = number_channels(recording.frf.outputs, recording.frf.inputs)
+    counted = number_channels(recording.frf.outputs, recording.frf.inputs, made.ids.tolist())
     channels = bool(rest) and counted and not on_structure(made, nodes)
     if channels:
         notes.append(
@@ -98,7 +98,9 @@ def matched(
         for role, labels in sides
         for label in labels
     ]
-    unproved = [d.label for d in found if d.matched_by == "grid" and np.isnan(d.distance)]
+    unproved = dict.fromkeys(
+        d.label for d in found if d.matched_by == "grid" and np.isnan(d.distance)
+    )
     if unproved:
         notes.append(
             f"labels {named(unproved, 3)} of {recording.name} are taken as grid numbers of the "
