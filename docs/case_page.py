@@ -143,7 +143,9 @@ _FILES = """\
 - A table `NAME.channels.csv` next to time data names its channels: `channel`, `label`, `unit`,
   optional `role`, `scale`. A `.wav` needs it.
 - Universal file: FRFs and coherence (58, 58b), nodes (15, 2411), lines (2412, 82), axes of nodes
-  (2420), shapes (55), header and units (151, 164). Other datasets are named and not used.
+  (2420), shapes (55), header and units (151, 164). Other datasets are named and not used. Shapes
+  alone give their frequencies as a table of poles; `chladni correlate DECK --modes` compares the
+  shapes.
 
 Several recordings are distinguished by article, level and state, as the files or `[[recording]]`
 say. For one article, level and state, other shaker places are stacked as inputs of one test. Equal
@@ -163,8 +165,7 @@ Time histories and spectra of responses without a force give natural frequencies
 neither FRFs nor poles. A decay (a record, or each of its blocks) is used from its loudest moment
 on. A steady signal is used as if the force were white in the band. The time data may be any of
 those above without the force, and sound of a microphone (Pa). The command `identify` gives poles,
-damping and unscaled shapes of decays. Elsewhere they, and mode shapes, are named in the notes and
-not used.
+damping and unscaled shapes of decays. Elsewhere they are named in the notes and not used.
 """
 
 

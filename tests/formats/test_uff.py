@@ -10,6 +10,7 @@ from chladni.ema.channel_checks import drive_points
 from chladni.errors import FileError
 from chladni.io.uff.read_uff import read_uff, write_uff
 from chladni.io.uff.uff_units import ratio
+from chladni.io.uff.write_shapes import write_shapes
 
 LINES = (np.arange(2, 403) * 0.5, np.geomspace(10.0, 300.0, 101))
 
@@ -199,6 +200,32 @@ def test_shapes_complex_and_real(tmp_path):
     np.testing.assert_allclose(shapes.damping, 0.3 / abs(pole), rtol=1e-5)
     assert shapes.dofs[:3] == ("1:+X", "1:+Y", "1:+Z")
     np.testing.assert_allclose(shapes.values[:, 0], [z[0], 2 * z[0], 0, z[1], 2 * z[1], 0])
+
+
+@pytest.mark.parametrize("complex_", [False, True])
+def test_shapes_that_are_written_come_back(tmp_path, complex_):
+    """A normal mode is its own, a complex one keeps its imaginary part, its pole gives f and ζ."""
+    motion = np.arange(12.0).reshape(2, 3, 2) + (1j * np.arange(12.0, 0, -1).reshape(2, 3, 2)
+                                                 if complex_ else 0.0)  # fmt: skip
+    ids, places = np.array([4, 9]), np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    f = np.array([12.5, 40.0])
+    back = read_uff(write_shapes(tmp_path / "a.unv", f, motion, ids, places, 0.01)).shapes
+    np.testing.assert_allclose(back.values.reshape(2, 3, 2), motion, rtol=1e-5)
+    assert np.iscomplexobj(back.values) is complex_
+    np.testing.assert_allclose(back.frequency, f, rtol=1e-5)
+    np.testing.assert_allclose(back.damping, 0.01, rtol=1e-3)
+
+
+def test_mode_shapes_alone_give_natural_frequencies(tmp_path):
+    """In order, without rigid motions; where the file holds FRFs they are not used."""
+    motion, ids, places = np.ones((1, 3, 3)), np.array([4]), np.zeros((1, 3))
+    path = write_shapes(tmp_path / "a.unv", np.array([40.0, 1e-4, 12.5]), motion, ids, places)
+    poles = read_uff(path).poles
+    np.testing.assert_allclose(poles.frequency, [12.5, 40.0], rtol=1e-5)
+    assert np.isnan(poles.frequency_sd).all()
+    with_frf = foreign(path, record())
+    assert read_uff(with_frf).frf is not None
+    assert read_uff(with_frf).poles is None
 
 
 def test_hammer_test_of_a_plate(recordings):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from ..geometry.nearest import ShellSurface
 from ..model.assembly import Assembly
 
 OFF = 0.02  # of the structure's size: a node farther from the grid of its number is another one
@@ -25,14 +26,21 @@ def size_of(made: Assembly) -> float:
 def scaled(made: Assembly, nodes: Mapping[int, np.ndarray]) -> tuple[str, dict[int, np.ndarray]]:
     """Unit in which nodes lie on the deck, and the nodes in metres.
 
-    Metres unless another unit is far better.
+    Metres unless another unit is far better: at the grids, else the largest on the shells.
     """
     if len(nodes) < ENOUGH:
         return "m", dict(nodes)
     places, size = np.array(list(nodes.values())), size_of(made)
     off = {unit: _off(made, places * factor, size) for unit, factor in SCALES.items()}
-    best = min(off, key=lambda unit: off[unit])
-    unit = best if off["m"] > 5 * OFF and off[best] < OFF else "m"
+    unit = min(off, key=lambda unit: off[unit])
+    if off[unit] >= OFF and len(made.shells):  # no grid is near in a coarse mesh
+        shells = ShellSurface.whole(made)
+        on = {u: _off_shells(shells, places * SCALES[u], size) for u in off if off[u] < np.inf}
+        off["m"] = min(off["m"], on.get("m", np.inf))
+        unit = max((u for u in on if on[u] < OFF), key=lambda u: SCALES[u], default="m")
+    elif off[unit] >= OFF:
+        unit = "m"
+    unit = unit if off["m"] > 5 * OFF else "m"
     return unit, {n: SCALES[unit] * x for n, x in nodes.items()}
 
 
@@ -42,6 +50,11 @@ def _off(made: Assembly, places: np.ndarray, size: float) -> float:
         return np.inf
     away = [float(np.linalg.norm(made.points - x, axis=1).min()) for x in places[:_LOOKED]]
     return float(np.median(away)) / size
+
+
+def _off_shells(shells: ShellSurface, places: np.ndarray, size: float) -> float:
+    """Median distance from the shells over the structure's size."""
+    return float(np.median(shells.closest_points(places[:_LOOKED]).distance)) / size
 
 
 def _dot(places: np.ndarray, size: float) -> bool:

@@ -56,8 +56,9 @@ def places(
     elsewhere = seated and not numbers_agree(made, nodes)
     frf = recorded[0].frf if recorded else None
     numbers = [label for label in spoken if not label.startswith("base:")]
-    both = (numbers, ()) if frf is None else (frf.outputs, frf.inputs)
-    counted = number_channels(*both, made.ids.tolist(), 1 if "sensors" in test else ENOUGH)
+    outputs, inputs = (numbers, ()) if frf is None else (frf.outputs, frf.inputs)
+    least = 1 if "sensors" in test else ENOUGH
+    counted = number_channels(outputs, inputs, made.ids.tolist(), least)
     if not seated and numbers and counted:
         raise LabelError(
             f"{test.at('recordings')}: the labels {named(numbers, 3)} are taken as channel "

@@ -14,7 +14,7 @@ import numpy as np
 from ...arrays import measurable
 from ...dofs import label
 from ...ema.response_correlations import responses
-from ...ema.setup import Function, Recording, Shapes
+from ...ema.setup import Function, PoleTable, Recording, Shapes
 from ...errors import ChladniError, FileError, named
 from .estimate_stamp import read_stamp, with_variance
 from .uff_accumulator import Channel, Pair, Shape, TimeSignal, UffAccumulator
@@ -69,13 +69,15 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
         _take_function(uff, record, parts, uff.where(record.number, _FUNCTION), quantity)
     frf, (averages, added) = frf_matrix(uff, quantity), read_stamp(uff.title)
     time = time_record(uff) if frf is None else None
-    _name_unused(uff, frf is None and time is None)
+    alone = frf is None and time is None
+    _name_unused(uff, alone)
     if frf is not None and averages:
         frf = with_variance(frf, averages)
         uff.notes.append(f"{path.name}: its noise is that of the stated {averages:g} averages")
     return Recording(
         name=path.name,
         frf=frf,
+        poles=_poles(uff) if alone and not responses(uff.functions) else None,
         shapes=_shapes(uff),
         nodes=uff.nodes,
         axes=_axes(uff),
@@ -307,8 +309,10 @@ def _take_systems(uff: UffAccumulator, d: Dataset, where: str) -> None:
 
 
 def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
-    """A normal mode (analysis type 2) or a complex one (3 and 7); others are no modes."""
+    """A normal mode (analysis type 2) or a complex one (3 and 7) as motion; others are no modes."""
     analysis = int(d["analysis_type"])
+    if int(d["spec_data_type"]) not in _MOTION:
+        return
     if analysis == 2:
         f = d.get("freq", 0.0)
         zeta = d.get("modal_damp_vis", 0.0) or d.get("modal_damp_his", 0.0) / 2
@@ -327,6 +331,8 @@ def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
 
 
 _UNITS, _FUNCTION = 164, 58
+_MOTION = (0, 1, 8, 11, 12)  # data types: unknown, general, displacement, velocity, acceleration
+_RIGID = 1e-3  # of the highest frequency: modes below are rigid motions
 _TAKE = {
     15: _take_nodes,
     55: _take_shape,
@@ -343,6 +349,21 @@ def _axes(uff: UffAccumulator) -> dict[int, np.ndarray]:
     """The nodes whose directions are not those of the global axes."""
     turned = {n: uff.systems[s] for n, s in uff.turned.items() if s in uff.systems}
     return {n: A for n, A in turned.items() if not np.allclose(A, np.eye(3), atol=1e-6)}
+
+
+def _poles(uff: UffAccumulator) -> PoleTable | None:
+    """Frequencies of the mode shapes as a table, rigid motions left out; None without any."""
+    shapes = sorted(uff.shapes, key=lambda shape: shape.frequency)
+    elastic = [s for s in shapes if s.frequency > _RIGID * shapes[-1].frequency]
+    if not elastic:
+        return None
+    uff.notes.append(
+        f"{uff.path.name}: the natural frequencies of its {len(elastic)} mode shapes are compared; "
+        "chladni correlate DECK --modes compares the shapes"
+    )
+    f, zeta = np.array([(s.frequency, s.damping or np.nan) for s in elastic]).T
+    n = len(elastic)
+    return PoleTable(f, np.full(n, np.nan), zeta, np.arange(1, n + 1), ("",) * n)
 
 
 def _shapes(uff: UffAccumulator) -> Shapes | None:
