@@ -117,8 +117,8 @@ _FILES = """\
 - FRF as `.csv`: columns `frequency_hz`, `output`, `input`, `real`, `imag`; optional `coherence` and
   `variance` (the noise), `level` and `article` (one recording each). In place of `real` and `imag`
   there may be `magnitude` and `phase_deg` or `phase_rad`.
-- FRF as `.npz`: arrays `frequency_hz` (n_f,), `values` (n_f, n_out, n_in), `outputs`, `inputs`;
-  optional `coherence`, `variance`, `quantity`, `level`, `article`.
+- FRF as `.npz` or `.mat`: arrays `frequency_hz` (n_f,), `values` (n_f, n_out, n_in), `outputs`,
+  `inputs`; optional `coherence`, `variance`, `quantity`, `level`, `article`.
 - Where a table moves the supports, the input is `base:+X`, `base:+Y` or `base:+Z` and the quantity
   transmissibility, acceleration per acceleration (unit 1). All grids that the deck holds by SPC
   move together, and so does everything that is held to ground.

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import PoleTable
@@ -32,6 +33,39 @@ def test_every_digit_comes_back(tmp_path, H, ending):
         np.testing.assert_array_equal(getattr(back.frf, name), getattr(H, name))
     assert (back.frf.outputs, back.frf.inputs) == (H.outputs, H.inputs)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize(("outputs", "inputs"), [(3, 2), (3, 1), (1, 2), (1, 1)])
+def test_a_mat_holds_frfs_by_the_names_of_npz(tmp_path, H, outputs, inputs):
+    """MATLAB drops axes of length one at the end, and its texts are cells or rows of characters."""
+    H = H.sel(H.outputs[:outputs], H.inputs[:inputs])
+    held = {"frequency_hz": H.frequency[:, None], "values": H.values, "quantity": H.quantity,
+            "coherence": H.coherence, "inputs": np.array(H.inputs, object),
+            "outputs": np.array(H.outputs), "level": 2.5}  # fmt: skip
+    savemat(tmp_path / "a.mat", held)
+    (back,) = read_recordings(tmp_path / "a.mat")
+    np.testing.assert_array_equal(back.frf.values, H.values)
+    np.testing.assert_array_equal(back.frf.coherence, H.coherence)
+    assert (back.frf.outputs, back.frf.inputs, back.level) == (H.outputs, H.inputs, 2.5)
+    assert back.frf.quantity == "mobility"
+
+
+@pytest.mark.parametrize(
+    ("held", "said"),
+    [
+        ({"FRF": np.ones((3, 3, 9)), "frequencyBand": np.arange(9.0)},
+         "unknown array FRF, frequencyBand.*of FRFs frequency_hz, values, outputs, inputs"),
+        ({"frequency_hz": np.arange(9.0), "values": np.ones(9)}, "no array outputs, inputs"),
+        ({"frequency_hz": np.arange(9.0), "values": np.ones((2, 9)), "outputs": ["1:+Z", "2:+Z"],
+          "inputs": ["1:+Z"], "quantity": "mobility"}, r"values are \(2, 9\)"),
+        ({"Signal": {"x_values": {"increment": 1.0}, "y_values": {"values": np.array([1j, 2.0])}}},
+         "record 1 is complex, a function of frequency; export FRFs as a universal file"),
+    ],
+)  # fmt: skip
+def test_a_mat_of_other_frfs_is_a_sentence(tmp_path, held, said):
+    savemat(tmp_path / "a.mat", held)
+    with pytest.raises(FileError, match=rf"a\.mat: .*{said}"):
+        read_recordings(tmp_path / "a.mat")
 
 
 def test_order_of_rows_and_columns_is_free(tmp_path, H):

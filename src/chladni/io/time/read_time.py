@@ -79,13 +79,13 @@ def _refuse_cut(path: Path) -> None:
             return
 
 
-def read_mat(path: Path) -> Read:
-    """A MAT of MATLAB 4 to 7: named arrays, or records with x_values and y_values (Testlab).
+def mat_variables(path: Path) -> dict[str, Any]:
+    """Variables of a MAT of MATLAB 4 to 7, axes of length one left out.
 
     Raises
     ------
     FileError
-        If it is of version 7.3, is damaged, or does not say rate and channels.
+        If it is of version 7.3, or is damaged.
     """
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import MatReadError
@@ -102,18 +102,31 @@ def read_mat(path: Path) -> Read:
         held = loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except (*DAMAGED, MatReadError) as error:
         raise FileError(f"{path.name} cannot be read as MAT: {error}") from error
-    held = {k: v for k, v in held.items() if not k.startswith("__")}
+    return {k: v for k, v in held.items() if not k.startswith("__")}
+
+
+def time_of_mat(path: Path, held: dict[str, Any]) -> Read:
+    """Time data of a MAT: named arrays, or records with x_values and y_values (Testlab).
+
+    Raises
+    ------
+    FileError
+        If the variables do not say rate and channels.
+    """
     records = [r for v in held.values() for r in np.ravel(np.array(v, dtype=object))
                if hasattr(r, "x_values") and hasattr(r, "y_values")]  # fmt: skip
     if records:
         return _assembled(path, *_testlab(path.name, records))
-    arrays = {}
-    for name, value in held.items():
-        array = np.asarray(value)
-        if array.dtype.kind == "O":
-            array = np.array([str(x) for x in array.ravel()])
-        arrays[name] = array
-    return named_arrays(path, arrays)
+    return named_arrays(path, mat_arrays(held))
+
+
+def mat_arrays(held: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Variables as arrays, a cell of texts as a row of them."""
+    arrays = {name: np.asarray(value) for name, value in held.items()}
+    return {
+        name: np.array([str(x) for x in array.ravel()]) if array.dtype.kind == "O" else array
+        for name, array in arrays.items()
+    }
 
 
 def named_arrays(path: Path, arrays: dict[str, np.ndarray]) -> Read:
@@ -136,6 +149,11 @@ def _testlab(name: str, records: list[Any]) -> tuple[float, list[TimeChannel]]:
     channels, rates = [], []
     for k, record in enumerate(records):
         x, y = record.x_values, record.y_values
+        if np.iscomplexobj(getattr(y, "values", None)):
+            raise FileError(
+                f"{name}: record {k + 1} is complex, a function of frequency; export FRFs as a "
+                "universal file"
+            )
         try:
             rates.append(1 / float(x.increment))
             values = np.asarray(y.values, float)
