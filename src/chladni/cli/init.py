@@ -1,6 +1,5 @@
 """``chladni init``: a commented case.toml and sensors.csv from a deck and a recording."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -9,8 +8,9 @@ import typer
 from ..case import load_case
 from ..errors import ChladniError, FileError
 from ..output import write_text
+from ..workflows.case_check import NO_RECORDING, check
 from ..workflows.case_draft import CaseDraft, case_text, draft, said_of, sensors_text
-from .console import say
+from .console import say, watched
 from .run import Allow, Out, Units, place_of, started
 
 
@@ -45,7 +45,7 @@ def run(
             write_text(job.folder / "sensors.csv", sensors_text(made))
         for sentence in _sentences(made):
             job.say(sentence)
-    say(_next(place, made.missing))
+    say(_next(place, made))
 
 
 def _sentences(made: CaseDraft) -> list[str]:
@@ -55,11 +55,20 @@ def _sentences(made: CaseDraft) -> list[str]:
     return [*out, *made.notes, *(f"missing: {text}" for text in made.missing)]
 
 
-def _next(place: Path, missing: Sequence[str]) -> str:
-    """State if the case can be used, else the words without which it cannot."""
+def _next(place: Path, made: CaseDraft) -> str:
+    """State if the case can be used, else the first reason why a comparison would refuse it."""
+    if made.nowhere:
+        return "not complete yet: no output or input has a place; add rows to sensors.csv"
     try:
-        load_case(place)
+        case = load_case(place)
+        with watched() as progress:
+            found = check(case, progress=progress)
     except ChladniError as error:
         return f"not complete yet: {error}"
-    said = "can be used; what is missing would improve it" if missing else "is complete"
+    if not made.read:
+        return f"not complete yet: there is no recording; {NO_RECORDING}"
+    if found.faults:
+        first = found.faults[0]
+        return f"not ready yet: {first.text}; {first.remedy}; next: chladni check {place}"
+    said = "can be used; what is missing would improve it" if made.missing else "is complete"
     return f"the case {said}; next: chladni check {place}"

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..case.free_parameters import fields_of
+from ..case.mended_recordings import with_frf
 from ..ema.response_correlations import responses
 from ..ema.setup import Recording
 from ..errors import FileError
@@ -78,6 +79,11 @@ class CaseDraft:
         count: Counter[str] = Counter(d.matched_by for d in self.dofs)
         return ", ".join(f"{count[kind]} {text}" for kind, text in WAYS.items() if count[kind])
 
+    @property
+    def nowhere(self) -> bool:
+        """Whether there are dofs and none of them has a place."""
+        return bool(self.dofs) and all(d.matched_by == "missing" for d in self.dofs)
+
 
 def draft(
     deck: Path,
@@ -137,7 +143,7 @@ def _recordings(path: Path, quantity: str | None) -> tuple[Recording, ...]:
     if not path.is_file():
         raise FileError(f"no file {path}{similar_names(path)}")
     try:
-        return read_recordings(path, quantity)
+        return tuple(with_frf(r)[0] for r in read_recordings(path, quantity))
     except FileError as error:
         if quantity is None and "quantity" in str(error):
             raise FileError(f"{error} (--quantity)") from error
