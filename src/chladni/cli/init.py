@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
-from ..case import load_case
+from ..case import Case, load_case
 from ..errors import ChladniError, FileError
 from ..output import write_text
 from ..workflows.case_check import NO_RECORDING, check
 from ..workflows.case_draft import CaseDraft, case_text, draft, said_of, sensors_text
+from ..workflows.ready_case import refuse_without_effects
 from .console import say, watched
 from .run import Allow, Out, Units, place_of, started
 
@@ -61,14 +62,22 @@ def _next(place: Path, made: CaseDraft) -> str:
         return "not complete yet: no output or input has a place; add rows to sensors.csv"
     try:
         case = load_case(place)
-        with watched() as progress:
-            found = check(case, progress=progress)
     except ChladniError as error:
         return f"not complete yet: {error}"
     if not made.read:
         return f"not complete yet: there is no recording; {NO_RECORDING}"
-    if found.faults:
-        first = found.faults[0]
-        return f"not ready yet: {first.text}; {first.remedy}; next: chladni check {place}"
+    if why := _refusal(case):
+        return f"not ready yet: {why}; next: chladni check {place}"
     said = "can be used; what is missing would improve it" if made.missing else "is complete"
     return f"the case {said}; next: chladni check {place}"
+
+
+def _refusal(case: Case) -> str:
+    """The first reason why diagnose would refuse the case before its fit; "" for none."""
+    try:
+        refuse_without_effects(case)
+        with watched() as progress:
+            faults = check(case, progress=progress).faults
+    except ChladniError as error:
+        return str(error).removeprefix(f"{case.path}: ")
+    return f"{faults[0].text}; {faults[0].remedy}" if faults else ""

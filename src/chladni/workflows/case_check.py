@@ -255,7 +255,8 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
     try:
         refuse_without_effects(case)
     except FileError as error:
-        out.append(CaseFinding(_without_path(case, error), "use calibrate or correlate", True))
+        text, _, remedy = _without_path(case, error).partition("; ")
+        out.append(CaseFinding(text, remedy, True))
         diagnosing = False
     try:
         every = each_state(with_natural_frequencies(case))
