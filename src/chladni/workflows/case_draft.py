@@ -81,7 +81,7 @@ class CaseDraft:
 
     @property
     def nowhere(self) -> bool:
-        """Whether there are dofs and none of them has a place."""
+        """True if there are dofs and no place of any is known."""
         return bool(self.dofs) and all(d.matched_by == "missing" for d in self.dofs)
 
 

@@ -32,7 +32,7 @@ class ReadyCase:
 
 
 def refuse_without_effects(case: Case) -> None:
-    """Refuse a deck on which no effect can act.
+    """Refuse a deck without parts for the effects.
 
     Raises
     ------

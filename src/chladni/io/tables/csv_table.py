@@ -102,7 +102,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -
 
 
 def delimiter(path: Path) -> str:
-    """What separates the names in the first line of a file: a comma, a semicolon or a tab."""
+    """The separator of the names in the first line of a file: a comma, a semicolon or a tab."""
     first = first_line(path)
     return max(DELIMITERS, key=first.count)
 

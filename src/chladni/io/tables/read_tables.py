@@ -41,7 +41,7 @@ _NPZ_OPTIONAL = ("coherence", "variance", "quantity", "level", "article")
 
 
 def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
-    """What a file holds, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat.
+    """Contents of a file, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat.
 
     A CSV, NPZ or MAT holds FRFs, poles (CSV) or time data; WAV holds time data.
 
@@ -119,7 +119,7 @@ def _as_quantity(r: Recording, quantity: str | None) -> Recording:
 
 
 def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
-    """FRFs (one recording per article and level) or poles, told apart by the header."""
+    """FRFs (one recording per article and level) or poles; the header decides."""
     path = Path(path)
     head = set(names_of(path)) - {""} if path.is_file() else set()
     if head and head.isdisjoint({*_CARTESIAN, "output", "input", "magnitude"}):

@@ -72,6 +72,6 @@ def function_set(d: Mapping[str, Any], number: int) -> FunctionSet:
 
 
 def _name(text: object) -> str:
-    """Name of an entity as a word of a label; "" where there is none."""
+    """Name of an entity as a word of a label, or an empty text."""
     name = re.sub(r"[^\w.+-]+", "_", str(text or "").strip())
     return "" if name.upper() in ("NONE", "NULL", "0") else name

@@ -26,10 +26,10 @@ _BINARY = re.compile(rb"(?m)^ *58[bB]")
 def readable(path: Path) -> Iterator[Path]:
     """The file itself, or a tidied copy of it that lives as long as it is needed.
 
-    Its text becomes UTF-8, in the heads of binary records too. Text files are tidied where end
-    marks are not in columns 1 to 6, or are followed by some blanks, where lines end in a carriage
-    return alone, and where exponents are Fortran's D or have three digits. The numbers of binary
-    records are never touched.
+    Its text becomes UTF-8, in the heads of binary records too. End marks of text files
+    are put into columns 1 to 6, with no blanks behind them. Lines that end in a carriage return
+    alone, Fortran's D exponents and those of three digits are mended. The numbers of binary records
+    are never touched.
 
     Raises
     ------

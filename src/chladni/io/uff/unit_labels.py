@@ -85,10 +85,10 @@ def plain(label: str) -> str:
 
 
 def unit(label: str) -> Unit | None:
-    """What a label means; None where a part of it is not known, or it says nothing.
+    """Unit of a label; None where a part of it is not known, or it says nothing.
 
-    A slash divides by the whole product behind it, as in m/N-s and m/s*s; only where that is
-    neither a motion nor a force it divides by the next factor alone, as in 1/N*m/s2.
+    A slash divides by the whole product behind it, as in m/N-s and m/s*s. Where that is neither a
+    motion nor a force, it divides by the next factor alone, as in 1/N*m/s2.
 
     >>> unit("(m/s^2)/lbf") == unit("1/lbf*(m/s2)"), unit("m/N-s").motion, unit("furlong")
     (True, 'mobility', None)
@@ -103,7 +103,7 @@ def unit(label: str) -> Unit | None:
 
 
 def is_force(u: Unit) -> bool:
-    """Whether a unit is one of force."""
+    """Return True for a unit of force."""
     return (u.length, u.force, u.time) == (0, 1, 0)
 
 
