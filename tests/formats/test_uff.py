@@ -157,7 +157,9 @@ def test_points_that_have_a_name_in_place_of_a_number_are_no_repeats(tmp_path):
     frf = read_uff(foreign(tmp_path / "b.uff", *parts)).frf
     assert frf.outputs == ("LEFT:1:+Z", "RIGHT:1:+Z", "7:+Z")
     alone = record(rsp_ent_name="WING", ref_ent_name="SHAKER")
-    assert read_uff(foreign(tmp_path / "c.uff", alone)).frf.outputs == ("1:+Z",)
+    coherent = record(func_type=6, data=np.ones(10))
+    frf = read_uff(foreign(tmp_path / "c.uff", alone, coherent)).frf
+    assert (frf.outputs, frf.coherence is None) == (("1:+Z",), False)
 
 
 def test_node_0_at_both_ends_is_no_drive_point(tmp_path):

@@ -133,7 +133,7 @@ def _entities(records: Sequence[FunctionSet]) -> Entities:
     found: dict[tuple[int, int], set[str]] = {}
     for record in records:
         for end, (node, _) in enumerate((record.response, record.reference)):
-            found.setdefault((end, node), set()).add(record.names[end])
+            found.setdefault((end, node), set()).update({record.names[end]} - {""})
     return found
 
 
