@@ -22,7 +22,7 @@ PACKAGES = {  # every package of ours and where its source is
 }
 GROUND = {
     "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "parallel",
-    "results", "extensions"
+    "results", "extensions", "own_folder"
 }  # fmt: skip
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ....errors import FileError
 from ....output import atomic
+from ....own_folder import own_folder
 from ..text.deck import Deck
 from ..text.format import card
 from ..text.source_files import Include, Source
@@ -34,7 +35,8 @@ def write_deck(
     Raises
     ------
     FileError
-        If ``path`` is one of the files the deck was read from.
+        If ``path`` is one of the files the deck was read from, or a link stands where an included
+        file has to go.
     LabelError
         If a change names a card or field that does not exist.
     """
@@ -46,12 +48,14 @@ def write_deck(
     if len(footer) > sum(len(s.lines) for s in deck.sources):
         footer = _apart(deck, path, final, footer)
     places = _places(deck, final, {*edits, *([deck.begins] if footer else [])})
-    for k in sorted(places, reverse=True):
-        source = deck.sources[k]
-        new = {**edits.get(k, {}), **_includes(deck, source, places[k], places)}
-        text = _text(source, new, footer if k == deck.begins else [])
-        target = path.parent / places[k].relative_to(final.parent)
-        atomic(target, lambda part, text=text: part.write_bytes(text))  # type: ignore[misc]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with own_folder(path.parent) as here:
+        for k in sorted(places, reverse=True):
+            source = deck.sources[k]
+            new = {**edits.get(k, {}), **_includes(deck, source, places[k], places)}
+            text = _text(source, new, footer if k == deck.begins else [])
+            target = path.parent / places[k].relative_to(final.parent)
+            atomic(target, lambda part, text=text: part.write_bytes(text), here)  # type: ignore[misc]
     return path
 
 
