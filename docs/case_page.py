@@ -51,11 +51,15 @@ notes. Numbers are SI whatever the deck is in. The command `chladni init DECK RE
 case. The command `chladni check CASE` says how it is understood. This page is written from
 `chladni/case/schema.py`.
 
-Its files lie in its folder. A path that leads out of it is refused unless `[model] outside = true`
-allows it, so that a case from somebody else opens nothing of yours. The command `chladni
-init` points to deck and recordings where they are, and writes that word if they are elsewhere.
-Copied into the folder, they make a case that can be handed on. A deck may include other files from
-anywhere.
+Its files lie in its folder. A path or a link that leads out of it is refused unless `[model]
+outside = true` allows it, so that a case from somebody else opens nothing of yours. The same holds
+for what a deck or a thickness file includes. The command `chladni init` points to deck and
+recordings where they are, and writes that word if they are elsewhere. Copied into the folder, they
+make a case that can be handed on.
+
+In every table that is written, text that a spreadsheet would take for a formula (`=`, `+`, `-` or
+`@` in front) begins with a quotation mark, as in `'+Z`. Where a table is read, the mark is taken
+off. Control characters are written as `\\x1b`.
 
 Files above 1 GB (an archive: unpacked) are refused before they are read; `CHLADNI_LARGEST_GB=8` in
 the environment lets larger ones in. Results go to a folder of their own (`--out`) with those of one

@@ -79,7 +79,8 @@ SCHEMA = (
         "Unknown cards and case control commands that are ignored.",
         '["CWELD"]', COMMANDS),
     Key("model", "outside", "true or false", "", "false",
-        "True: files of the case may lie outside of its folder (`../`, or a whole path). Leave it "
+        "True: files of the case may lie outside of its folder (`../`, a whole path or a link). "
+        "Leave it "
         "false in a case from somebody else.", "true", COMMANDS),
     Key("test", "recordings", "list of files", "", "none",
         "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data. FRFs of time data "

@@ -18,7 +18,7 @@ from ..geometry.formed_mesh import FormedMesh
 from ..output import write_text
 from ..units import Units
 from ..units import units as units_named
-from .file_size import refuse_large
+from .file_size import refuse_large, refuse_outside
 
 _WIDTHS = {"": (8, 16), "%": (10, 16), "+": (20, 20)}  # integers and reals of each format
 
@@ -80,6 +80,7 @@ def _resolved(block: _Block, above: tuple[Path, ...]) -> Iterator[_Block]:
     for row, line in enumerate(block.lines):
         if line.strip():
             other = block.source.parent / line.strip()
+            refuse_outside(other, f"{block.source}, line {block.at[row]}: INCLUDE ")
             if not other.is_file():
                 raise block.fault(row, f"no file {line.strip()!r}")
             if other.resolve() in above:

@@ -7,7 +7,7 @@ from itertools import accumulate
 from pathlib import Path
 
 from ....errors import FileError
-from ...file_size import refuse_large
+from ...file_size import refuse_large, refuse_outside
 
 BOM = b"\xef\xbb\xbf"  # some editors begin a file with it
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
@@ -167,6 +167,7 @@ class _DeckReading:
     ) -> None:
         prefix = f"{file.path}:{first + 1}: INCLUDE "
         target = _target(name, file.path, above)
+        refuse_outside(target, prefix)
         position = -1
         if self.bulk or target.is_file():
             position = self.load(target, above, prefix)
