@@ -28,6 +28,7 @@ from chladni.effects.calibration_parameters import (
 )
 from chladni.inference.adequacy import STATISTICS, adequacy
 from chladni.inference.hypothesis_fit import HypothesisFit
+from chladni.io.tables.csv_table import csv_text
 from chladni.model.assembly import Assembly
 from chladni.output import make_folder, write_text
 from chladni.search.diagnosis import without_effects
@@ -130,8 +131,8 @@ def _tabulate(case: Path, made: MadeCase) -> None:
     """Replace the recording of a case by a table of natural frequencies."""
     f = np.array([f for f in made.truth["frequency_hz"] if f > ELASTIC][:LISTED])
     f *= np.exp(ERROR * np.random.default_rng([made.truth["seed"], 3]).normal(size=len(f)))
-    rows = [f"{k},{hz:.4f}" for k, hz in enumerate(f, 1)]
-    write_text(case / "modes.csv", "\n".join(["mode,frequency_hz", *rows, ""]))
+    rows = [(k, f"{hz:.4f}") for k, hz in enumerate(f, 1)]
+    write_text(case / "modes.csv", csv_text([("mode", "frequency_hz"), *rows]))
     head, rest = (case / "case.toml").read_text(encoding="utf-8").split("[test]")
     mass = [line for line in rest.splitlines() if line.startswith("mass")]
     words = [head + "[test]", 'recordings = ["modes.csv"]', *mass, ""]

@@ -1,14 +1,20 @@
 """Tables: round trips to the last digit; one sentence for each kind of fault."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.io import savemat
 
+import chladni
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import PoleTable
 from chladni.errors import FileError
+from chladni.io.tables.csv_table import escaped, unescaped
 from chladni.io.tables.read_tables import read_poles, read_recordings
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.io.tables.write_tables import write_csv, write_npz, write_poles
@@ -22,6 +28,59 @@ def H():
     spread, gamma = rng.uniform(size=(2, 20, 3, 2))
     outputs, inputs = ("1:+Z", "4:-X", "7:n"), ("1:+Z", "base:+Z")
     return FRF(values, f, outputs, inputs, "mobility", spread, gamma)
+
+
+FORMULAS = (
+    "=cmd|' /C calc'!A0",
+    "@SUM(1)",
+    "+1+cmd",
+    "-2+3",
+    "\tx",
+    "\r=1",
+    " =1",
+    "\uff1d1",
+    "+Z",
+)
+CELLS = st.text(st.sampled_from("=+-@'\t\r\n ,\"\\x1b5c07aZ0\x1b\x9b\uff1d"), min_size=1)
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_no_cell_is_a_formula(text):
+    """OWASP, CSV Injection: nothing begins with = + - @, a tab or a line end, behind blanks too."""
+    assert str(escaped(text)).startswith("'")
+    assert unescaped(str(escaped(text))) == text
+
+
+@settings(max_examples=300)
+@given(CELLS)
+def test_an_escaped_cell_comes_back(text):
+    cell = str(escaped(text))
+    assert unescaped(cell) == text
+    assert not re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]", cell)
+    number = re.fullmatch(r"[-+][\d.]+(e[-+]?\d+)?", cell)
+    assert number or not re.match(r"\s*[=+\-@\uff1d]|[\t\r\n]", cell)
+
+
+@pytest.mark.parametrize("number", [-1.5, "-1.5", "+2e-3", "-.5", "1e5", 7, "-inf", "nan"])
+def test_numbers_stay_numbers(number):
+    assert escaped(number) == number
+
+
+def test_labels_come_back_whatever_they_are(tmp_path, H):
+    odd = ("=1+1", "-\x1b[31m", "\\x1b")
+    write_csv(tmp_path / "a.csv", replace(H, outputs=odd))
+    text = (tmp_path / "a.csv").read_text()
+    assert "\x1b" not in text
+    assert read_recordings(tmp_path / "a.csv", "mobility")[0].frf.outputs == odd
+
+
+def test_every_table_is_written_by_one_function():
+    """No other module makes rows of cells."""
+    source = Path(chladni.__file__).parents[1]
+    makers = {
+        p.name for p in source.rglob("*.py") if re.search(r"csv\.(Dict)?[wW]rit", p.read_text())
+    }
+    assert makers == {"csv_table.py"}
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz"])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..case.files_of_source import files_of
 from ..case.free_parameters import fields_of
 from ..case.mended_recordings import with_frf
 from ..ema.response_correlations import responses
@@ -16,6 +17,7 @@ from ..ema.setup import Recording
 from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..io.nastran import assembly
+from ..io.tables.csv_table import csv_text
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
@@ -187,8 +189,7 @@ def _missing(
 
 def sensors_text(made: CaseDraft) -> str:
     """Return the text of ``sensors.csv``; a missing sensor has no row."""
-    rows = [_row(d) for d in made.dofs if d.matched_by != "missing"]
-    return "\n".join([",".join(COLUMNS), *(",".join(row) for row in rows), ""])
+    return csv_text([COLUMNS, *(_row(d) for d in made.dofs if d.matched_by != "missing")])
 
 
 def _row(d: MatchedDof) -> list[str]:
@@ -240,7 +241,8 @@ def case_text(made: CaseDraft, folder: Path) -> str:
 
 def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
     """Return the line that permits files outside the folder, if there are any."""
-    ways = (Path(_seen_from(path, folder)) for path in (made.deck, *made.recordings))
+    files = (*files_of(made.deck), *made.recordings)
+    ways = (Path(_seen_from(path, folder)) for path in files)
     if not any(axis_text.is_absolute() or ".." in axis_text.parts for axis_text in ways):
         return []
     return ["outside = true  # files outside this folder: not part of the case"]

@@ -103,6 +103,7 @@ class _DeckReading:
         for first in file.statements():
             name, _ = file.statement(first)
             target = _target(name, file.path, above)
+            refuse_outside(target, f"{file.path}:{first + 1}: INCLUDE ")
             here = _entered(target, (), "") if target.is_file() else file.path
             if target.is_file() and here not in above and len(above) <= _DEEPEST:
                 data = self._text(target, f"{file.path}:{first + 1}: INCLUDE ")
