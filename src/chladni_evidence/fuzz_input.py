@@ -2,19 +2,31 @@
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from .sound_files import Files
 
 
 @dataclass(frozen=True)
 class FuzzInput:
-    """Files of one input, which of them was injured, and the command that is given it."""
+    """Files of one input, which of them was injured, and the command that is given it.
+
+    Attributes
+    ----------
+    links : {name: where it leads}, made after the files; a name may lie in a folder
+    """
 
     kind: str
     files: dict[str, bytes]
     arguments: tuple[str, ...]
     sound: bool = False  # nothing was injured: to be answered, not refused
+    links: dict[str, str] = field(default_factory=dict)
+
+
+YOURS = "yours"  # a folder beside that of the input, with files a case of somebody else may not use
+YOUR_FILES = ("plate.bdf", "frf.npz", "sensors.csv", "case.toml", "run.json", "report.html",
+              "modes.json", "v1")  # fmt: skip
+SECRET = b"WORD-OF-YOURS"  # what each of them holds
 
 
 Maker = Callable[[random.Random, Files], FuzzInput]

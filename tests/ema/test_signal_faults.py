@@ -1,5 +1,6 @@
 """Faults of signals are named with channel and time; sound recordings of every kind raise none."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -208,6 +209,21 @@ def test_a_lone_spike_is_named_and_a_blow_is_not():
     blow = recording()
     response = np.array([np.convolve(x, [1.0, 0.4, -0.2])[: len(x)] for x in force[0, [0, 0, 0]]])
     assert not signal_checks(replace(blow, force=force, response=response[None]))[0]
+
+
+def test_a_stepped_sine_is_cut_before_it_is_stacked():
+    """No dwell copies the whole record: cost and memory grow with its length alone."""
+    one = recording("sine")
+    many = replace(
+        one,
+        response=np.tile(one.response, (1, 8, 1)),
+        outputs=tuple(f"{k}:+Z" for k in range(1, 25)),
+    )
+    tracemalloc.start()
+    estimate(many)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < many.response.nbytes
 
 
 def test_the_screening_says_it():

@@ -26,6 +26,7 @@ OUTSTANDING = 3.0  # times the rms of its signal
 STRUCK = 0.01  # of the largest force
 QUIET = 6.0  # the same for the other channels at that instant
 ORDER = 3  # of the polynomial of a drift
+COARSE = 8192  # means of the signal, of which a drift is seen
 LINES = (5, 45)  # of the whole record, with which a drift is compared
 SWING = 0.1  # m: no article on its cords goes farther than that
 LONG = 30.0  # s: slower than any swing on cords is what lasts that long
@@ -220,13 +221,15 @@ def drifts(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Findi
     found, largest = [], 0.0
     power = _DERIVATIVES.get(record.quantity, 0)
     for c in channels:
-        s = c.x.ravel().astype(float)
-        n, T = len(s), len(s) / record.rate
-        if n < 20 * LINES[1] or not s.any():
+        x = c.x.ravel()
+        every, T = max(1, len(x) // COARSE), len(x) / record.rate
+        n = len(x) // every
+        if n < 20 * LINES[1] or not x.any():
             continue
+        s = x[: n * every].reshape(n, every).mean(axis=1)
         slow, step, energy = _slow(s)
         rest = s - slow
-        rms = float(np.sqrt((rest**2).mean()))
+        rms = float(np.sqrt(max(x.var() - slow.var(), 0.0)))
         size = float(np.ptp(slow))
         largest = max(largest, size / max(rms, 1e-300))
         lines = np.abs(np.fft.rfft((rest - rest.mean()) * np.hanning(n))[slice(*LINES)]) ** 2
@@ -236,7 +239,10 @@ def drifts(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Findi
         if size < rms or energy < SURE**2 * ORDER * chance or possible:
             continue
         if step is not None:
-            what, text = "step", f"{c.name} steps by {size:.3g} at {step / record.rate:.4g} s"
+            what, text = (
+                "step",
+                f"{c.name} steps by {size:.3g} at {step * every / record.rate:.4g} s",
+            )
         else:
             what, text = "drift", f"{c.name} drifts by {size:.3g} from 0 to {T:.4g} s"
         text += f", {size / max(rms, 1e-300):.3g} times the rms of its signal"
