@@ -52,14 +52,14 @@ case. The command `chladni check CASE` says how it is understood. This page is w
 `chladni/case/schema.py`.
 
 Its files lie in its folder. A path or a link that leads out of it is refused unless `[model]
-outside = true` allows it, so that a case from somebody else opens nothing of yours. The same holds
-for what a deck or a thickness file includes. The command `chladni init` points to deck and
-recordings where they are, and writes that word if they are elsewhere. Copied into the folder, they
-make a case that can be handed on.
+outside = true` allows it, so that a case from somebody else opens nothing of yours. Files
+that a deck or a thickness file includes are treated likewise. The command `chladni init` points to
+deck and recordings where they are, and writes that word if they are elsewhere. Copied into the
+folder, they make a case that can be handed on.
 
-In every table that is written, text that a spreadsheet would take for a formula (`=`, `+`, `-` or
-`@` in front) begins with a quotation mark, as in `'+Z`. Where a table is read, the mark is taken
-off. Control characters are written as `\\x1b`.
+Text that a spreadsheet would take for a formula (`=`, `+`, `-` or `@` in front) is written with a
+quotation mark in front, as in `'+Z`. Where a table is read, the mark is taken off.
+Control characters are written as `\\x1b`.
 
 Files above 1 GB (an archive: unpacked) are refused before they are read; `CHLADNI_LARGEST_GB=8` in
 the environment lets larger ones in. Results go to a folder of their own (`--out`) with those of one

@@ -109,10 +109,9 @@ def run_folder(
 ) -> Iterator[Path]:
     """A scratch folder in ``out``; its files are moved into ``out`` only if the body succeeds.
 
-    A folder holds the results of one command. What an earlier run of the same command wrote there
-    is replaced and what that run alone wrote goes; no other file is ever touched, and none that a
-    link below ``out`` leads to. While it works a second process is refused, where the file system
-    has locks.
+    A folder holds the results of one command. Files that an earlier run of the same command wrote
+    there are replaced or removed. No other file is touched, and none that a link below ``out``
+    leads to. While it works a second process is refused, where the file system has locks.
 
     Parameters
     ----------

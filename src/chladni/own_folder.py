@@ -85,7 +85,7 @@ class OwnFolder:
         )
 
     def status(self, name: str) -> os.stat_result | None:
-        """What stands under a name, a link for itself; None: nothing.
+        """Status of a file, a folder or a link itself; None if the name is free.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class OwnFolder:
             os.replace(name, other, src_dir_fd=here, dst_dir_fd=there)
 
     def remove(self, name: str) -> None:
-        """Remove a file, a folder with all in it, or a link itself; nothing where there is none."""
+        """Remove a file, a folder with all in it, or a link itself; a free name is passed over."""
         found = self.status(name)
         if found is None:
             return
@@ -136,7 +136,7 @@ class OwnFolder:
             os.rmdir(last, dir_fd=folder)
 
     def open(self, name: str, mode: Literal["ab", "a+b"]) -> IO[bytes]:
-        """Open a file to write at its end; it is made where there is none.
+        """Open a file to write at its end; a new one is made if the name is free.
 
         Raises
         ------

@@ -117,7 +117,7 @@ def laid_out(one: FuzzInput, folder: Path) -> None:
 
 
 def _left_alone(yours: Path, folder: Path, said: str) -> str:
-    """What is wrong with files beside the input that links lead to, "" where they are as before."""
+    """Name the misuse of the files that links lead to; "" if they are as before and not shown."""
     if {p.name: p.read_bytes() for p in yours.iterdir()} != dict.fromkeys(YOUR_FILES, SECRET):
         return "touched outside"
     written = [p for p in folder.rglob("*") if p.is_file() and not p.is_symlink()]

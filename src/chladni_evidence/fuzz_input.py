@@ -19,11 +19,11 @@ class FuzzInput:
     kind: str
     files: dict[str, bytes]
     arguments: tuple[str, ...]
-    sound: bool = False  # nothing was injured: to be answered, not refused
     links: dict[str, str] = field(default_factory=dict)
+    sound: bool = False  # nothing was injured: to be answered, not refused
 
 
-YOURS = "yours"  # a folder beside that of the input, with files a case of somebody else may not use
+YOURS = "yours"  # a folder next to the input, with files that a case of somebody else may not use
 YOUR_FILES = ("plate.bdf", "frf.npz", "sensors.csv", "case.toml", "run.json", "report.html",
               "modes.json", "v1")  # fmt: skip
 SECRET = b"WORD-OF-YOURS"  # what each of them holds

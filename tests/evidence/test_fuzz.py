@@ -7,7 +7,7 @@ import pytest
 import chladni_evidence.fuzz as fuzzing
 from chladni_evidence.__main__ import main
 from chladni_evidence.fuzz import DUE, fuzz, outcome
-from chladni_evidence.fuzz_input import FuzzInput
+from chladni_evidence.fuzz_input import YOURS, FuzzInput
 from chladni_evidence.fuzz_inputs import KINDS, fuzz_inputs
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs processes that fork")
@@ -76,6 +76,22 @@ def test_a_sound_deck_written_otherwise_is_answered(tmp_path):
     assert counts == {"recoded": {"answered": 4}}
     no = FuzzInput("recoded", {"a.bdf": b"BEGIN BULK\nXYZ,1\n"}, ("modes", "a.bdf"), sound=True)
     assert outcome(no).called == "sound, and not answered"
+
+
+@pytest.mark.parametrize(
+    ("code", "called"),
+    [
+        ("import sys; sys.exit('chladni: ' + open('a').read())", "told of outside"),
+        ("open('a', 'a').write('x'); import os; os.mkdir('out')", "touched outside"),
+        ("import sys; sys.stderr.write('chladni: no'); sys.exit(2)", "refused"),
+    ],
+)
+def test_what_follows_a_link_is_told(code, called, monkeypatch):
+    import runpy
+
+    monkeypatch.setattr(runpy, "run_module", lambda *_, **__: exec(code))
+    one = FuzzInput("links", {}, ("modes", "a"), {"a": f"../{YOURS}/v1"})
+    assert outcome(one).called == called
 
 
 def test_an_unknown_kind_is_refused(tmp_path, capsys):

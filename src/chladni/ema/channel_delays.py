@@ -1,8 +1,8 @@
 """Delays of single channels: linear phase beyond that of real modes.
 
 A normal mode has a real modal constant, whatever the place of the sensor: H_o = Σ a_r g_r(ω) with
-real a_r. A channel that comes τ late has H_o exp(-iωτ). Of all delays, the least squares of real
-constants to H_o exp(iωτ) are smallest at τ. The poles come from channels that are consistent by
+real a_r. A channel that comes τ late has H_o exp(-iωτ). The least squares of real constants to
+H_o exp(iωτ') are smallest at τ' = τ. The poles come from channels that are consistent by
 themselves, because no real mode fits a late one.
 """
 
@@ -55,7 +55,7 @@ def channel_delays(frf: FRF, found: Identified | None) -> tuple[list[Finding], C
         if sure and abs(late) * top > TURNED:
             out.append(_late(label, late, float(sd[o]), float(gain[o])))
     if len(out) == len(frf.outputs) and np.ptp(delay) * top < TURNED:
-        out = []  # all alike: a delay of the whole chain
+        out = []  # a delay of the whole chain
     most = float(np.abs(delay[known] - usual).max())
     return out, Check(name, f"at most {1e3 * most:.3g} ms", not out)
 
