@@ -19,6 +19,7 @@ NEAR = 32  # samples on either side of a run that say how often neighbours are e
 EDGE = 4  # differences on either side of a run
 ACTIVE = 0.1  # of the rms difference about a run: less and the signal comes to rest by itself
 STEPS = 4.0  # quantisation steps: less is no jump
+MANY = 50_000_000  # samples of all channels: more take too much memory
 LAGS = 16  # samples by which one is predicted
 PIECE = 512  # samples over which a signal is as loud as it is
 SPIKE = 12.0  # robust standard deviations: a Gaussian signal of 1e9 samples has none
@@ -148,6 +149,8 @@ def spikes(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Findi
     innovation. A blow, an impact within the structure or the end of a burst shows in several
     channels; a spike of a cable or a converter in one.
     """
+    if sum(c.x.size for c in channels) > MANY:
+        return [], Check("spikes", f"is tried on up to {MANY:.0e} samples", None)
     errors = [_innovations(c.x) for c in channels]
     unlikely = np.array([e / _local_scale(e) for e in errors])
     struck = _struck(record)
