@@ -78,12 +78,15 @@ def test_a_sound_deck_written_otherwise_is_answered(tmp_path):
     assert outcome(no).called == "sound, and not answered"
 
 
+SAY = "import sys; sys.stderr.write('chladni: '"
+
+
 @pytest.mark.parametrize(
     ("code", "called"),
     [
-        ("import sys; sys.exit('chladni: ' + open('a').read())", "told of outside"),
+        (f"{SAY} + open('a').read()); sys.exit(2)", "told of outside"),
         ("open('a', 'a').write('x'); import os; os.mkdir('out')", "touched outside"),
-        ("import sys; sys.stderr.write('chladni: no'); sys.exit(2)", "refused"),
+        (f"{SAY} + 'no'); sys.exit(2)", "refused"),
     ],
 )
 def test_what_follows_a_link_is_told(code, called, monkeypatch):
