@@ -107,6 +107,7 @@ def _run(folder: Path, arguments: Iterable[str], patience: float) -> None:
 
 def laid_out(one: FuzzInput, folder: Path) -> None:
     """Write the files of an input and make its links."""
+    folder.mkdir(exist_ok=True)
     for file, data in one.files.items():
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (folder / file).write_bytes(data)
