@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .errors import LabelError, ModelError, did_you_mean, named
+from .errors import LabelError, ModelError, did_you_mean, named, plain_line
 from .output import atomic, run_folder
 
 
@@ -81,7 +81,7 @@ class Result:
 
     def summary(self) -> str:
         """Return the result in words: one sentence, then the main tables as text."""
-        return self._view.summary(self)
+        return plain_line(self._view.summary(self))
 
     def plot(self, name: str = "") -> DrawnPicture:
         """Draw a picture of the page of the command.

@@ -94,4 +94,4 @@ def contradictory(rng: random.Random, sound: Files) -> FuzzInput:
         np.savez(out, **held)
         files = {"frf.npz": out.getvalue()}
     files |= {"plate.bdf": sound["plate.bdf"], "case.toml": _CASE.encode()}
-    return FuzzInput("contradictory", files, ("check", "."), cause)
+    return FuzzInput("contradictory", files, ("check", "."), cause=cause)

@@ -1,13 +1,12 @@
 """Tables of a study for other programs: CSV for pandas, NetCDF for xarray."""
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from chladni.dynamics.frf import UNIT
+from chladni.io.tables.csv_table import csv_text
 from chladni.output import atomic, plain, write_text
 
 from .parameter_study import ParameterStudy
@@ -21,12 +20,11 @@ def write_csv(path: Path, found: ParameterStudy) -> Path:
 
     ``pandas.read_csv("samples.csv")`` reads it.
     """
-    table, text = found.table(), io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table)
-    for row in zip(*table.values(), strict=True):
-        writer.writerow(["" if v is None else v for v in plain(row)])
-    return write_text(path, text.getvalue())
+    table = found.table()
+    rows = (
+        ["" if v is None else v for v in plain(row)] for row in zip(*table.values(), strict=True)
+    )
+    return write_text(path, csv_text([table, *rows]))
 
 
 def write_netcdf(path: Path, found: ParameterStudy) -> list[str]:

@@ -110,13 +110,13 @@ def incoherent(frf: FRF) -> tuple[list[Finding], Check]:
 
 
 def drive_points(frf: FRF) -> list[tuple[int, int, int]]:
-    """(output, input, sign) of dofs that are both, by their labels."""
+    """(output, input, sign) of dofs that are both, by their labels; node 0 is no place."""
     bare = {label: re.sub(r":[+-]", ":", label) for label in (*frf.outputs, *frf.inputs)}
     return [
         (i, j, 1 if (":-" in o) == (":-" in p) else -1)
         for i, o in enumerate(frf.outputs)
         for j, p in enumerate(frf.inputs)
-        if bare[o] == bare[p] and not p.startswith("base")
+        if bare[o] == bare[p] and not p.startswith(("base", "0:"))
     ]
 
 

@@ -15,12 +15,14 @@ from .chain_checks import (
     phase_checks,
 )
 from .channel_checks import channel_checks, dead
+from .channel_delays import channel_delays
 from .finding import Check, Finding, Screening
 from .frf_maps import Misreading, mapped, misreadings
 from .identification import Identified, identify
 from .screening import levels_checked
 from .setup import Recording
 from .shapes import lines_per_bandwidth
+from .signal_faults import signal_checks
 from .time_record import overloaded
 
 LINES = 3.0  # in a half-bandwidth: fewer leave the damping uncertain
@@ -60,6 +62,12 @@ def screened(
             mend = "choose a larger range of the front end and measure again"
             findings.append(Finding("overload", text, "fault", (name.split()[-1],), mend, blocks))
         checks.append(Check("overload", f"{len(clipped)} channels are cut off", not clipped))
+        more, some = signal_checks(recording.time, frf)
+        findings += more
+        checks += some
+        more, one = channel_delays(frf, found)
+        findings += more
+        checks.append(one)
     else:
         checks.append(Check("overload", "needs time data", None))
     more, check = levels_checked(recording, others)

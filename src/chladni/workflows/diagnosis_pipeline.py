@@ -43,7 +43,7 @@ from ..search.diagnosis import diagnose as compared
 from ..search.frequency_table import frequency_error, frequency_rows
 from ..search.measured_modes import MeasuredModes, measured_modes
 from ..search.other_recordings import scored_others
-from ..search.preparation import NOT_WEIGHED, prepare
+from ..search.preparation import NOT_WEIGHED
 from ..search.question import Prepared, Question
 from ..search.regions_to_free import regions_to_free
 from ..search.result_parts import (
@@ -59,21 +59,13 @@ from ..search.result_parts import (
 from ..search.verdict_models import fitted_scores, models, of_channels, real_poles, with_deck
 from ..search.written_scores import noise_Q, written_Q
 from ..sparse.freed_memory import give_back_freed_memory
-from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .deck_comments import with_mended, with_remarks
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
-from .mended_case import mending, undone, with_undone
+from .mended_case import mending, with_undone
 from .over_levels import over_levels
-from .question_of_case import question_of
-from .screening_of_case import (
-    RecordingAtFault,
-    instead_of_effects,
-    screened_prepared,
-    screened_unprepared,
-    unlike,
-    unmendable,
-)
+from .ready_case import ready
+from .screening_of_case import instead_of_effects, unlike
 from .sign_of_gain import with_sign_of_gain
 
 
@@ -125,25 +117,9 @@ def _searched(
 ) -> Explained:  # fmt: skip
     """Fit the recording as it is; ``faults`` were undone already."""
     progress("identifying the recording", 0.0)
-    if diagnosing and not len(case.assembly.shells) + len(case.assembly.beams):
-        raise FileError(
-            f"{case.path}: the deck has neither shells nor beams, but the effects of diagnose act "
-            "on these; calibrate and correlate accept any deck"
-        )
-    question = question_of(case)
-    try:
-        prepared = prepare(question, within(progress, 0.0, 0.1))
-    except FileError:  # a recording at fault may hold nothing to fit, and says so itself
-        alone = screened_unprepared(case)
-        if alone is None or not alone.faults:
-            raise
-        raise RecordingAtFault(alone) from None
-    if prepared.identified is not None:
-        refuse_turned_axes(case, prepared.identified, prepared.nominal)
-    screening = screened_prepared(case, prepared)
-    if screening is not None and unmendable(screening):
-        if diagnosing or undone(case, screening, faults) is not None:
-            raise RecordingAtFault(screening)
+    made_ready = ready(case, diagnosing, within(progress, 0.0, 0.1), undone=faults)
+    question, prepared = made_ready.question, made_ready.prepared
+    screening = made_ready.screening
     if known:
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)

@@ -99,11 +99,18 @@ def _places(case: Case) -> dict[str, np.ndarray]:
     return dict(zip(case.outputs.labels, case.outputs.points, strict=True))
 
 
-def screened_prepared(case: Case, prepared: Prepared) -> Screening | None:
-    """Screen with the poles and modes prepared for a diagnosis; None without an FRF."""
+def screened_prepared(
+    case: Case, prepared: Prepared, use: np.ndarray | None = None
+) -> Screening | None:
+    """Screen with the poles and modes prepared for a diagnosis; None without an FRF.
+
+    Parameters
+    ----------
+    use : (n_f,) bool, lines they were identified from, default all
+    """
     if not case.frfs or prepared.identified is None:
         return None
-    return screened_by_model(case, prepared.identified, prepared.nominal)
+    return screened_by_model(case, prepared.identified, prepared.nominal, use)
 
 
 def screened_unprepared(case: Case) -> Screening | None:
