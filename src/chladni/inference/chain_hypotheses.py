@@ -145,7 +145,8 @@ def other_readings(
         mixed = two_forces(seen, model, outputs, inputs)
         tried += swaps
         tried += driven_elsewhere(seen, model, inputs)
-        tried += [h for h in mixed if not any(BEYOND_DOUBT * s.Q < h.Q for s in swaps)]
+        rivals = [h.Q for h in swaps if h.share < EXPLAINED]  # simpler, where they explain it
+        tried += [h for h in mixed if h.Q < BEYOND_DOUBT * min(rivals, default=np.inf)]
         tried += mirrored(frf, lines, declared, model, outputs, inputs)
     return tried
 

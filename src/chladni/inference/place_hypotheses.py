@@ -27,6 +27,7 @@ from .smoothed_responses import (
 )
 
 PLACES = 400  # where the force may act
+TRIED = 12  # places of another force whose level is found again
 MOVED = 0.02  # of the structure: places nearer than that to their mirror images are the same
 OFF = 0.05  # of the structure: mirror images farther from every grid are off it
 
@@ -133,15 +134,18 @@ def _two_forces(
     declared, best = np.inf, np.inf
     split = 0, np.zeros(0), np.zeros(0)
     for H, others in zip(seen.answers(), seen.answers(drive=drive), strict=True):
-        log_H = level_free(H)
         level = np.median(log10_of(H).real)
-        own = mean_squares(log_H[:, :, j] - seen.log_test[:, :, j])  # (n_out,)
-        other = mean_squares(log10_of(others) - level - seen.log_test[:, :, [j]])  # (n_out, k)
-        Q = np.minimum(own[:, None], other).mean(axis=0)
-        k = int(Q.argmin())
+        of_own = log10_of(H[:, :, [j]]) - level - seen.log_test[:, :, [j]]  # (n_s, n_out, 1)
+        of_other = log10_of(others) - level - seen.log_test[:, :, [j]]  # (n_s, n_out, k)
+        own, other = mean_squares(of_own)[:, 0], mean_squares(of_other)
         declared = min(declared, float(own.mean()))
-        if Q[k] < best:
-            best, split = float(Q[k]), (int(grids[k]), own, other[:, k])
+        for k in np.argsort(np.minimum(own[:, None], other).mean(axis=0))[:TRIED]:
+            both = np.where(other[:, k] < own, of_other[:, :, k], of_own[:, :, 0])
+            common = np.median(both.real)  # the level, without what the other force adds to it
+            pair = mean_squares(of_own[:, :, 0] - common), mean_squares(of_other[:, :, k] - common)
+            Q = float(np.minimum(*pair).mean())
+            if Q < best:
+                best, split = Q, (int(grids[k]), *pair)
     grid, own, other = split
     moved = other < EXPLAINED * own
     if min(moved.sum(), (~moved).sum()) < 2 or own[moved].mean() < EXPLAINED * CHANCE:
