@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .arguments import checked
-from .errors import LabelError, ModelError, did_you_mean, named
+from .errors import LabelError, ModelError, did_you_mean, named, plain_line
 from .output import atomic, run_folder
 
 
@@ -97,7 +97,7 @@ class Result:
 
     def summary(self) -> str:
         """Return the result in words: one sentence, then the main tables as text."""
-        return self._view.summary(self)
+        return plain_line(self._view.summary(self))
 
     @checked
     def plot(self, name: str = "") -> DrawnPicture:

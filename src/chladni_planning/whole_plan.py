@@ -254,8 +254,7 @@ def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, 
     """Target modes, target modes plus some above, and the number of rigid modes before them."""
     due = settings.modes or min(24, 4 * settings.sensors // 5)
     n = len(built.system.dofs)
-    where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
-    modal = normal_modes(built.system, min(n, due + SPARE + 6), points=where)
+    modal = normal_modes(built.system, min(n, due + SPARE + 6))
     rigid = int(rigid_modes(modal).sum())
     above = modal.sel(slice(rigid, None)).with_damping(settings.damping)
     below = np.flatnonzero(

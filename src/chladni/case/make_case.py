@@ -53,7 +53,6 @@ class CaseWords(TypedDict, total=False):
     held_out_sensors : a number, or labels
     held_out_band : (low, high) [Hz]
     effects : names of the effects that ``diagnose`` tries; default all
-    noise : "lines" or "identified": whose noise the evidence counts
     parameters : dicts with the keys of a [[parameter]]: field, parts, name, sd, low, high
     """
 
@@ -82,7 +81,6 @@ class CaseWords(TypedDict, total=False):
     held_out_sensors: int | Sequence[str]
     held_out_band: tuple[float, float]
     effects: Sequence[str]
-    noise: str
     parameters: Sequence[Mapping[str, Any]]
 
 

@@ -267,7 +267,7 @@ def _run(command: Callable[[], Any]) -> int:
         return _said(error, AT_FAULT)
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
-        return _said(f"{name}{error.strerror or error}", AT_FAULT)
+        return _said(FileError(f"{name}{error.strerror or error}"), AT_FAULT)
     except KeyboardInterrupt as error:
         return _said(str(error) or "interrupted; no file was written", INTERRUPTED)
     except Exception as error:  # noqa: BLE001  a fault of ours is said as one, too

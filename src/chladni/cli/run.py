@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
+from ..arrays import real_number
 from ..errors import FileError
 from ..output import run_folder, write_json
 from ..progress import Progress, within
@@ -226,7 +227,7 @@ def limits(text: str) -> tuple[float, float]:
     (20.0, 200.0)
     """
     try:
-        low, high = (float(x) for x in text.replace(",", ":").split(":"))
+        low, high = (real_number(x) for x in text.replace(",", ":").split(":"))
     except ValueError:
         raise FileError(f"--band {text!r} is not of the form 20:200") from None
     if not 0 <= low < high < float("inf"):

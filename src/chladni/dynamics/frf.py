@@ -11,7 +11,7 @@ from ..arrays import readonly
 from ..dofs import label as text_of
 from ..dofs import positions
 from ..errors import LabelError, ShapeError, named
-from ..sparse.dissection import analyse, pattern
+from ..sparse.elimination_fronts import analyse, pattern
 from ..sparse.factor import factorise
 from .massless import static_solver
 from .modes import ModalModel
@@ -238,7 +238,6 @@ def residual_flexibility(
     load: np.ndarray,
     *,
     shift: float | None = None,
-    points: np.ndarray | None = None,
 ) -> Residual:
     """R_0 = b_oᵀ A⁻¹ b_i - Σ φφᵀ/(λ_r - σ), R_1 = b_oᵀ A⁻¹ M A⁻¹ b_i - ..., A = K - σ M.
 
@@ -252,7 +251,7 @@ def residual_flexibility(
     """
     lam = (2 * np.pi * modal.frequency) ** 2
     sigma = -1e-2 * lam[-1] if shift is None else shift
-    solve = static_solver(system, sigma, points)
+    solve = static_solver(system, sigma)
     X = solve(np.asarray(load, dtype=float))
     Y = solve(system.M @ X)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
@@ -280,7 +279,6 @@ def direct_frf(
     frequency: np.ndarray,
     *,
     structural: float = 0.0,
-    points: np.ndarray | None = None,
 ) -> FRF:
     """Receptance without modes, H(ω) = (K (1 + i g) - ω² M + i ω V)⁻¹: a slow, exact reference.
 
@@ -292,7 +290,7 @@ def direct_frf(
     frequency = np.asarray(frequency, dtype=float)
     load = unit_columns(len(system.dofs), rows_in)
     K = system.K * (1 + 1j * structural)
-    order = analyse(pattern(K, system.M, system.V), points, system.dofs[:, 0])
+    order = analyse(pattern(K, system.M, system.V), system.dofs[:, 0])
     H = np.empty((len(frequency), len(rows_out), len(rows_in)), dtype=complex)
     for k, omega in enumerate(2 * np.pi * frequency):
         Z = K - omega**2 * system.M + 1j * omega * system.V

@@ -21,7 +21,7 @@ from ..inference.calibration_result import (
     LikelihoodProfile,
     PosteriorSample,
 )
-from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted, wide_start
+from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from ..inference.identifiability import calibration_positions, identifiability, parameter_names
 from ..inference.likelihood import Responses
 from ..inference.linear_model import Squares
@@ -171,8 +171,7 @@ def _ends(
         try:
             if isinstance(data, Poles):
                 return fitted(model, problem.base, problem.data, mass, x)
-            begun = wide_start(model, problem.base, problem.data, mass, x)
-            return fit(model, problem.base, data, mass, begun).kept()
+            return fit(model, problem.base, data, mass, x).kept()
         except ModelError:
             return None
 

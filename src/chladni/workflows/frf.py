@@ -15,7 +15,7 @@ from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift, transfer
 from ..errors import FileError, LabelError, ShapeError
 from ..fem.measured_dofs import MeasuredDofs
-from ..fem.modelled import Modelled, modelled, node_points
+from ..fem.modelled import Modelled, modelled
 from ..fem.solve import base_response, inertia_load
 from ..io.tables.sensor_table import exciter, read_layout
 from ..model.analysis import Analysis, Subcase
@@ -217,7 +217,7 @@ def superposed(
         for side in (outputs, inputs)
     )
     shift = residual_shift(modal, frequency[-1])
-    rest = residual_flexibility(s.system, modal, pick, load, points=model.places, shift=shift)
+    rest = residual_flexibility(s.system, modal, pick, load, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
@@ -234,7 +234,7 @@ def _from_base(
     dofs, s = np.array([(point, c) for point, c, _ in ends]), made.structure
     load = s.T.T @ inertia_load(made.assembly, -np.eye(3)[:, axis - 1 : axis])
     modal, pick = made.modes.with_damping(damping), s.rows(dofs).T.toarray()
-    rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s))
+    rest = residual_flexibility(s.system, modal, pick, load)
     found = base_response(s, modal, axis, frequency, dofs, residual=rest)
     signs = sign * np.array([c for _, _, c in ends])
     return replace(
@@ -252,7 +252,7 @@ def _places_from_base(
     """Compute the transmissibility at places off the grids, along their own directions."""
     built, modal = made.structure, made.modes.with_damping(damping)
     pick, load = outputs.rows(built).T.toarray(), inputs.loads(built).T.toarray()
-    rest = residual_flexibility(built.system, modal, pick, load, points=node_points(built))
+    rest = residual_flexibility(built.system, modal, pick, load)
     s = 2j * np.pi * frequency
     H = transfer(modal, pick.T @ modal.shapes, load.T @ modal.shapes, s, residual=rest)
     values = outputs.moved_with_base(inputs) + (s**2)[:, None, None] * H

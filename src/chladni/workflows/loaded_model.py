@@ -70,7 +70,7 @@ class Model:
         from ..dynamics.eigen import normal_modes
 
         count = min(count, len(self.structure.system.dofs))
-        return normal_modes(self.structure.system, count, points=self.places)
+        return normal_modes(self.structure.system, count)
 
     def directions(self, labels: Sequence[str]) -> sp.csr_array:
         """Motion at labels as 12:+Z or 12:n (the surface normal): (k, n_free)."""

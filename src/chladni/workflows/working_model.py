@@ -15,8 +15,10 @@ from ..dynamics.statespace import StateSpace, state_space
 from ..effects.calibration_parameters import value as value_of
 from ..effects.user_parameters import UNITS, why_implausible, with_factor
 from ..errors import LabelError, ModelError
-from ..io.nastran import assembly, write_assembly, write_deck
+from ..io.nastran import Deck, assembly, write_assembly, write_deck
 from ..io.nastran.edit.model_changes import changes
+from ..io.nastran.edit.unwritten import refuse_regrouped, refuse_unwritten
+from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..results import DrawnPicture
@@ -166,11 +168,32 @@ class WorkingModel(Model):
         """Write its deck: the cards that changed are edited, every other line stays as it was.
 
         An Assembly, which no deck holds, is written as a new deck in SI.
+
+        Raises
+        ------
+        ModelError
+            If the deck as it would be read again is another structure; the sentence names what it
+            cannot hold. Nothing is written then.
         """
         if self.deck is None:
             return write_assembly(self.assembly, path)
-        before = assembly(self.deck, self.units)
-        return write_deck(self.deck, path, changes(self.deck, before, self.assembly, self.units))
+        before, subcase = self._as_read(self.deck)
+        refuse_regrouped(before, self.assembly)
+        edits = changes(self.deck, before, self.assembly, self.units)
+        found = written_assembly(self.deck, edits, self.units, subcase) if edits else before
+        refuse_unwritten(before, self.assembly, found)
+        return write_deck(self.deck, path, edits)
+
+    def _as_read(self, deck: Deck) -> tuple[Assembly, int | None]:
+        """The deck's assembly, and the subcase whose supports this one has; None: the first."""
+        default = assembly(deck, self.units)
+        held = self.assembly.supports
+        if not np.array_equal(default.supports, held):
+            for case in deck.case.subcases:
+                made = assembly(deck, self.units, case.id)
+                if np.array_equal(made.supports, held):
+                    return made, case.id
+        return default, None
 
 
 @checked
