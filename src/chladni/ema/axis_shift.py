@@ -10,7 +10,6 @@ no model whose stiffness is free.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ..dynamics.frf import FRF
 from .finding import Check, Finding
@@ -64,6 +63,8 @@ def axis_shift(frf: FRF, found: Identified, use: np.ndarray | None = None) -> Ax
     costs = [cost(t) for t in trials]
     k, step = int(np.argmin(costs)), float(trials[1] - trials[0])
     ends = max(trials[k] - step, trials[0]), min(trials[k] + step, trials[-1])
+    from scipy.optimize import minimize_scalar
+
     found_by = minimize_scalar(cost, bounds=ends, method="bounded", options={"xatol": step / 50})
     best = float(found_by.x)
     p = min(sets, key=lambda p: fitted(best, p)[0])

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..case.node_numbers import (
     OFF,
@@ -152,6 +151,8 @@ def matched_nodes(made: Assembly, recording: Recording, ids: np.ndarray) -> Node
     row = np.where((made.ids[at] == ids) & by_number & ~(away > OFF * size), at, -1)
     rest = np.flatnonzero((row < 0) & placed)
     if len(rest):
+        from scipy.spatial import cKDTree
+
         away, near = cKDTree(made.points).query(place[rest])
         row[rest] = np.where(away <= SAME_PLACE * size, near, -1)
     return NodesOnDeck(row, place, unit, int((row[rest] >= 0).sum()))
