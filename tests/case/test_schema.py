@@ -71,7 +71,6 @@ sensors = ["16:+Z"]
 band = [50.0, 60.0]
 [search]
 effects = ["point-mass"]
-noise = "lines"
 [[parameter]]
 name = "E of the sheet"
 parts = ["sheet"]
@@ -123,7 +122,6 @@ OTHER = {  # another accepted value of every word
     ("held_out", "sensors"): "1",
     ("held_out", "band"): "[48.0, 60.0]",
     ("search", "effects"): '["point-mass", "crack"]',
-    ("search", "noise"): '"identified"',
     ("parameter", "name"): '"stiffness"',
     ("parameter", "parts"): '["CELAS2 99"]',
     ("parameter", "field"): '"nu"',
