@@ -52,19 +52,14 @@ def ours(system, places):
     """Block Lanczos, own multifrontal Cholesky, Sturm count."""
     from chladni.dynamics.eigen import normal_modes
 
-    return normal_modes(system, COUNT, points=places).frequency
-
-
-def ours_unplaced(system, places):
-    """The same, the places of the nodes not given."""
-    return ours(system, None)
+    return normal_modes(system, COUNT).frequency
 
 
 def ours_unproved(system, places):
     """The same without the Sturm count, which no peer offers."""
     from chladni.dynamics.eigen import normal_modes
 
-    return normal_modes(system, COUNT, points=places, proof=False).frequency
+    return normal_modes(system, COUNT, proof=False).frequency
 
 
 def bare(system, places):
@@ -102,7 +97,6 @@ def shift(system):
 
 METHODS = {
     "chladni": ours,
-    "chladni, no places": ours_unplaced,
     "chladni, no proof": ours_unproved,
     "block Lanczos + CHOLMOD": bare,
     "block Lanczos + SuperLU": superlu,

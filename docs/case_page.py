@@ -51,11 +51,15 @@ notes. Numbers are SI whatever the deck is in. The command `chladni init DECK RE
 case. The command `chladni check CASE` says how it is understood. This page is written from
 `chladni/case/schema.py`.
 
-Its files lie in its folder. A path that leads out of it is refused unless `[model] outside = true`
-allows it, so that a case from somebody else opens nothing of yours. The command `chladni
-init` points to deck and recordings where they are, and writes that word if they are elsewhere.
-Copied into the folder, they make a case that can be handed on. A deck may include other files from
-anywhere.
+Its files lie in its folder. A path or a link that leads out of it is refused unless `[model]
+outside = true` allows it, so that a case from somebody else opens nothing of yours. Files
+that a deck or a thickness file includes are treated likewise. The command `chladni init` points to
+deck and recordings where they are, and writes that word if they are elsewhere. Copied into the
+folder, they make a case that can be handed on.
+
+Text that a spreadsheet would take for a formula (`=`, `+`, `-` or `@` in front) is written with a
+quotation mark in front, as in `'+Z`. Where a table is read, the mark is taken off.
+Control characters are written as `\\x1b`.
 
 Files above 1 GB (an archive: unpacked) are refused before they are read; `CHLADNI_LARGEST_GB=8` in
 the environment lets larger ones in. Results go to a folder of their own (`--out`) with those of one
@@ -117,11 +121,13 @@ _FILES = """\
 - FRF as `.csv`: columns `frequency_hz`, `output`, `input`, `real`, `imag`; optional `coherence` and
   `variance` (the noise), `level` and `article` (one recording each). In place of `real` and `imag`
   there may be `magnitude` and `phase_deg` or `phase_rad`.
-- FRF as `.npz`: arrays `frequency_hz` (n_f,), `values` (n_f, n_out, n_in), `outputs`, `inputs`;
-  optional `coherence`, `variance`, `quantity`, `level`, `article`.
+- FRF as `.npz` or `.mat`: arrays `frequency_hz` (n_f,), `values` (n_f, n_out, n_in), `outputs`,
+  `inputs`; optional `coherence`, `variance`, `quantity`, `level`, `article`.
 - Where a table moves the supports, the input is `base:+X`, `base:+Y` or `base:+Z` and the quantity
   transmissibility, acceleration per acceleration (unit 1). All grids that the deck holds by SPC
   move together, and so does everything that is held to ground.
+- Tables are UTF-8, UTF-16 or CP1252, separated by commas, semicolons or tabs. Numbers have a
+  decimal point. Where semicolons or tabs separate, they may have a decimal comma.
 - Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (noted,
   never fitted), `state` (the first is compared, or the one `use` names).
 - Time data, whose FRFs are estimated as `chladni test` does it. Hits, bursts, multisines, random
@@ -141,7 +147,9 @@ _FILES = """\
 - A table `NAME.channels.csv` next to time data names its channels: `channel`, `label`, `unit`,
   optional `role`, `scale`. A `.wav` needs it.
 - Universal file: FRFs and coherence (58, 58b), nodes (15, 2411), lines (2412, 82), axes of nodes
-  (2420), shapes (55), header and units (151, 164). Other datasets are named and not used.
+  (2420), shapes (55), header and units (151, 164). Other datasets are named and not used. Shapes
+  alone give their frequencies as a table of poles; `chladni correlate DECK --modes` compares the
+  shapes.
 
 Several recordings are distinguished by article, level and state, as the files or `[[recording]]`
 say. For one article, level and state, other shaker places are stacked as inputs of one test. Equal
@@ -161,8 +169,7 @@ Time histories and spectra of responses without a force give natural frequencies
 neither FRFs nor poles. A decay (a record, or each of its blocks) is used from its loudest moment
 on. A steady signal is used as if the force were white in the band. The time data may be any of
 those above without the force, and sound of a microphone (Pa). The command `identify` gives poles,
-damping and unscaled shapes of decays. Elsewhere they, and mode shapes, are named in the notes and
-not used.
+damping and unscaled shapes of decays. Elsewhere they are named in the notes and not used.
 """
 
 

@@ -380,14 +380,14 @@ def cards() -> str:
     from chladni.io.nastran.text import known_cards
     from chladni.io.nastran.text.cards import FIELDS, LEGACY
 
-    left_out = analysis_requests._LEFT_OUT
-    harmless = sorted(known_cards.HARMLESS - left_out.keys())
+    left_out = analysis_requests.LEFT_OUT
+    harmless = known_cards.HARMLESS.keys() - left_out.keys()
     on_sol = sorted(set(known_cards.FOLLOWS_TEMPERATURE))
     return "\n".join(
         [
             "# Nastran cards\n",
             BY.format("the tables of `chladni.io.nastran`"),
-            "`chladni check CASE` says for a deck which of these it holds.\n",
+            "`chladni check DECK` says which of these a deck holds.\n",
             "## Read\n",
             table(("card", "fields that are known"), [(f"`{n}`", f"`{' '.join(f)}`")
                                                       for n, f in sorted(FIELDS.items())]),
@@ -406,16 +406,25 @@ def cards() -> str:
                                                  if n not in on_sol]),
             f"Materials that follow temperature: {_names(on_sol)}.\n",
             "## Passed over\n",
-            "These cards change no linear model of stiffness, mass, damping and harmonic loads: "
-            f"{_names(harmless)}.\n",
+            "These cards change no linear model of stiffness, mass, damping and harmonic loads.\n",
+            table(("cards", "meaning"), _grouped(known_cards.HARMLESS, harmless)),
             "## Refused\n",
-            "These cards carry stiffness, mass or a tie and are not understood: "
-            f"{_names(sorted(known_cards.CARRIERS))}; so does every other card whose name begins "
-            "with C. A card with any other name is refused too, because it may change the "
-            "structure.\n\n`--allow NAME`, or `allow = [\"NAME\"]` in `[model]` of a case, passes "
+            "These cards carry stiffness, mass or a tie and are not understood. A card with any "
+            "other name is refused too, because it may change the structure.\n",
+            table(("cards", "meaning"), _grouped(known_cards.REFUSED, known_cards.REFUSED)),
+            "These are refused where the case control selects them, and in a deck without one.\n",
+            table(("cards", "meaning"), _grouped(known_cards.SELECTED, known_cards.SELECTED)),
+            "`--allow NAME`, or `allow = [\"NAME\"]` in `[model]` of a case, passes "
             "over a card although it is not understood.\n",
         ]
     )  # fmt: skip
+
+
+def _grouped(meaning: Mapping[str, str], names: Iterable[str]) -> list[tuple[str, str]]:
+    """(cards, their meaning) of these names."""
+    wanted = sorted(names)
+    groups = dict.fromkeys(meaning.values())
+    return [(_names(n for n in wanted if meaning[n] == what), what) for what in groups]
 
 
 def _names(names: Iterable[str]) -> str:

@@ -21,8 +21,8 @@ PACKAGES = {  # every package of ours and where its source is
     "chladni_envs": ROOT / "envs",
 }
 GROUND = {
-    "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "parallel",
-    "results", "extensions"
+    "address_space", "errors", "arguments", "arrays", "dofs", "units", "output", "progress",
+    "parallel", "results", "extensions", "own_folder",
 }  # fmt: skip
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
@@ -56,7 +56,7 @@ MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_pl
 LIBRARIES = {
     "progress": {"rich"},
     "parallel": {"threadpoolctl"},
-    "sparse": {"sksparse"},
+    "sparse": {"pymetis", "sksparse"},
     "geometry": {"pyvista", "trimesh"},
     "io": {"meshio", "pandas", "pyyeti", "pyuff", "trimesh", "xarray"},
     "view": {"pyvista", "matplotlib", "PIL"},

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.builders.quick_runs import coarse_pictures
 
 NOTEBOOK = Path(__file__).parents[1] / "docs/first_day.ipynb"
 
@@ -25,7 +26,7 @@ def shown(tmp_path_factory):
     book = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
     cells = [c for c in book["cells"] if c["cell_type"] == "code"]
     assert not any(c["outputs"] for c in cells), "outputs are not kept in the repository"
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, coarse_pictures():
         patch.chdir(tmp_path_factory.mktemp("notebook"))
         yield [*run(cells, {})], Path.cwd()
 

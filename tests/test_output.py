@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from contextlib import nullcontext
 from errno import ENOLCK, ENOSPC, EROFS
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from chladni.errors import FileError
 from chladni.output import atomic, lock, plain, run_folder, write_json, write_npz, write_text
+from chladni.own_folder import OwnFolder, own_folder
 from chladni.progress import silent, terminal, within
 
 VALUES = st.recursive(
@@ -131,23 +133,23 @@ def test_a_file_the_run_reads_is_never_replaced(tmp_path):
     assert (tmp_path / "results-1" / "b.json").exists()
 
 
-def breaking_at(monkeypatch, out, fault):
+def breaking_at(monkeypatch, fault):
     """Moves break where the new b.json would come to its place."""
-    move = Path.rename
+    move = OwnFolder.move
 
-    def fails(self, target):
-        if self.name == "b.json" and target.parent == out and ".old" not in self.parts:
+    def fails(self, source, target):
+        if target == "b.json" and ".old" not in source:
             raise fault
-        return move(self, target)
+        return move(self, source, target)
 
-    monkeypatch.setattr(Path, "rename", fails)
+    monkeypatch.setattr(OwnFolder, "move", fails)
 
 
 def test_a_move_that_fails_half_way_is_taken_back(tmp_path, monkeypatch):
     wrote(tmp_path, "a.json", "b.json")
     (tmp_path / "a.json").write_text("of the first run")
     with monkeypatch.context() as patch:
-        breaking_at(patch, tmp_path, OSError(28, "No space left on device"))
+        breaking_at(patch, OSError(28, "No space left on device"))
         with pytest.raises(FileError, match="No space left on device; no file was replaced"):
             wrote(tmp_path, "a.json", "b.json")
     assert (tmp_path / "a.json").read_text() == "of the first run"
@@ -162,7 +164,7 @@ def test_a_move_that_is_interrupted_is_taken_back(tmp_path, monkeypatch):
         before[name] = "of the first run"
         (tmp_path / name).write_text(before[name])
     with monkeypatch.context() as patch:
-        breaking_at(patch, tmp_path, KeyboardInterrupt())
+        breaking_at(patch, KeyboardInterrupt())
         with pytest.raises(KeyboardInterrupt):
             wrote(tmp_path, "a.json", "b.json", "d.json")
     assert {name: (tmp_path / name).read_text() for name in listed(tmp_path)} == before
@@ -254,6 +256,107 @@ def test_a_list_does_not_lead_out_of_its_folder(tmp_path):
     write_json(out / "run.json", {"command": "modes", "files": names})
     wrote(out, "a.json")
     assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+LINKED = {  # name in run.json: the link on its way, and where that leads
+    "s/v1": ("s", "vict"),
+    "s/deep/v2": ("s", "vict"),
+    "sub/s/v1": ("sub/s", "vict"),
+    "v": ("v", "vict/v1"),
+}
+
+
+def foreign(tmp_path):
+    """A folder of somebody's, and what is in it."""
+    write_text(tmp_path / "vict" / "v1", "precious")
+    write_text(tmp_path / "vict" / "deep" / "v2", "precious")
+    return lambda: {str(p): p.read_text() for p in (tmp_path / "vict").rglob("*") if p.is_file()}
+
+
+def link(out, name, target):
+    (out / name).parent.mkdir(parents=True, exist_ok=True)
+    (out / name).symlink_to(target)
+
+
+@pytest.mark.parametrize("writes", [False, True])
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("name", LINKED)
+def test_no_link_leads_a_run_out_of_its_folder(tmp_path, name, late, writes):
+    """Nothing is deleted, moved or overwritten there, also where the link appears meanwhile."""
+    held, out, (at, target) = foreign(tmp_path), tmp_path / "run", LINKED[name]
+    before = held()
+    write_json(out / "run.json", {"command": "modes", "files": [name, "a.json"]})
+    if not late:
+        link(out, at, tmp_path / target)
+    refused = pytest.raises(FileError, match="results are in") if writes else nullcontext()
+    with refused, run_folder(out, "modes") as part:
+        write_text(part / (name if writes else "a.json"), "new")
+        if late:
+            link(out, at, tmp_path / target)
+    assert held() == before
+    assert (out / at).is_symlink()
+
+
+def test_the_folder_itself_may_be_a_link(tmp_path):
+    """The user has it so; a link that takes its place meanwhile is followed no more."""
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "out").symlink_to("disk")
+    wrote(tmp_path / "out", "a.json", "sub/b.json")
+    assert listed(tmp_path / "disk") == {"a.json", "sub/b.json", "run.json"}
+    held = foreign(tmp_path)
+    before = held()
+    with run_folder(tmp_path / "out", "modes") as part:
+        write_text(part / "v1", "new")
+        (tmp_path / "out").unlink()
+        (tmp_path / "out").symlink_to("vict")
+    assert held() == before
+    assert listed(tmp_path / "disk") == {"v1", "run.json"}
+
+
+def test_a_link_in_the_place_of_the_list_is_not_read(tmp_path):
+    write_json(tmp_path / "mine.json", {"command": "modes", "files": ["a.json"]})
+    link(tmp_path / "run", "run.json", tmp_path / "mine.json")
+    with pytest.raises(FileError, match=r"run\.json is not a list of results"):
+        wrote(tmp_path / "run", "b.json")
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_an_own_folder_follows_no_link(tmp_path, held):
+    """With the calls of the system, and where it has none."""
+    there = foreign(tmp_path)
+    before, out = there(), tmp_path / "run"
+    out.mkdir()
+    link(out, "s", tmp_path / "vict")
+    link(out, "v", tmp_path / "vict" / "v1")
+    write_text(out / "mine", "mine")
+    with own_folder(out) as opened:
+        here = opened if held else OwnFolder(out, -1)
+        for name in ("s/v1", "s/deep/v2", "s/new", "../vict/v1", str(tmp_path / "vict/v1"), ""):
+            for use in (
+                lambda n: here.move("mine", n), lambda n: here.move(n, "stolen"), here.remove,
+                here.make, lambda n: here.open(n, "ab"), here.status,
+            ):  # fmt: skip
+                with pytest.raises(FileError):
+                    use(name)
+        with pytest.raises(FileError, match="is a link"):
+            here.open("v", "ab")
+        assert not here.has_file("v")
+        here.move("mine", "v")  # in place of the link
+        here.remove("s")  # the link
+        here.make("new/deep")
+        here.remove("new")
+    assert there() == before
+    assert listed(out) == {"v"}
+
+
+def test_a_second_name_elsewhere_is_not_appended_to(tmp_path):
+    held, out = foreign(tmp_path), tmp_path / "run"
+    before = held()
+    out.mkdir()
+    (out / "rows").hardlink_to(tmp_path / "vict" / "v1")
+    with own_folder(out) as here, pytest.raises(FileError, match="2 names lead to it"):
+        here.open("rows", "ab")
+    assert held() == before
 
 
 def test_a_file_is_no_folder(tmp_path):

@@ -1,6 +1,6 @@
 """Actuator placement: shakers are chosen one a step; places that would rattle are vetoed."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -11,8 +11,11 @@ from chladni_planning import best_layout, rattle_margin, shaking
 
 from . import drawing
 from .reset_first import refuse_before_reset
-from .sensor_placement import Reset, Step, of_case
+from .sensor_placement import Reset, Step, of_case, with_notes
 from .small_specimens import ModalSpecimen, plate
+
+if TYPE_CHECKING:
+    from chladni.workflows.given_case import Source
 
 WORST = 1e6  # limit of the condition number: places beyond it are equally useless
 
@@ -43,9 +46,11 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     clearance : (g,)          [m]; access and gaps are found on the mesh of a case
     force : amplitude for which nothing may rattle [N]
     quantity : quantity that the sensors measure
-    case : folder or deck     its mesh gives candidates and modes
+    case : folder, deck or model  its mesh gives candidates and modes
     modes : int               number of target modes of a case
-    units : str               unit system of a bare deck, as mm-t-s; a case states its own
+    units : str               unit system of a bare deck, as mm-t-s; a case states its own. Where it
+                              is missing, the materials show it, and ``notes`` and the info of a
+                              reset name it.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
@@ -61,7 +66,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         clearance: np.ndarray | None = None,
         force: float = 1.0,
         quantity: Quantity = "receptance",
-        case: str | None = None,
+        case: "Source | None" = None,
         modes: int = 24,
         units: str | None = None,
         render_mode: str | None = None,
@@ -69,6 +74,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         if specimen is None:
             specimen = plate(7, 7, 6) if case is None else of_case(case, modes, units)
         s = self.specimen = specimen
+        self.notes = s.notes
         n, r = s.phi.shape
         access = s.access if access is None else access
         if gap_shapes is None and clearance is None:
@@ -95,7 +101,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         """Start without actuators."""
         super().reset(seed=seed)
         self.chosen, self.steps, self.score = np.zeros(len(self.allowed), bool), 0, 0.0
-        return self._observation(), self._info()
+        return self._observation(), with_notes(self._info(), self.notes)
 
     def step(self, action: np.int64) -> Step:
         """Choose one more actuator."""

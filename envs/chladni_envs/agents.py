@@ -13,7 +13,7 @@ import gymnasium as gym
 import numpy as np
 
 from chladni.errors import ShapeError
-from chladni_planning import Candidates, Rules, annealed, best_layout, evolved, first_max, first_min
+from chladni_planning import Candidates, Rules, best_layout, evolved, first_max, first_min
 from chladni_planning import best_actuators as best_shakers
 
 from .actuator_placement import ActuatorPlacementEnv
@@ -67,17 +67,10 @@ def _problem(env: gym.Env[Any, Any]) -> tuple[Candidates, int, Rules]:
     return inner.candidates, inner.n_sensors, within
 
 
-def exchange(env: gym.Env[Any, Any], *, pairs: bool = True) -> Agent:
-    """Effective independence, then exchange of one and of two sensors."""
+def exchange(env: gym.Env[Any, Any], *, starts: int = 10, seed: int = 0) -> Agent:
+    """Exchange from the layout of effective independence and from random ones."""
     c, n_sensors, rules = _problem(env)
-    pairs = pairs and c.rows.shape[2] == 1
-    return towards(best_layout(c, n_sensors, rules=rules, pairs=pairs), env)
-
-
-def annealing(env: gym.Env[Any, Any], *, seed: int = 0, steps: int = 4000) -> Agent:
-    """Simulated annealing over swaps."""
-    c, n_sensors, rules = _problem(env)
-    return towards(annealed(c, n_sensors, seed=seed, steps=steps, rules=rules), env)
+    return towards(best_layout(c, n_sensors, rules=rules, starts=starts, seed=seed), env)
 
 
 def genetic(env: gym.Env[Any, Any], *, seed: int = 0, generations: int = 60) -> Agent:

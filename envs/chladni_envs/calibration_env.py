@@ -1,6 +1,7 @@
 """Calibration: continuous steps on scaled parameters until model and recording agree."""
 
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -9,6 +10,9 @@ from . import drawing
 from .calibration_questions import CalibrationQuestion, plate_question
 from .reset_first import refuse_before_reset
 from .sensor_placement import Reset, Step
+
+if TYPE_CHECKING:
+    from chladni.case import Case
 
 DONE = 1e-5  # Q at which model and recording agree
 STRIDE = 0.2  # greatest step, in units in which the bounds are -1 and 1
@@ -44,7 +48,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         self,
         question: CalibrationQuestion | None = None,
         *,
-        case: str | None = None,
+        case: "str | Path | Case | None" = None,
         bands: int = 8,
         max_steps: int = 60,
         render_mode: str | None = None,

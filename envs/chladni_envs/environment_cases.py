@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from chladni.case import load_case
+from chladni.case import Case, load_case
 from chladni.effects.effect import Effect, Parameter
 from chladni.errors import FileError
 from chladni.inference.likelihood import Responses
 from chladni.reduced.reduced_model import State, evaluate
-from chladni.workflows.loaded_model import load_model
+from chladni.workflows.given_case import Source
+from chladni.workflows.loaded_model import is_case, model_in_si
 from chladni.workflows.question_of_case import prepared
 from chladni_planning import (
     Linearised,
@@ -31,7 +32,7 @@ REACH = 2.0  # bounds of a calibration environment, in prior standard deviations
 
 
 def specimen(
-    case: str, modes: int, *, candidates: int = 300, units: str | None = None
+    case: Source, modes: int, *, candidates: int = 300, units: str | None = None
 ) -> ModalSpecimen:
     """Flat, reachable places found on the mesh and the first flexible modes along their normals.
 
@@ -40,12 +41,13 @@ def specimen(
 
     Parameters
     ----------
-    case : folder with a case.toml, that file, or a bare deck
+    case : folder with a case.toml, that file, a bare deck, a loaded model or an Assembly
     modes : int          target modes, fewer if the model has fewer
     candidates : int     largest number of places
-    units : str          unit system of a bare deck
+    units : str          unit system of a bare deck; default the one that its materials show, which
+                         the notes name
     """
-    model = load_model(Path(case), units)
+    model, said = model_in_si(case, "plan", units)
     places = find_sensor_candidates(model.assembly, candidates, unit=model.unit)
     target, _, _ = target_modes(model.structure, PlanSettings(modes=modes))
     mounts, moving = mounts_at(places), motion(model.structure, target)
@@ -61,6 +63,7 @@ def specimen(
         access=places.straight,
         gap_shapes=gaps.motion,
         clearance=gaps.clearance,
+        notes=(said, *model.notes) if said else model.notes,
     )
 
 
@@ -74,8 +77,8 @@ class Recorded:
     score : Responses         the compared data, damping equalised
     """
 
-    def __init__(self, case: str) -> None:
-        self.prepared = prepared(load_case(case))
+    def __init__(self, case: Source) -> None:
+        self.prepared = prepared(_with_recording(case))
         problem = self.prepared.problem
         score = self.prepared.score
         if not isinstance(score, Responses):
@@ -130,6 +133,18 @@ class Recorded:
 
         frequency = self.score.s.imag[lines] / (2 * np.pi)
         return CalibrationQuestion(self.names, frequency, predict, fitted(self.score.values))
+
+
+def _with_recording(source: Source) -> Case:
+    """The case at a path, or one that was loaded; FileError for whatever holds no recording."""
+    if isinstance(source, str | Path) and (is_case(Path(source)) or not Path(source).exists()):
+        source = load_case(source)
+    if not isinstance(source, Case):
+        what = source if isinstance(source, str | Path) else f"this {type(source).__name__}"
+        raise FileError(
+            f"{what} holds no recording; give the folder of a case, as chladni init writes it"
+        )
+    return source
 
 
 def _name(effect: Effect, parameter: Parameter) -> str:

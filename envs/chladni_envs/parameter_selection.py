@@ -1,6 +1,7 @@
 """Parameter selection: effects to free in a calibration, judged on held-out data."""
 
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -11,6 +12,9 @@ from chladni_planning import Linearised
 from . import drawing
 from .reset_first import refuse_before_reset
 from .sensor_placement import Reset, Step
+
+if TYPE_CHECKING:
+    from chladni.case import Case
 
 
 class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
@@ -51,7 +55,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         self,
         problem: Linearised | None = None,
         *,
-        case: str | None = None,
+        case: "str | Path | Case | None" = None,
         effects: bool = False,
         p: int = 8,
         cost: float = 0.2,

@@ -1,7 +1,7 @@
 """Sensor placement: candidates are deleted, or sensors added, one a step."""
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -13,15 +13,23 @@ from . import drawing
 from .reset_first import refuse_before_reset
 from .small_specimens import ModalSpecimen, plate
 
+if TYPE_CHECKING:
+    from chladni.workflows.given_case import Source
+
 Reset = tuple[np.ndarray, dict[str, Any]]
 Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 
 
-def of_case(case: str, modes: int, units: str | None = None) -> ModalSpecimen:
+def of_case(case: "Source", modes: int, units: str | None = None) -> ModalSpecimen:
     """Candidates and target modes of a case folder or deck (see :mod:`.environment_cases`)."""
     from .environment_cases import specimen  # the finite element part is loaded only here
 
     return specimen(case, modes, units=units)
+
+
+def with_notes(info: dict[str, Any], notes: tuple[str, ...]) -> dict[str, Any]:
+    """Add the sentences on the deck of an environment to the info of a reset."""
+    return {**info, "notes": "; ".join(notes)} if notes else info
 
 
 class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
@@ -52,9 +60,11 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     points : (n, 2) or (n, 3)     places [m], for pictures
     noise, prior, rules : as in :func:`chladni_planning.effective_independence`
     unusable : float              share of candidates that are unusable, drawn at each reset
-    case : folder or deck         its mesh gives candidates and modes (phi is then None)
+    case : folder, deck or model  its mesh gives candidates and modes (phi is then None)
     modes : int                   number of target modes of a case
-    units : str                   unit system of a bare deck, as mm-t-s; a case states its own
+    units : str                   unit system of a bare deck, as mm-t-s; a case states its own.
+                                  Where it is missing, the materials show it, and ``notes`` and the
+                                  info of a reset name it.
 
     A frame of ``render_mode="rgb_array"`` is 256 pixels high and 320 wide.
     """
@@ -72,15 +82,17 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         prior: np.ndarray | None = None,
         rules: Rules | None = None,
         unusable: float = 0.0,
-        case: str | None = None,
+        case: "Source | None" = None,
         modes: int = 24,
         units: str | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.outline: np.ndarray | None = None
+        self.notes: tuple[str, ...] = ()
         if phi is None:
             specimen = plate() if case is None else of_case(case, modes, units)
             phi, points, self.outline = specimen.phi, specimen.points, specimen.outline
+            self.notes = specimen.notes
         self.candidates = candidates(phi, noise, prior)
         n = len(self.candidates)
         usual = min(n, -(-5 * self.candidates.unknowns // 4))
@@ -104,7 +116,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         self.walk = self._walk(broken)
         self.start, self.steps = self.walk.log_det, 0
         self.needed = abs(int(self.walk.kept.sum()) - self.n_sensors)
-        return self.walk.worth.copy(), self._info()
+        return self.walk.worth.copy(), with_notes(self._info(), self.notes)
 
     def step(self, action: np.int64) -> Step:
         """Delete, or add, one candidate."""

@@ -19,6 +19,7 @@ class ModalSpecimen:
     access : (n,) bool         True where a free line leads to the place, for a shaker's rod
     gap_shapes : (g, r)        opening of gaps between sheets [1/√kg]
     clearance : (g,)           of these gaps [m]
+    notes : sentences on the deck, as the unit system that was guessed
     """
 
     points: np.ndarray
@@ -30,6 +31,7 @@ class ModalSpecimen:
     access: np.ndarray | None = None
     gap_shapes: np.ndarray | None = None
     clearance: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
 
 
 def plate(

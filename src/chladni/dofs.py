@@ -12,7 +12,7 @@ import numpy as np
 from .errors import LabelError, named
 
 COMPONENTS = ("X", "Y", "Z", "RX", "RY", "RZ")
-_LABEL = re.compile(r"^\s*(\d+)\s*:\s*([+-]?)\s*(R?[XYZ])\s*$", re.IGNORECASE)
+_LABEL = re.compile(r"^\s*([0-9]+)\s*:\s*([+-]?)\s*(R?[XYZ])\s*$", re.IGNORECASE)
 
 
 def parse(label: str) -> tuple[int, int, int]:

@@ -34,6 +34,7 @@ def installed(
     fits: Callable[[Any], bool],
     taken: Container[str],
     name_of: Callable[[EntryPoint, Any], str] = lambda entry, _: entry.name,
+    but: Container[EntryPoint] = (),
 ) -> dict[str, Any]:
     """Load what the installed packages offer in a group of entry points.
 
@@ -45,6 +46,7 @@ def installed(
     fits : whether an object is one
     taken : names that no package may use
     name_of : an entry point and its object
+    but : entry points that are passed over
 
     Returns
     -------
@@ -57,6 +59,8 @@ def installed(
     """
     out: dict[str, Any] = {}
     for entry in sorted(entry_points(group=group), key=lambda e: (e.name, e.value)):
+        if entry in but:
+            continue
         package = f"the package {entry.dist.name}" if entry.dist is not None else "a package"
         offer = f"{package} offers the {noun}"
         try:

@@ -2,19 +2,19 @@
 
 import json
 import os
-import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from errno import ENOSPC
 from importlib.metadata import PackageNotFoundError, version
 from itertools import count
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from .errors import FileError, named
+from .own_folder import OwnFolder, own_folder
 
 try:
     import fcntl
@@ -45,17 +45,28 @@ def plain(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
-def atomic(path: Path | str, write: Callable[[Path], object]) -> Path:
-    """Let ``write`` fill a temporary file beside ``path``, of the same suffix, then move it."""
+def atomic(
+    path: Path | str, write: Callable[[Path], object], within: OwnFolder | None = None
+) -> Path:
+    """Let ``write`` fill a temporary file beside ``path``, of the same suffix, then move it.
+
+    Parameters
+    ----------
+    within : a folder above ``path``, below which no link is followed
+    """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(suffix=path.suffix, prefix=".part-", dir=path.parent)
+    folder = path.parent if within is None else within.path
+    folder.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(suffix=path.suffix, prefix=".part-", dir=folder)
     os.close(handle)
     part = Path(name)
     try:
         write(part)
         part.chmod(0o666 & ~_umask())
-        part.replace(path)
+        if within is None:
+            part.replace(path)
+        else:
+            within.move(part.name, path.relative_to(folder).as_posix())
     finally:
         part.unlink(missing_ok=True)
     return path
@@ -74,10 +85,17 @@ def write_json(path: Path | str, data: Any) -> Path:
 
 def write_npz(path: Path | str, **arrays: np.ndarray) -> Path:
     """Write compressed arrays; texts become fixed-width unicode, so no pickle is needed."""
+    return write_arrays(path, arrays)
+
+
+def write_arrays(
+    path: Path | str, arrays: Mapping[str, np.ndarray], within: OwnFolder | None = None
+) -> Path:
+    """Write arrays by name as NPZ, as :func:`atomic` does."""
     held = {name: np.asarray(array) for name, array in arrays.items()}
     if objects := [name for name, array in held.items() if array.dtype.hasobject]:
         raise FileError(f"{path}: {named(objects)} contain Python objects, which need a pickle")
-    return atomic(path, lambda part: np.savez_compressed(part, **held))  # type: ignore[arg-type]
+    return atomic(path, lambda part: np.savez_compressed(part, **held), within)  # type: ignore[arg-type]
 
 
 @contextmanager
@@ -91,9 +109,9 @@ def run_folder(
 ) -> Iterator[Path]:
     """A scratch folder in ``out``; its files are moved into ``out`` only if the body succeeds.
 
-    A folder holds the results of one command. What an earlier run of the same command wrote there
-    is replaced and what that run alone wrote goes; no other file is ever touched. While it works a
-    second process is refused, where the file system has locks.
+    A folder holds the results of one command. Files that an earlier run of the same command wrote
+    there are replaced or removed. No other file is touched, and none that a link below ``out``
+    leads to. While it works a second process is refused, where the file system has locks.
 
     Parameters
     ----------
@@ -108,23 +126,23 @@ def run_folder(
         a file is in the way, in which case all results are kept in a folder of their own.
     """
     out = Path(out)
-    with _made(out), locked(out):
-        before = _earlier(out, command)
+    with _made(out), locked(out) as here:
+        before = _earlier(here, command)
         for killed in out.glob(f"{_SCRATCH}*"):  # nobody else is at work here
-            shutil.rmtree(killed, ignore_errors=True)
-        part = _scratch(out)
+            here.remove(killed.name)
+        part = _scratch(out.resolve())  # a link in its place, later, is not followed
         try:
             yield part
             stays = before - _files(part) if adds else set()
             if listed:
                 _list(part, command, stays)
-            _move(part, out, before - stays, {p.resolve() for p in inputs})
+            _move(part, here, before - stays, {p.resolve() for p in inputs})
         except OSError as error:
             if error.errno != ENOSPC:
                 raise
             raise FileError(f"{out}: {error.strerror}; no file was written") from error
         finally:
-            shutil.rmtree(part, ignore_errors=True)
+            here.remove(part.name)
 
 
 @contextmanager
@@ -157,23 +175,18 @@ def make_folder(out: Path) -> None:
 
 
 @contextmanager
-def locked(out: Path) -> Iterator[None]:
-    """The folder's lock, which the kernel frees when this process ends however it ends.
+def locked(out: Path) -> Iterator[OwnFolder]:
+    """The folder, locked by the kernel, which frees it when this process ends however it ends.
 
     Raises
     ------
     FileError
         If another process holds it.
     """
-    if fcntl is None:
-        yield
-        return
-    handle = os.open(out, os.O_RDONLY)
-    try:
-        lock(handle, out)
-        yield
-    finally:
-        os.close(handle)
+    with own_folder(out) as here:
+        if here.handle >= 0:
+            lock(here.handle, out)
+        yield here
 
 
 def lock(handle: int, folder: Path) -> bool:
@@ -205,22 +218,24 @@ def _scratch(out: Path) -> Path:
         raise FileError(f"{out}: no file can be written there ({error.strerror})") from error
 
 
-def _earlier(out: Path, command: str) -> set[str]:
+def _earlier(here: OwnFolder, command: str) -> set[str]:
     """Names of the files an earlier run of this command wrote into the folder."""
-    path = out / LIST
+    path = here.path / LIST
     for name, by in _MARKS.items():
-        if by != command and (out / name).exists():
-            raise FileError(f"{out} has the results of chladni {by}; give another --out")
-    if not path.exists():
+        if by != command and here.status(name):
+            raise FileError(f"{here.path} has the results of chladni {by}; give another --out")
+    if not here.status(LIST):
         return set()
     try:
+        if path.is_symlink():
+            raise ValueError(LIST)
         held = json.loads(path.read_text(encoding="utf-8"))
         by, names = str(held["command"]), {str(name) for name in held["files"]}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise FileError(f"{path} is not a list of results; give another --out") from error
     if by != command:
-        raise FileError(f"{out} has the results of chladni {by}; give another --out")
-    return {name for name in names if not (Path(name).is_absolute() or ".." in Path(name).parts)}
+        raise FileError(f"{here.path} has the results of chladni {by}; give another --out")
+    return names
 
 
 def _files(part: Path) -> set[str]:
@@ -234,62 +249,60 @@ def _list(part: Path, command: str, stays: set[str]) -> None:
     write_json(part / LIST, {"command": command, "version": own_version(), "files": files})
 
 
-def _move(part: Path, out: Path, before: set[str], inputs: set[Path]) -> None:
+def _move(part: Path, here: OwnFolder, before: set[str], inputs: set[Path]) -> None:
     """Files of a finished run into their folder: all of them or none."""
     names = sorted(_files(part))
-    mine = {name for name in {*before, LIST} if (out / name).is_file()}
-    mine = {name for name in mine if (out / name).resolve() not in inputs}
+    mine = {name for name in {*before, LIST} if here.has_file(name)}
+    mine = {name for name in mine if (here.path / name).resolve() not in inputs}
     try:
-        _refuse_blocked(out, names, mine, inputs)
-        _swapped(part, out, names, mine)
+        _refuse_blocked(here, names, mine, inputs)
+        _swapped(part.name, here, names, mine)
     except (FileError, OSError) as error:
-        why = error if isinstance(error, FileError) else f"{out}: {error.strerror}"
-        kept = _kept(part, out)
+        why = error if isinstance(error, FileError) else f"{here.path}: {error.strerror}"
+        kept = _kept(part, here)
         raise FileError(f"{why}; no file was replaced, and the results are in {kept}") from error
 
 
-def _refuse_blocked(out: Path, names: Sequence[str], mine: set[str], inputs: set[Path]) -> None:
+def _refuse_blocked(
+    here: OwnFolder, names: Sequence[str], mine: set[str], inputs: set[Path]
+) -> None:
     """Refuse to replace what an earlier run of the command did not write."""
     for name in names:
-        target = out / name
+        target = here.path / name
         if target.resolve() in inputs:
             raise FileError(f"{target} is an input file of this run")
-        if name not in mine and os.path.lexists(target):
+        if here.status(name) and name not in mine:
             raise FileError(
                 f"{target} exists and no {LIST} shows that this command wrote it; move it away, "
                 "or give another --out"
             )
-        above = next((p for p in target.parents if p.exists()), out)
-        if not above.is_dir():
-            raise FileError(f"{above} exists and is not a folder")
 
 
-def _swapped(part: Path, out: Path, names: Sequence[str], mine: set[str]) -> None:
+def _swapped(part: str, here: OwnFolder, names: Sequence[str], mine: set[str]) -> None:
     """Move the new files in and the old ones away; back again where any of it fails."""
-    old = part / ".old"
-    moves = [(out / name, old / name) for name in sorted(mine)]
-    moves += [(part / name, out / name) for name in names]
+    moves = [(name, f"{part}/.old/{name}") for name in sorted(mine)]
+    moves += [(f"{part}/{name}", name) for name in names]
     try:
         for source, target in moves:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            source.rename(target)
+            here.move(source, target)
     except BaseException:  # an interruption, too
         for source, target in reversed(moves):
-            if not source.exists():  # it was moved
-                target.rename(source)
-        shutil.rmtree(old, ignore_errors=True)
+            with suppress(FileError):  # a link has appeared: the old file is with what is kept
+                if not here.status(source):  # it was moved
+                    here.move(target, source)
+        if not _files(here.path / part / ".old"):
+            here.remove(f"{part}/.old")
         raise
-    for folder in {(out / name).parent for name in mine} - {out}:
-        with suppress(OSError):  # the new run wrote there, too
-            folder.rmdir()
+    for folder in {str(PurePosixPath(name).parent) for name in mine} - {"."}:
+        here.remove_empty(folder)  # unless the new run wrote there, too
 
 
-def _kept(part: Path, out: Path) -> Path:
+def _kept(part: Path, here: OwnFolder) -> Path:
     """Results that could not be moved, under a name that lasts."""
-    place = next(p for k in count(1) if not (p := out / f"results-{k}").exists())
-    part.rename(place)
-    place.chmod(0o777 & ~_umask())
-    return place
+    name = next(n for k in count(1) if not here.status(n := f"results-{k}"))
+    part.chmod(0o777 & ~_umask())
+    here.move(part.name, name)
+    return here.path / name
 
 
 def own_version() -> str:

@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from .errors import plain_line
+
 Progress = Callable[[str, float], None]  # what is being done, and how far it is (0 to 1)
 
 
@@ -71,12 +73,12 @@ def terminal(patience: float = 2.0) -> Iterator[Progress]:
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
-    columns = (TextColumn("{task.description:<36}"), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description:<36}", markup=False), BarColumn(), TimeElapsedColumn())
     bar = Bar(*columns, console=Console(stderr=True), transient=True)
     task, begun = bar.add_task("", total=1.0), time.monotonic()
 
     def report(what: str, fraction: float) -> None:
-        bar.update(task, description=what, completed=fraction)
+        bar.update(task, description=plain_line(what), completed=fraction)
         if time.monotonic() - begun > patience and not bar.live.is_started:
             bar.start()
 

@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from .errors import LabelError, ModelError, did_you_mean, named
+from .arguments import checked
+from .errors import LabelError, ModelError, did_you_mean, named, plain_line
 from .output import atomic, run_folder
 
 
@@ -53,12 +55,23 @@ _FRAME = (
     '<iframe srcdoc="{}" sandbox="" title="{}" '
     'style="width:100%;height:{}rem;border:1px solid #ccc;border-radius:8px"></iframe>'
 )
-_views: dict[type, Callable[[], View]] = {}
+_views: dict[str, Callable[[], View]] = {}  # by the full name of the type
+_later: list[str] = []  # modules that fill it
 
 
-def show_by(kind: type, view: Callable[[], View]) -> None:
-    """Let results of this type be shown by what the call returns at the first use."""
-    _views[kind] = view
+def full_name(kind: type) -> str:
+    """Module and name of a type, by which it is known before it is loaded."""
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def show_by(kind: type | str, view: Callable[[], View]) -> None:
+    """Let results of a type, or of its full name, be shown by what the call returns."""
+    _views[kind if isinstance(kind, str) else full_name(kind)] = view
+
+
+def show_later(module: str) -> None:
+    """Name a module that is loaded, and fills in views, when a result without one is shown."""
+    _later.append(module)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,15 +87,19 @@ class Result:
 
     @property
     def _view(self) -> View:
-        return next(_views[kind] for kind in type(self).__mro__ if kind in _views)()
+        names = [full_name(kind) for kind in type(self).__mro__]
+        while not any(name in _views for name in names):
+            import_module(_later.pop())
+        return next(_views[name] for name in names if name in _views)()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.summary().partition(chr(10))[0]}>"
 
     def summary(self) -> str:
         """Return the result in words: one sentence, then the main tables as text."""
-        return self._view.summary(self)
+        return plain_line(self._view.summary(self))
 
+    @checked
     def plot(self, name: str = "") -> DrawnPicture:
         """Draw a picture of the page of the command.
 
@@ -113,6 +130,7 @@ class Result:
         drawn: Mapping[str, bytes] = self.__dict__["_drawn"]
         return drawn
 
+    @checked
     def save(self, folder: Path | str) -> Path:
         """Write the files that the command writes: JSON, tables, pictures, ``report.html``.
 

@@ -8,6 +8,7 @@ from typing import Annotated, cast
 
 import typer
 
+from chladni.arrays import real_number
 from chladni.case import Case, load_case
 from chladni.case.load import OUTSIDE
 from chladni.case.sensor_places import placed
@@ -135,7 +136,7 @@ def _factors(text: str) -> tuple[float, ...]:
     (0.5, 1.0, 2.0)
     """
     try:
-        return tuple(float(x) for x in text.split(","))
+        return tuple(real_number(x) for x in text.split(","))
     except ValueError:
         raise FileError(f"--levels {text!r} is not of the form 0.5,1,2") from None
 

@@ -1,9 +1,7 @@
 """The folder of a virtual test: a case for every other command, time data, the sealed truth."""
 
-import csv
 import json
 from collections import Counter
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ from chladni.case import Case
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.io.nastran import write_deck
 from chladni.io.nastran.edit.model_changes import changes
+from chladni.io.tables.csv_table import csv_text
 from chladni.io.uff.estimate_stamp import stamp
 from chladni.io.uff.write_time import write_time_uff
 from chladni.io.uff.write_uff import write_uff
@@ -73,19 +72,15 @@ def file_names(recordings: tuple[BenchRecording, ...]) -> list[str]:
 
 def _sensors(found: BenchResult) -> str:
     """Return the text of ``sensors.csv``, with the nominal masses of the sensors."""
-    text = StringIO()
-    write = csv.writer(text, lineterminator="\n").writerow
     uncertain = ["position_sd"] * bool((found.outputs.sd > 0).any() or (found.inputs.sd > 0).any())
-    write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass", *uncertain])
+    head = ["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass", *uncertain]
     usual, shaker = found.setup.accelerometer.mass, found.setup.shaker
     behind = shaker.gauge.mass * shaker.gauge.beyond if shaker else 0.0
     masses = np.where(found.outputs.mass > 0, found.outputs.mass, usual)
     rows = _rows(found.outputs, "output", masses)
     if not found.inputs.base[0]:  # its label says all there is to a table
         rows += _rows(found.inputs, "input", np.full(len(found.inputs.labels), behind))[:1]
-    for row in rows:
-        write(row if uncertain else row[:-1])
-    return text.getvalue()
+    return csv_text([head, *(row if uncertain else row[:-1] for row in rows)])
 
 
 def _rows(dofs: MeasuredDofs, role: str, masses: np.ndarray) -> list[list[str]]:

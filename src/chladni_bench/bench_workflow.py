@@ -6,6 +6,7 @@ from typing import Any, Unpack, get_args
 
 import numpy as np
 
+from chladni.arguments import checked, refuse_fields
 from chladni.case import Case
 from chladni.case.make_case import CaseWords
 from chladni.dynamics.modes import rigid_modes
@@ -91,6 +92,9 @@ class BenchSettings:
     room: float = 0.0
     keep_time: bool = False
 
+    def __post_init__(self) -> None:
+        refuse_fields(self)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BenchResult(Result):
@@ -121,6 +125,7 @@ class BenchResult(Result):
     notes: tuple[str, ...] = ()
 
 
+@checked
 def virtual_test(
     source: Source,
     settings: BenchSettings | None = None,

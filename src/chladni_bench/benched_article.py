@@ -13,7 +13,7 @@ from chladni.fem.assemble import Structure, structure
 from chladni.fem.energy import mass_properties
 from chladni.fem.locate import rows_of, shares_of
 from chladni.fem.measured_dofs import MeasuredDofs
-from chladni.fem.modelled import node_points, solved
+from chladni.fem.modelled import solved
 from chladni.geometry.facets import tangents, unit
 from chladni.model.assembly import Assembly
 from chladni.workflows.loaded_model import LEAST_MODES
@@ -95,7 +95,7 @@ def benched(
     hung = _hung(built, () if on_table else hangers)
     base = inputs.loads(built)[:1] if on_table else sp.csr_array((0, built.T.shape[1]))
     loads = sp.vstack([base if on_table else drive[:3], hung]).T.toarray()
-    whole = with_residual_vectors(built.system, modes, loads, node_points(built))
+    whole = with_residual_vectors(built.system, modes, loads)
     phi, r = whole.shapes, len(whole)
     f, zeta = whole.frequency.copy(), np.full(r, REST)
     f[: len(modes)][rigid_modes(modes)] = 0.0
@@ -118,7 +118,7 @@ def _modes(built: Structure, band: float) -> ModalModel:
     least = min(LEAST_MODES, len(built.system.dofs))
     if len(found) >= least:
         return found
-    return normal_modes(built.system, least, points=node_points(built))
+    return normal_modes(built.system, least)
 
 
 def _drive(built: Structure, inputs: MeasuredDofs) -> sp.csr_array:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import toeplitz
-from scipy.signal import lfilter
 
 from chladni.errors import ShapeError
 
@@ -101,6 +100,8 @@ class HeldRun:
         q(t + R h) = E^R q(t) + Σ_j w_j b u(t + j h), j = 0 .. R: w_j = E^{R-1-j} (E G_1 + G_0),
         but E^{R-1} G_0 at 0 and G_1 at R.
         """
+        from scipy.signal import lfilter
+
         s = self.step
         powers = s.E[:, None] ** np.arange(every, -1, -1)
         w = np.zeros_like(powers)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import ellip, residue
 
 from .pole_model import PoleFilter, one_of_pairs
 
@@ -42,6 +41,8 @@ def anti_alias(rate: float) -> PoleFilter:
 
     All channels share it, so that no FRF sees it.
     """
+    from scipy.signal import ellip, residue
+
     edge = 2 * np.pi * PASS * rate
     b, a = ellip(ORDER, RIPPLE, STOP, 1.0, analog=True)  # per edge: numbers of order one
     r, p, _ = residue(b, a)

@@ -103,10 +103,9 @@ def _completed(
 def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, f_max: float) -> ArticleModes:
     """Normal modes and static responses to forces at the loaded points, by Rayleigh and Ritz."""
     system = built.system
-    X = built.assembly.points[built.assembly.rows(system.dofs[:, 0])]
-    modes = normal_modes(system, band=ABOVE * f_max, points=X)
+    modes = normal_modes(system, band=ABOVE * f_max)
     translations = (6 * np.unique(loaded)[:, None] + np.arange(3)).ravel()
-    extra = attachments(shifted(system, f_max / 4, X), built.T[translations])
+    extra = attachments(shifted(system, f_max / 4), built.T[translations])
     basis = orthonormal(system.M, [modes.shapes, extra], kept=len(modes))
     lam, Q = eigh(basis.T @ (system.K @ basis))
     shapes = basis @ Q

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import multiprocessing
-import shutil
 import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -14,6 +13,7 @@ import numpy as np
 
 from chladni.errors import FileError, LabelError
 from chladni.output import locked, make_folder, own_version, write_json, write_text
+from chladni.own_folder import own_folder
 from chladni.parallel import one_blas_thread
 
 from .blind_folder import BlindFolder, Seals, hash_of, hash_of_case, published, read_json
@@ -106,7 +106,10 @@ def _made(name: str, order: Order, place: BlindFolder) -> bool:
     truth, cache = place.truth(name), place.out / "cache"
     if truth.exists():
         return True
-    shutil.rmtree(place.case(name), ignore_errors=True)  # remains of a run that was killed
+    with own_folder(place.out) as here:
+        for folder in ("cases", "sealed", "cache"):
+            here.make(folder)
+        here.remove(f"cases/{name}")  # remains of a run that was killed
     try:
         write_case(made_of(order, cache), place.case(name), truth)
     except Exception:  # noqa: BLE001  a maker that fails is counted, and the others go on

@@ -4,8 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scipy.stats import beta
-
 from chladni.output import write_json, write_text
 from chladni.view.evaluation_plots import shares_over_size
 
@@ -39,6 +37,8 @@ class Share:
 
     def ends(self, k: int) -> tuple[float, float]:
         """Ends of the interval where k cases count; 0 or 1 where none or every case does."""
+        from scipy.stats import beta
+
         n = self.cases
         low = 0.0 if k == 0 else float(beta.ppf(0.05, k + 0.5, n - k + 0.5))
         return low, 1.0 if k == n else float(beta.ppf(0.95, k + 0.5, n - k + 0.5))

@@ -1,6 +1,5 @@
 """Answers to the cases of a blind benchmark, from their folders alone."""
 
-import shutil
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 
 from chladni.errors import FileError
 from chladni.output import locked, own_version, write_json
+from chladni.own_folder import own_folder
 
 from .blind_diagnosis import Answer, answered
 from .blind_folder import BlindFolder, Seals, hash_of, published, unchanged_cases
@@ -81,13 +81,17 @@ def _one(
     answers: dict[str, Any] = {}
     for command in commands:
         work = place.work(name, command)
-        shutil.rmtree(work, ignore_errors=True)  # remains of a run that was killed
+        with own_folder(place.out) as here:
+            here.make("answers")
+            for remains in (work.name, f"{work.name}.log"):  # of a run that was killed
+                here.remove(f"answers/{remains}")
         answer = answered(command, place.case(name), work, limit, stop)
         if stop.is_set():
             return "stopped"
         answers[command] = vars(answer)
         if command != "diagnose":  # its pages take megabytes that are not needed
-            shutil.rmtree(work, ignore_errors=True)
+            with own_folder(place.out) as here:
+                here.remove(f"answers/{work.name}")
     write_json(place.answer(name), {**given, **answers})
     return in_words(Answer(**answers["diagnose"]))
 

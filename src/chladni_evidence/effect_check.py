@@ -6,12 +6,15 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from chladni.arguments import checked
 from chladni.effects import registry
 from chladni.effects.family import Family
 from chladni.errors import AccuracyError, FileError
 from chladni.model.assembly import Assembly
 from chladni.progress import Progress, silent, within
 from chladni.results import Result
+from chladni.units import Units
+from chladni.workflows.given_case import Source
 from chladni.workflows.loaded_model import Model, as_model
 
 from .effect_ground import GROUNDS, EffectGround, ground_of, usual_grounds
@@ -156,10 +159,11 @@ class EffectCheck(Result):
         return self
 
 
+@checked
 def check_effect(
     effect: str | Family,
-    deck: Path | str | Model | None = None,
-    units: str | None = None,
+    deck: Source | None = None,
+    units: str | Units | None = None,
     *,
     progress: Progress = silent,
 ) -> EffectCheck:
@@ -172,8 +176,8 @@ def check_effect(
     Parameters
     ----------
     effect : name of an installed or registered effect, or its ``Family``
-    deck : path of a Nastran deck or case, or a model from ``chladni.load``; without one a
-        generated plate, or two plates with joints, with what the effect needs
+    deck : path of a Nastran deck or case, a model from ``chladni.load``, or an Assembly; without
+        one a generated plate, or two plates with joints, with what the effect needs
     units : unit system of the path of a bare deck
 
     Raises
@@ -205,7 +209,7 @@ def check_effect(
 
 
 def _grounds(
-    family: Family, deck: Path | str | Model | None, units: str | None
+    family: Family, deck: Source | None, units: str | Units | None
 ) -> tuple[Model | None, dict[str, Callable[[], EffectGround]]]:
     """The given model, and the structures on which candidates are looked for in turn."""
     if deck is None:

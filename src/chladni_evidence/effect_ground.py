@@ -20,7 +20,6 @@ from chladni.effects.rigid_ties import on_firm_springs
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
-from chladni.fem.modelled import node_points
 from chladni.geometry.refine import refined
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
@@ -194,7 +193,7 @@ def ground_of(deck: Assembly) -> EffectGround:
     """
     built = structure(deck)
     count = min(2 * MODES + 1, len(built.system.dofs))
-    modes = normal_modes(built.system, count, points=node_points(built))
+    modes = normal_modes(built.system, count)
     rigid = int(rigid_modes(modes).sum())
     if len(modes) < rigid + MODES:
         raise ModelError(

@@ -23,7 +23,7 @@ from pathlib import Path
 
 from chladni.output import write_json, write_text
 
-from .fuzz_input import FuzzInput
+from .fuzz_input import SECRET, YOUR_FILES, YOURS, FuzzInput
 
 PATIENCE = 60.0  # of the processor's time [s]
 MEMORY = 2e9  # resident at most [bytes]
@@ -56,9 +56,11 @@ class FuzzOutcome:
 def outcome(one: FuzzInput, patience: float = PATIENCE) -> FuzzOutcome:
     """Run the command on the files in a folder of their own."""
     with tempfile.TemporaryDirectory(prefix="chladni-fuzz-") as name:
-        folder = Path(name)
-        for file, data in one.files.items():
-            (folder / file).write_bytes(data)
+        folder, yours = Path(name) / "input", Path(name) / YOURS
+        laid_out(one, folder)
+        for file in YOUR_FILES if one.links else ():
+            yours.mkdir(exist_ok=True)
+            (yours / file).write_bytes(SECRET)
         begun = time.monotonic()
         child = os.fork()
         if child == 0:
@@ -67,7 +69,13 @@ def outcome(one: FuzzInput, patience: float = PATIENCE) -> FuzzOutcome:
         size = used.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
         seconds = used.ru_utime + used.ru_stime
         output, said = (_read(folder / n) for n in ("stdout.txt", "stderr.txt"))
-        called = _called(status, output, said, size, folder / "out")
+        called = _called(status, output, said, size, folder / "out", bool(one.links))
+        if one.sound and called in DUE[1:]:
+            called = "sound, and not answered"
+        if one.links:
+            called = _left_alone(yours, folder, output + said) or called
+        if called == "answered" and not re.search(one.cause, output):
+            called = "silent"
         return FuzzOutcome(called, said or output, min(seconds, time.monotonic() - begun), size)
 
 
@@ -99,8 +107,29 @@ def _run(folder: Path, arguments: Iterable[str], patience: float) -> None:
         os._exit(code)
 
 
-def _called(status: int, output: str, said: str, size: int, out: Path) -> str:
-    """The name of what happened."""
+def laid_out(one: FuzzInput, folder: Path) -> None:
+    """Write the files of an input and make its links."""
+    folder.mkdir(exist_ok=True)
+    for file, data in one.files.items():
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_bytes(data)
+    for link, target in one.links.items():
+        (folder / link).parent.mkdir(parents=True, exist_ok=True)
+        (folder / link).unlink(missing_ok=True)
+        (folder / link).symlink_to(target)
+
+
+def _left_alone(yours: Path, folder: Path, said: str) -> str:
+    """Name the misuse of the files that links lead to; "" if they are as before and not shown."""
+    if {p.name: p.read_bytes() for p in yours.iterdir()} != dict.fromkeys(YOUR_FILES, SECRET):
+        return "touched outside"
+    written = [p for p in folder.rglob("*") if p.is_file() and not p.is_symlink()]
+    told = SECRET.decode() in said or any(SECRET in p.read_bytes() for p in written)
+    return "told of outside" if told else ""
+
+
+def _called(status: int, output: str, said: str, size: int, out: Path, there: bool = False) -> str:
+    """The name of what happened; ``there``: the output folder was there before."""
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         slow = (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
@@ -118,7 +147,7 @@ def _called(status: int, output: str, said: str, size: int, out: Path) -> str:
         return "refused" if usage and code == 2 else "no sentence"
     if _LIST.search(said):
         return "programmer's words"
-    if code == 2 and out.exists():
+    if code == 2 and out.exists() and not there:
         return "half-written"
     return "refused" if code == 2 else "not trusted"
 
@@ -182,7 +211,6 @@ def _keep(one: FuzzInput, found: FuzzOutcome, place: Path) -> None:
     """The files of a failure, what was said and the line that makes it again."""
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    for name, data in one.files.items():
-        (place / name).write_bytes(data)
+    laid_out(one, place)
     line = shlex.join(["chladni", *one.arguments, "--out", "out"])
     write_text(place / "command.txt", f"{line}\n\n{found.called}\n{found.said}")

@@ -1,12 +1,15 @@
 """Sound inputs that are injured: files cut, doubled or misspelt, and those of contradictions."""
 
+import json
 import random
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from .contradictions import CONTRADICTIONS
-from .fuzz_input import FuzzInput, Maker
+from .contradictory_recordings import contradictory
+from .fuzz_input import YOURS, FuzzInput, Maker
 from .mutations import WORDS, injured_archive, injured_bytes, injured_text
+from .recoded_text import recoded
 from .sound_files import Files, sound_files
 
 
@@ -109,6 +112,31 @@ def _page(rng: random.Random, sound: Files) -> FuzzInput:
     return FuzzInput("page", files, ("report", "."))
 
 
+def _links(rng: random.Random, sound: Files) -> FuzzInput:
+    """A case or an output folder of which links lead to files of yours, by files and by folders."""
+    names = ("case.toml", "plate.bdf", "frf.npz", "frf.uff", "sensors.csv")
+    files, links = {name: sound[name] for name in names}, dict[str, str]()
+    wanted = rng.choice(("plate.bdf", "frf.npz", "sensors.csv", "case.toml"))
+    way = rng.choice(("file", "folder", "include", "results"))
+    if way == "file":
+        links[wanted] = f"../{YOURS}/{wanted}"
+    elif way == "folder":
+        links["sub"] = f"../{YOURS}"
+        text = files["case.toml"].replace(f'"{wanted}"'.encode(), f'"sub/{wanted}"'.encode())
+        files["case.toml"] = text
+    elif way == "include":
+        links["more.inc"] = f"../{YOURS}/plate.bdf"
+        text = files["plate.bdf"].replace(b"BEGIN BULK", b"BEGIN BULK\nINCLUDE 'more.inc'", 1)
+        files["plate.bdf"] = text
+    else:
+        at = rng.choice(("s", "s/t", "v"))
+        links[f"out/{at}"] = f"{'../' * (2 + at.count('/'))}{YOURS}" + "/v1" * (at == "v")
+        held = {"command": "modes", "files": [at if at == "v" else f"{at}/v1", "report.html"]}
+        files["out/run.json"] = json.dumps(held).encode()
+    command, *options = ("modes",) if way == "results" else rng.choice(CASE_COMMANDS)
+    return FuzzInput("links", files, (command, ".", *options), links)
+
+
 _MAKERS: dict[str, Maker] = {
     "deck": _deck,
     "uff": _recording("uff", "frf.uff"),
@@ -120,6 +148,9 @@ _MAKERS: dict[str, Maker] = {
     "punch": _punch,
     "wav": _wav,
     "mesh": _mesh,
+    "recoded": recoded,
+    "links": _links,
     **CONTRADICTIONS,
+    "contradictory": contradictory,
 }
 KINDS = tuple(_MAKERS)

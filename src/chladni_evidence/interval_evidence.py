@@ -9,14 +9,13 @@ too often.
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.stats import kstest, norm
 
 from chladni.case import load_case
 from chladni.effects.calibration_parameters import (
@@ -28,6 +27,7 @@ from chladni.effects.calibration_parameters import (
 )
 from chladni.inference.adequacy import STATISTICS, adequacy
 from chladni.inference.hypothesis_fit import HypothesisFit
+from chladni.io.tables.csv_table import csv_text
 from chladni.model.assembly import Assembly
 from chladni.output import make_folder, write_text
 from chladni.search.diagnosis import without_effects
@@ -39,7 +39,7 @@ from .bench_of_structure import SPECIMENS, form_bench, panel_bench
 from .made_case import MadeCase, made_case, write_case
 from .part_scatter import Scales
 
-NOISES = ("formulation", "identified", "frequencies")  # the last: of a table without FRFs
+NOISES = ("formulation", "frequencies")  # the last: of a table without FRFs
 LISTED, ERROR = 14, 5e-4  # natural frequencies of that table, and sd of their logarithms
 STRUCTURES = ("plate", "panel", "bonded plates", "ribbed plate")
 MAKERS = ("fine", "calculix")
@@ -121,9 +121,8 @@ def answered(structure: str, maker: str, seed: int, cache: Path) -> list[Calibra
         case = Path(folder, "case")
         write_case(made, case, Path(folder, "truth.json"))
         question = question_of(load_case(case))
-        every = [replace(question, identified_noise=noise == "identified") for noise in NOISES[:2]]
         _tabulate(case, made)
-        every.append(question_of(load_case(case)))
+        every = [question, question_of(load_case(case))]
         return [_answer(q, made.truth, noise) for q, noise in zip(every, NOISES, strict=True)]
 
 
@@ -131,8 +130,8 @@ def _tabulate(case: Path, made: MadeCase) -> None:
     """Replace the recording of a case by a table of natural frequencies."""
     f = np.array([f for f in made.truth["frequency_hz"] if f > ELASTIC][:LISTED])
     f *= np.exp(ERROR * np.random.default_rng([made.truth["seed"], 3]).normal(size=len(f)))
-    rows = [f"{k},{hz:.4f}" for k, hz in enumerate(f, 1)]
-    write_text(case / "modes.csv", "\n".join(["mode,frequency_hz", *rows, ""]))
+    rows = [(k, f"{hz:.4f}") for k, hz in enumerate(f, 1)]
+    write_text(case / "modes.csv", csv_text([("mode", "frequency_hz"), *rows]))
     head, rest = (case / "case.toml").read_text(encoding="utf-8").split("[test]")
     mass = [line for line in rest.splitlines() if line.startswith("mass")]
     words = [head + "[test]", 'recordings = ["modes.csv"]', *mass, ""]
@@ -181,6 +180,8 @@ def interval_evidence(
 
 def table(answers: Sequence[CalibratedArticle]) -> list[str]:
     """Coverage of 90 % intervals, and Kolmogorov-Smirnov p of uniformity, by noise and value."""
+    from scipy.stats import kstest, norm
+
     lines = [f"{'noise':11} {'value':12} number  inside 90 %  rms off  sd/prior  uniform p"]
     for noise in NOISES:
         mine = [a for a in answers if a.noise == noise]

@@ -14,6 +14,7 @@ from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
 from chladni.geometry.facets import cell_areas
 from chladni.io.nastran import write_assembly
+from chladni.io.tables.csv_table import csv_text
 from chladni.io.uff.estimate_stamp import stamp
 from chladni.io.uff.write_uff import write_uff
 from chladni.model.assembly import Assembly
@@ -289,21 +290,21 @@ def _sensors(case: MadeCase) -> str:
     """Table of the sensors and the shaker, with their masses where the bench attached them."""
     bench, known = case.bench, case.benched
     masses = (known.sensor_mass, known.gauge_mass) if known else (0.0, 0.0)
-    rows = ["label,grid,x,y,z,nx,ny,nz,role" + ",mass" * (known is not None)]
+    head = ["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role"]
+    rows = [head + ["mass"] * (known is not None)]
     for spots, role, m in zip(
         (bench.outputs, bench.drive), ("output", "input"), masses, strict=True
     ):
-        tail = f",{m:g}" * (known is not None)
+        tail = [f"{m:g}"] * (known is not None)
         rows += [_sensor(spots, k, role) + tail for k in range(len(spots))]
-    return "\n".join([*rows, ""])
+    return csv_text(rows)
 
 
-def _sensor(spots: Spots, k: int, role: str) -> str:
-    grid, place = str(spots.grids[k]), ",,"
+def _sensor(spots: Spots, k: int, role: str) -> list[str]:
+    grid, place = str(spots.grids[k]), [""] * 3
     if spots.grids[k] == 0:
-        grid, place = "", ",".join(f"{x:.7g}" for x in spots.points[k])
-    direction_text = ",".join(f"{x:.9g}" for x in spots.directions[k])
-    return f"{spots.labels[k]},{grid},{place},{direction_text},{role}"
+        grid, place = "", [f"{x:.7g}" for x in spots.points[k]]
+    return [spots.labels[k], grid, *place, *(f"{x:.9g}" for x in spots.directions[k]), role]
 
 
 def _toml(case: MadeCase) -> str:

@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.stats import kstest
 
 from .outcome_row import NULLS, QUANTITIES, Row
 from .outside_kinds import OUTSIDE
@@ -112,6 +111,8 @@ def _figures(rows: Sequence[Row]) -> Iterator[str]:
 
 def _tests_of_fit(right: Sequence[Row]) -> Iterator[str]:
     """Median and uniformity of p for right answers, by the mesh of their articles."""
+    from scipy.stats import kstest
+
     for mesh in sorted({r["mesh"] for r in right}):
         p = np.array([r["p"] for r in right if r["mesh"] == mesh and r["p"] is not None], float)
         if len(p := p[np.isfinite(p)]):

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from chladni.case import Case
 from chladni.effects.joints import fasteners
@@ -190,6 +189,8 @@ def deviation_fit(case: Case, progress: Progress) -> DeviationFit:
     Every mode of test and model has the same damping. The parameters stay within e^±0.5 of the
     deck's. No error of the mesh is allowed for.
     """
+    from scipy.optimize import least_squares
+
     problem = prepare(question_of(case), progress).problem
     data, model, base = problem.data, problem.reduced.model, problem.base
     assert isinstance(data, Responses)

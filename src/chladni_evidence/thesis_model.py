@@ -9,6 +9,7 @@ from chladni.fem.energy import mass_properties
 from chladni.fem.modelled import modelled
 from chladni.io.dyna import write_keyword
 from chladni.io.nastran import write_assembly
+from chladni.io.tables.csv_table import csv_text, unescaped
 from chladni.model.properties import BeamSection, Isotropic, Part, ShellSection, SolidSection
 from chladni.output import write_text
 from chladni.parallel import one_blas_thread
@@ -171,7 +172,7 @@ def _marker(at: Any, text: str) -> annotations.Marker:
 
 def with_drive_sensor(text: str) -> str:
     """The table of sensors with an accelerometer next to the shaker, and masses of all devices."""
-    head, *rows = csv.reader(StringIO(text))
+    head, *rows = ([unescaped(c) for c in row] for row in csv.reader(StringIO(text)))
     role, mass, label = (head.index(name) for name in ("role", "mass", "label"))
     drive = next(row for row in rows if row[role] == "input")
     outputs = [row for row in rows if row[role] == "output"]
@@ -182,6 +183,4 @@ def with_drive_sensor(text: str) -> str:
     shaker = BenchSetup().shaker
     assert shaker is not None
     drive[mass] = f"{shaker.gauge.mass * shaker.gauge.beyond:g}"
-    out = StringIO()
-    csv.writer(out, lineterminator="\n").writerows([head, *outputs, drive])
-    return out.getvalue()
+    return csv_text([head, *outputs, drive])

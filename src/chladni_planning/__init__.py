@@ -47,7 +47,6 @@ from .layouts.layout_quality import visibility as visibility
 from .layouts.layout_quality import with_visible_modes as with_visible_modes
 from .layouts.layout_rules import Rules as Rules
 from .layouts.layout_rules import too_near as too_near
-from .layouts.layout_search import annealed as annealed
 from .layouts.layout_search import evolved as evolved
 from .layouts.layout_walk import Walk as Walk
 from .measurement_lines import burst_random_time as burst_random_time
@@ -87,7 +86,6 @@ __all__ = [
     "SensorCandidates",
     "Shaking",
     "Walk",
-    "annealed",
     "auto_mac",
     "balanced",
     "best_actuators",

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chladni.report.blocks import Block, Picture, Section, Table
 from chladni.report.words import number, quantity, rounded
@@ -69,6 +68,8 @@ def _percent(x: float) -> str:
 
 def _of_shells(model: Model, found: Detectable) -> np.ndarray:
     """Smallest mass of the place nearest to each shell (m,) [kg]."""
+    from scipy.spatial import cKDTree
+
     middle = model.assembly.points[model.assembly.shells.nodes].mean(axis=1)
     near = cKDTree(found.points).query(middle, min(3, len(found.points)))[1]
     return found.mass[near].reshape(len(middle), -1).mean(axis=1)

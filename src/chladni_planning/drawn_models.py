@@ -55,8 +55,7 @@ def ensemble(
     spread : standard deviation of the logarithm of each part's thickness
     """
     progress("models with random thickness", 0.0)
-    where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
-    modal = normal_modes(built.system, band=REACH * f_max, points=where)
+    modal = normal_modes(built.system, band=REACH * f_max)
     groups = element_groups(built, 1)
     parts = built.assembly.parts
     effects = tuple(
@@ -83,8 +82,7 @@ def _solved(
 ) -> np.ndarray:
     """Mode shapes of a model drawn at x, up to f_max."""
     drawn = with_thickness(built, effects, x)
-    where = drawn.assembly.points[drawn.assembly.rows(drawn.system.dofs[:, 0])]
-    shapes = normal_modes(drawn.system, band=f_max, points=where).shapes
+    shapes = normal_modes(drawn.system, band=f_max).shapes
     if len(shapes) != len(built.system.dofs):
         raise ModelError("a part's thickness changed which degrees of freedom are free")
     return shapes

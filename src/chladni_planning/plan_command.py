@@ -1,18 +1,14 @@
 """``chladni plan``: where to put sensors and shakers, and which lines to measure."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from chladni.cli.run import Allow, DeckOrCase, Out, Units, started
-from chladni.errors import FileError
 from chladni.progress import within
 from chladni.report.result_json import to_json
-from chladni.workflows.loaded_model import Model, is_case, load_deck, load_model
-from chladni.workflows.unit_guess import guessed_units
+from chladni.workflows.loaded_model import model_in_si
 
 from . import PlanSettings
 from .plan_summary import durations
@@ -86,7 +82,7 @@ def run(
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
-        model, said = _model(source, units, allow or ())
+        model, said = model_in_si(source, "plan", units, allow or ())
         job.note(model.notes)
         if said:
             job.say(said)
@@ -104,14 +100,3 @@ def run(
                 parts, sections=[*parts.sections, section], files=[*parts.files, picture]
             )
         job.show(parts)
-
-
-def _model(source: Path, units: str | None, allow: Sequence[str]) -> tuple[Model, str]:
-    """The model, and what its units were taken for: metres, kilograms and newtons are planned."""
-    if units is not None or not source.is_file() or is_case(source):
-        return load_model(source, units, allow, command="plan"), ""
-    bare = load_deck(source, None, allow)
-    guess = guessed_units(bare.model().assembly, source.name)
-    if not guess.sure:
-        raise FileError(f"{source}: {guess.why}; state it by --units")
-    return replace(bare, units=guess.units).model(), f"units = {guess.units.name}: {guess.why}"

@@ -9,8 +9,8 @@ from chladni.fem.assemble import Structure
 from chladni.output import write_text
 from chladni.report import live_pages as live
 from chladni.report.blocks import Block, Facts, Items, PageParts, Picture, Section, Table, Text
-from chladni.report.figures import Shown
 from chladni.report.live_pages import Page, mesh_of
+from chladni.report.shown import Shown
 from chladni.report.words import direction, hertz, number, rounded
 from chladni.view import annotations, plots, scene
 from chladni.view.surface import Surface
@@ -68,7 +68,7 @@ def lead(result: PlanSummary) -> str:
 def notes(found: Plan) -> list[str]:
     """List decisions of the planning, and warnings."""
     centres = int((~found.places.is_grid).sum())
-    out = _places_notes(found.places)
+    out = [*found.notes, *_places_notes(found.places)]
     if len(found.layout) == len(found.places):
         out.append(f"Every place has a sensor: there is room for only {len(found.places)}.")
     if centres:

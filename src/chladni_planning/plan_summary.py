@@ -1,12 +1,12 @@
 """A plan row by row: sensors, shakers, modes, lines and duration; the table of sensors."""
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import StringIO
 from typing import Literal
 
 import numpy as np
+
+from chladni.io.tables.csv_table import csv_text
 
 from .layouts.information import candidates, value
 from .measurement_lines import (
@@ -270,16 +270,14 @@ def sensors_csv(found: Plan, driven: str = "") -> str:
 
     A place that is not a grid is given by x, y, z [m]; its label is a number that no grid has.
     """
-    text = StringIO()
-    write = csv.writer(text, lineterminator="\n").writerow
-    write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
+    table: list[list[object]] = [["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"]]
     rows = [(int(i), "output", found.settings.mass) for i in found.layout]
     rows += [] if driven else [(int(i), "input", 0.0) for i in found.together]
     for i, role, mass in rows:
         at = _place(found, i)
         place = [""] * 3 if at.grid is not None else [f"{x:.7g}" for x in at.point_m]
         direction = [f"{x:.9g}" for x in at.direction]
-        write([at.label, at.grid, *place, *direction, role, f"{mass:g}"])
+        table.append([at.label, at.grid, *place, *direction, role, f"{mass:g}"])
     if driven:
-        write([driven, *[""] * 7, "input", "0"])
-    return text.getvalue()
+        table.append([driven, *[""] * 7, "input", "0"])
+    return csv_text(table)

@@ -1,39 +1,49 @@
 """Where to put sensors and shakers, and which lines to measure."""
 
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
-from chladni.case import Case
+from chladni.arguments import checked, settings_of
 from chladni.parallel import one_blas_thread
 from chladni.progress import Progress, silent
 from chladni.units import Units
-from chladni.workflows.loaded_model import DeckModels, Model, as_model
+from chladni.workflows.given_case import Source
+from chladni.workflows.loaded_model import model_in_si
 
 from .whole_plan import Plan, PlanSettings, plan_test
 
 
+@checked
 @one_blas_thread()
 def plan(
-    source: Case | Model | DeckModels | str | Path,
+    source: Source,
     settings: PlanSettings | None = None,
     *,
     units: str | Units | None = None,
+    allow: Sequence[str] = (),
     progress: Progress = silent,
+    **words: Any,
 ) -> Plan:
     """Place sensors by effective independence and exchange; choose shaker, cords and lines.
 
     Parameters
     ----------
-    source : a model, a case, or the path of a deck or case
+    source : a model, a case, an Assembly, or the path of a deck or case
     settings : how many sensors, modes, shakers, ...; default 30 sensors
-    units : of a deck given by its path
+    units : of a deck given by its path; without it the system that its materials show, which a
+        note of the plan names
+    allow : cards of the deck at a path to leave out although they carry stiffness
+    words : fields of :class:`PlanSettings` by name, as ``sensors=20``
 
     Raises
     ------
-    FileError, ModelError
-        If there is no such file, the deck is wrong, or it has too few places for the sensors.
+    ArgumentError, FileError, LabelError, ModelError
+        If there is no such file or setting, the deck is wrong, several unit systems fit it, or it
+        has too few places for the sensors.
     """
-    model = as_model(source, "plan", units)
-    built, settings = model.structure, settings or PlanSettings()
-    found = plan_test(model.assembly, settings, built=built, unit=model.unit, progress=progress)
-    return replace(found, origin=model)
+    chosen = settings_of(PlanSettings, settings, words)
+    model, said = model_in_si(source, "plan", units, allow)
+    built, unit = model.structure, model.unit
+    found = plan_test(model.assembly, chosen, built=built, unit=unit, progress=progress)
+    return replace(found, origin=model, notes=(said,) if said else ())

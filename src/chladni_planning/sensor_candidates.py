@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chladni.errors import ModelError
 from chladni.geometry.facets import point_normals, tangents, unit, vector_areas
@@ -232,6 +231,8 @@ def _bend(
 
     That mean is 1 - nᵀ (Σ A n nᵀ) n / Σ A, independent of the orientation of the faces.
     """
+    from scipy.spatial import cKDTree
+
     a = vector_areas(seen.points, sheet)
     tensor = np.einsum("mi,mj->mij", a, unit(a))
     own = np.zeros((len(seen.points), 3, 3))
@@ -249,6 +250,8 @@ def _bend(
 
 def _off_edges(seen: Surface, points: np.ndarray, foot: float) -> np.ndarray:
     """True where no free edge, fold, part boundary, beam or solid joint is within a foot."""
+    from scipy.spatial import cKDTree
+
     edges = seen.outline(20.0)
     a, b = seen.points[edges[:, 0]], seen.points[edges[:, 1]]
     dense = np.concatenate([a + t * (b - a) for t in (0.0, 0.25, 0.5, 0.75, 1.0)])

@@ -5,9 +5,11 @@ The method is that of Echaniz Granado (2015), section 4.1.
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 
+from chladni.arguments import refuse_fields
 from chladni.dofs import label
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.modes import ModalModel, rigid_modes
@@ -73,6 +75,14 @@ class PlanSettings:
     spread: float = 0.1
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        refuse_fields(
+            self, sensors=(1, inf), modes=(1, inf), f_max=(0, inf), damping=(1e-6, inf),
+            candidates=(2, inf), spacing=(0, inf), alike=(0, 1), actuators=(1, inf),
+            force=(1e-9, inf), floor=(0, 1), mass=(0, inf), draws=(0, inf), spread=(0, inf),
+            seed=(0, inf),
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class Mount:
@@ -125,6 +135,7 @@ class Plan(Result):
     loaded : (r,)                 frequencies with the sensors' mass on [Hz]
     hangers : (k,) int            grids, the quietest first
     quiet : (k,)                  their rms motion over the first modes, of the largest anywhere
+    notes : the unit system, where it was guessed
     """
 
     settings: PlanSettings
@@ -150,6 +161,7 @@ class Plan(Result):
     loaded: np.ndarray
     hangers: np.ndarray
     quiet: np.ndarray
+    notes: tuple[str, ...] = ()
 
 
 def plan_test(
@@ -242,8 +254,7 @@ def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, 
     """Target modes, target modes plus some above, and the number of rigid modes before them."""
     due = settings.modes or min(24, 4 * settings.sensors // 5)
     n = len(built.system.dofs)
-    where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
-    modal = normal_modes(built.system, min(n, due + SPARE + 6), points=where)
+    modal = normal_modes(built.system, min(n, due + SPARE + 6))
     rigid = int(rigid_modes(modal).sum())
     above = modal.sel(slice(rigid, None)).with_damping(settings.damping)
     below = np.flatnonzero(

@@ -15,6 +15,7 @@ from chladni.errors import ChladniError, FileError, LabelError, ModelError, did_
 from chladni.fem.energy import mass_properties
 from chladni.geometry.formed_mesh import FormedMesh
 from chladni.geometry.thickness_mapping import Mapped
+from chladni.io.tables.csv_table import csv_text
 from chladni.model.assembly import Assembly
 from chladni.output import write_text
 from chladni.report.blocks import Facts, Picture
@@ -247,8 +248,12 @@ def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
 
 def _candidates(places: "SensorCandidates") -> str:
     rows = (
-        f"{g}:n,{f'{g},,,' if is_grid else ',{:.7g},{:.7g},{:.7g}'.format(*x)},"
-        f"{n[0]:.6f},{n[1]:.6f},{n[2]:.6f},output"
+        [
+            f"{g}:n",
+            *([g, "", "", ""] if is_grid else ["", *(f"{c:.7g}" for c in x)]),
+            *(f"{c:.6f}" for c in n),
+            "output",
+        ]
         for g, is_grid, x, n in zip(
             places.ids.tolist(),
             places.is_grid.tolist(),
@@ -257,4 +262,4 @@ def _candidates(places: "SensorCandidates") -> str:
             strict=True,
         )
     )
-    return "\n".join(["label,grid,x,y,z,nx,ny,nz,role", *rows, ""])
+    return csv_text([["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role"], *rows])

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from chladni.dofs import rows
 from chladni.dynamics.modes import ModalModel, rigid_modes
@@ -50,6 +49,8 @@ class FollowedModes:
         Close modes may mix.  A shape is assigned by its share in the space of a group
         (``subspace_mac``), and within the group by its own MAC.
         """
+        from scipy.optimize import linear_sum_assignment
+
         elastic = modal.sel(np.arange(len(modal)) >= self.rigid)
         psi = elastic.shapes[rows(self.dofs, elastic.dofs)]
         own, group = mac(self.shapes, psi), self.clusters

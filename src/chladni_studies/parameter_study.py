@@ -13,26 +13,29 @@ from typing import Any
 
 import numpy as np
 
+from chladni.arguments import checked, settings_of
 from chladni.arrays import fingerprint
-from chladni.case import Case, load_case
+from chladni.case import Case
 from chladni.case.free_parameters import fields_of
 from chladni.dynamics.modes import ModalModel, rigid_modes
 from chladni.errors import ChladniError, FileError, Interrupted
 from chladni.io.nastran import units_of
 from chladni.model.assembly import Assembly
-from chladni.output import own_version
+from chladni.output import own_version, run_folder
 from chladni.progress import Progress, remaining, silent
 from chladni.results import Result
+from chladni.units import Units
 from chladni.workflows.case_model import REACH
 from chladni.workflows.frf import refuse_unknown
-from chladni.workflows.loaded_model import DeckModels, Model, as_model, is_case, load_model
+from chladni.workflows.given_case import Source
+from chladni.workflows.loaded_model import Model, as_model, opened
 
 from .designs import Design, design
 from .followed_modes import MARGIN, followed
 from .sample import StudyModel, computed
 from .sensitivity import Sensitivity, sensitivity, worth_telling
 from .study_settings import StudySettings
-from .study_store import OWN, StudyStore, opened_store, row_of
+from .study_store import OWN, StudyStore, opened_store, row_of, write_samples
 from .variation import Variation, of_case, of_parts, refuse_impossible
 from .varied_effects import of_effect
 from .vary_text import VaryText, vary_text
@@ -106,28 +109,36 @@ class ParameterStudy(Result):
         )
 
 
+@checked
 def study(
-    source: Case | Model | DeckModels | str | Path,
-    vary: Sequence[str] = (),
+    source: Source,
+    vary: str | Sequence[str] = (),
     settings: StudySettings | None = None,
     *,
     out: Path | str | None = None,
     workers: int | None = 1,
     scheduler: Any = None,
+    units: str | Units | None = None,
+    allow: Sequence[str] = (),
     progress: Progress = silent,
+    **words: Any,
 ) -> ParameterStudy:
     """Sample parameters of a model, in local processes or on any Dask cluster.
 
     Parameters
     ----------
-    source : a model, a case, or the path of a case; of a deck ``chladni.load(deck, units)``
+    source : a model, a case, an Assembly, or the path of a deck or case
     vary : ranges as "t of inner=0.6:0.8", "E=90%:110%" or "point-mass at 412=0.01:0.2"; without
         any, the [[parameter]] of a case
-    out : folder of the store: a study that was begun there continues where it stopped
+    out : folder of the store, with ``samples.csv``: a study that was begun there continues where
+        it stopped
     workers : local processes (a script that uses more than one needs the usual
               ``if __name__ == "__main__":``); None: one per core, or only this one for a study too
               short to start others
     scheduler : address of a Dask scheduler, or a ``distributed.Client``, instead of processes
+    units : of a deck given by its path; without it numbers stay in the deck's own units
+    allow : cards of the deck at a path to leave out although they carry stiffness
+    words : fields of :class:`StudySettings` by name, as ``samples=50``
 
     Raises
     ------
@@ -139,14 +150,13 @@ def study(
     """
     if workers is not None:
         refuse_many(workers)
-    settings = settings or StudySettings()
-    if isinstance(source, str | Path):
-        source = load_case(source) if is_case(Path(source)) else load_model(source)
-    wanted = [vary_text(text) for text in vary]
-    if isinstance(source, Case) and any(wanted_one.name == "suspension" for wanted_one in wanted):
-        source = replace(source, given=tuple(g for g in source.given if g[1] != "hangers"))  # used
-    model = as_model(source, "study")
-    case = source if isinstance(source, Case) else None
+    settings = settings_of(StudySettings, settings, words)
+    wanted = [vary_text(text) for text in ([vary] if isinstance(vary, str) else vary)]
+    found = opened(source, units, allow)
+    if isinstance(found, Case) and any(wanted_one.name == "suspension" for wanted_one in wanted):
+        found = replace(found, given=tuple(g for g in found.given if g[1] != "hangers"))  # used
+    model = as_model(found, "study")
+    case = found if isinstance(found, Case) else None
     varied, notes = _varied(model, case, wanted)
     progress("the nominal model", 0.0)
     wanted_one = _study_model(model, case, varied, settings)
@@ -183,11 +193,15 @@ def study(
         if case is not None and case.recordings and not case.frfs:
             notes.append("The recording has no FRFs, so there is no Q.")
         notes += [*drawn.notes, *(store.notes if store else [])]
-    return ParameterStudy(
+    done = ParameterStudy(
         varied, settings, drawn, X, tuple(rows[k] for k in sorted(rows)),
         row_of(nominal, dict(zip(names, own.tolist(), strict=True))),
         None if out is None else Path(out), len(before), made, (*model.notes, *notes),
     )  # fmt: skip
+    if out is not None:
+        with run_folder(out, "study", adds=True) as part:
+            write_samples(part / "samples.csv", done.table())
+    return done
 
 
 def _varied(
@@ -216,13 +230,7 @@ def _varied(
 
 
 def _refuse_taken(names: Sequence[str], columns: Collection[str]) -> None:
-    """Refuse parameters with the name of a result.
-
-    Raises
-    ------
-    FileError
-        If a parameter has the name of a column of the table.
-    """
+    """Refuse parameters with the name of a column of the table, by FileError."""
     for name in names:
         if name in {*columns, *OWN, *RESERVED}:
             raise FileError(f"a parameter cannot be called {name!r}, as a column of the table is")

@@ -6,7 +6,6 @@ from typing import Annotated, cast
 
 import typer
 
-from chladni.case import Case, load_case
 from chladni.cli.console import say, watched
 from chladni.cli.run import (
     MOST_LINES,
@@ -26,10 +25,11 @@ from chladni.dynamics.frf import Quantity
 from chladni.errors import AccuracyError, FileError
 from chladni.progress import Progress
 from chladni.report.result_json import to_json
-from chladni.workflows.loaded_model import DeckModels, is_case, load_deck, similar_names
+from chladni.workflows.loaded_model import is_case
 
 from .parameter_study import ParameterStudy, study
 from .study_settings import StudySettings
+from .study_store import write_samples
 from .workers import NO_WORKER
 
 
@@ -86,30 +86,23 @@ def run(
     if frf and not (input or is_case(source)):
         raise FileError("--frf needs --input and --output, or a case with FRFs")
     place = place_of("study", source, out)
-    model = _source(source, units, allow or [])
     with watched() as stage:
         progress = stage if sys.stderr.isatty() else _both(stage, _tenths())
         found = study(
-            model, vary or (), settings, out=place, workers=workers, scheduler=scheduler,
-            progress=progress,
+            source, vary or (), settings, out=place, workers=workers, scheduler=scheduler,
+            units=units, allow=allow or (), progress=progress,
         )  # fmt: skip
     _written(source, place, found)
-
-
-def _source(source: Path, units: str | None, allow: list[str]) -> Case | DeckModels:
-    if not source.exists():
-        raise FileError(f"no file or folder {source}{similar_names(source)}")
-    return load_case(source) if is_case(source) else load_deck(source, units, allow)
 
 
 def _written(source: Path, place: Path, found: ParameterStudy) -> None:
     """Write the page, the tables and study.json next to the samples."""
     from .study_page import study_page
-    from .study_tables import write_csv, write_netcdf
+    from .study_tables import write_netcdf
 
     with started("study", source, place) as job:
         job.json("study.json", to_json(found))
-        write_csv(job.keep("samples.csv", "one line per sample"), found)
+        write_samples(job.keep("samples.csv", "one line per sample"), found.table())
         job.notes += write_netcdf(job.keep("study.nc", "all results, for xarray"), found)
         job.files.append(("samples.jsonl", "the samples in the order they finished"))
         job.progress("pictures", 0.5)

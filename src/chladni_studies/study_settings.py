@@ -1,8 +1,10 @@
 """Settings of a parameter study: number of samples, sampler, and the results of each sample."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal, get_args
 
+from chladni.arguments import refuse_fields
 from chladni.dynamics.frf import UNIT, Quantity
 from chladni.errors import LabelError
 
@@ -42,17 +44,13 @@ class StudySettings:
     keep_frf: bool = False
 
     def __post_init__(self) -> None:
+        refuse_fields(
+            self, samples=(1, MOST_SAMPLES), modes=(1, 10_000), lines=(2, 1_000_000),
+            seed=(0, 2**32 - 1), damping=(0, inf),
+        )  # fmt: skip
         if self.sampler not in SAMPLERS:
             raise LabelError(f"no sampler {self.sampler!r}; there are {', '.join(SAMPLERS)}")
         if self.quantity not in UNIT:
             raise LabelError(f"no quantity {self.quantity!r}; there are {', '.join(UNIT)}")
-        for name, least, most in (
-            ("samples", 1, MOST_SAMPLES), ("modes", 1, 10_000), ("lines", 2, 1_000_000),
-            ("seed", 0, 2**32 - 1),
-        ):  # fmt: skip
-            if not least <= getattr(self, name) <= most:
-                raise LabelError(
-                    f"{name} = {getattr(self, name)} is not between {least} and {most}"
-                )
         if bool(self.outputs) != bool(self.inputs):
             raise LabelError("responses need both ends: at least one output and one input")

@@ -10,8 +10,6 @@ machines and no shared memory (as SQLite's write-ahead log does). It works on th
 systems of clusters without a file per sample, and can be read while it grows.
 """
 
-import csv
-import io
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -23,7 +21,9 @@ from typing import IO, Any
 import numpy as np
 
 from chladni.errors import FileError
-from chladni.output import lock, make_folder, plain, write_json, write_npz, write_text
+from chladni.io.tables.csv_table import csv_text
+from chladni.output import lock, make_folder, plain, write_arrays, write_json, write_text
+from chladni.own_folder import OwnFolder, own_folder
 
 from .sample import SampleResult
 
@@ -52,17 +52,18 @@ class StudyStore:
     folder: Path
     rows: dict[int, dict[str, Any]]
     file: IO[bytes]
+    held: OwnFolder
     notes: list[str] = field(default_factory=list)
 
     def keep(self, result: SampleResult, values: Mapping[str, float]) -> dict[str, Any]:
         """Write a finished sample; it is safe from a kill when this returns."""
         if result.frf is not None:
             frf = result.frf
-            write_npz(
-                self.frf_path(result.number), values=frf.values, frequency_hz=frf.frequency,
-                outputs=np.array(frf.outputs), inputs=np.array(frf.inputs),
-                quantity=np.array(frf.quantity),
+            arrays = dict(
+                values=frf.values, frequency_hz=frf.frequency, outputs=np.array(frf.outputs),
+                inputs=np.array(frf.inputs), quantity=np.array(frf.quantity),
             )  # fmt: skip
+            write_arrays(self.frf_path(result.number), arrays, self.held)
         row = row_of(result, values)
         line = json.dumps(row, ensure_ascii=False, allow_nan=False) + "\n"
         self.file.write(line.encode())
@@ -74,6 +75,14 @@ class StudyStore:
     def frf_path(self, number: int) -> Path:
         """Path of the whole response of a sample."""
         return self.folder / FRFS / f"{number:06d}.npz"
+
+
+def write_samples(path: Path, table: Mapping[str, list[Any]]) -> Path:
+    """Write one line per sample, as ``pandas.read_csv`` reads it; missing values are empty."""
+    rows = (
+        ["" if v is None else v for v in plain(row)] for row in zip(*table.values(), strict=True)
+    )
+    return write_text(path, csv_text([table, *rows]))
 
 
 def row_of(result: SampleResult, values: Mapping[str, float]) -> dict[str, Any]:
@@ -104,9 +113,9 @@ def opened_store(
     begun = folder / BEGUN
     if not begun.exists() and any(p.name != LOCK for p in folder.iterdir()):
         raise FileError(f"{folder} has files that are not a study; give an empty or a new folder")
-    with open(folder / LOCK, "a+b") as held:
+    with own_folder(folder) as held, held.open(LOCK, "a+b") as locking:
         notes = []
-        if not lock(held.fileno(), folder):
+        if not lock(locking.fileno(), folder):
             notes = [f"The file system of {folder} has no locks: start no second process there."]
         if begun.exists():
             _refuse_another(begun, identity)
@@ -114,18 +123,14 @@ def opened_store(
             write_text(folder / DESIGN, design_text(names, X))
             write_json(begun, {"identity": identity, **made})
         rows, good = finished(folder / ROWS, len(X))
-        with open(folder / ROWS, "ab") as file:
+        with held.open(ROWS, "ab") as file:
             file.truncate(good)
-            yield StudyStore(folder, rows, file, notes)
+            yield StudyStore(folder, rows, file, held, notes)
 
 
 def design_text(names: list[str], X: np.ndarray) -> str:
     """The design as CSV, with all digits of every number."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["sample", *names])
-    writer.writerows([k, *map(repr, x)] for k, x in enumerate(X.tolist()))
-    return text.getvalue()
+    return csv_text([["sample", *names], *([k, *x] for k, x in enumerate(X.tolist()))])
 
 
 def _refuse_another(begun: Path, identity: dict[str, Any]) -> None:

@@ -1,32 +1,17 @@
-"""Tables of a study for other programs: CSV for pandas, NetCDF for xarray."""
+"""NetCDF file of a study, for xarray."""
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from chladni.dynamics.frf import UNIT
-from chladni.output import atomic, plain, write_text
+from chladni.output import atomic
 
 from .parameter_study import ParameterStudy
 from .study_store import FRFS
 
 LARGEST = 1_500_000_000  # bytes of whole responses; beyond it they stay in files of their own
-
-
-def write_csv(path: Path, found: ParameterStudy) -> Path:
-    """Write one line per sample; missing values are empty.
-
-    ``pandas.read_csv("samples.csv")`` reads it.
-    """
-    table, text = found.table(), io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table)
-    for row in zip(*table.values(), strict=True):
-        writer.writerow(["" if v is None else v for v in plain(row)])
-    return write_text(path, text.getvalue())
 
 
 def write_netcdf(path: Path, found: ParameterStudy) -> list[str]:

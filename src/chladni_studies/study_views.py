@@ -8,11 +8,11 @@ from chladni.report.result_views import Paged
 from chladni.results import show_by
 
 from .parameter_study import ParameterStudy
-from .study_tables import write_csv
+from .study_store import write_samples
 
 
 def _tables(found: ParameterStudy, folder: Path) -> Sequence[tuple[str, str]]:
-    write_csv(folder / "samples.csv", found)
+    write_samples(folder / "samples.csv", found.table())
     return [("samples.csv", "one line per sample")]
 
 

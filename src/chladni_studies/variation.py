@@ -10,7 +10,15 @@ import numpy as np
 from chladni.case.free_parameters import free_parameter
 from chladni.case.schema import FIELDS
 from chladni.case.toml_sections import TomlSection
-from chladni.effects.user_parameters import SD, SD_OTHERS, UNITS, values_of, with_factor
+from chladni.effects.user_parameters import (
+    FARTHEST,
+    SD,
+    SD_OTHERS,
+    UNITS,
+    values_of,
+    why_implausible,
+    with_factor,
+)
 from chladni.errors import FileError
 from chladni.io.nastran import Deck
 from chladni.model.assembly import Assembly
@@ -21,7 +29,6 @@ from .vary_text import VaryText
 
 _SAME = 1e-9
 _REACH = {"E": 1e7, "K": 1e9, "M": 1e6}  # in the logarithm: joints are unknown by decades
-FARTHEST = 20.0  # largest factor from the deck's own value, up or down
 _SDS = 2.0  # prior standard deviations to either side, where a case gives no bounds
 
 
@@ -174,11 +181,10 @@ def _range(request: VaryText, nominal: float, scale: float) -> tuple[float, floa
     low, high = request.ends(scale, nominal)
     reach = _REACH.get(request.name, FARTHEST) if request.log else FARTHEST
     for value in (low, high):
-        if not 1 / reach <= value / nominal <= reach:
+        if why := why_implausible("", value, nominal, reach, scale):
             raise request.refused(
-                f"{value / scale:g} is {value / nominal:.3g} times the deck's own "
-                f"{nominal / scale:g}; plain numbers are in the deck's units, a share of its "
-                "value is written 90%:110%"
+                f"{why}; plain numbers are in the deck's units, a share of its value is written "
+                "90%:110%"
                 + ("" if request.log or request.name not in _REACH else ", decades 1e2:1e6:log")
             )
     return low, high
@@ -188,11 +194,9 @@ def refuse_impossible(chosen: Sequence[Variation], assembly: Assembly) -> None:
     """Refuse two ranges for one number, and Poisson's ratios of 1/2 or more, by FileError."""
     for k, a in enumerate(chosen):
         if a.free.field == "nu":
-            most = float(values_of(assembly, a.free).max()) * a.high / a.nominal
-            if most >= 0.5:
-                raise FileError(
-                    f"{a.name!r} would reach {most:.3g}, but materials have less than 0.5"
-                )
+            own = float(values_of(assembly, a.free).max())
+            if why := why_implausible("nu", own * a.high / a.nominal, own):
+                raise FileError(f"{a.name!r}: {why}")
         for b in chosen[:k]:
             shared = any(
                 set(getattr(a.free, name)) & set(getattr(b.free, name))

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.arrays import real_number
 from chladni.case.schema import FIELDS
 from chladni.effects.registry import names
 from chladni.errors import FileError
 
 _FORM = re.compile(
-    r"\s*(?P<name>[A-Za-z][\w-]*)(?:\s+of\s+(?P<parts>.+?)|\s+at\s+(?P<grid>\d+))?"
+    r"\s*(?P<name>[A-Za-z][\w-]*)(?:\s+of\s+(?P<parts>.+?)|\s+at\s+(?P<grid>[0-9]+))?"
     r"\s*=(?P<span>[^=]*)"
 )
 
@@ -76,7 +77,9 @@ class VaryText:
 
     def _number(self, piece: str, scale: float, nominal: float) -> float:
         try:
-            return float(piece[:-1]) / 100 * nominal if piece[-1:] == "%" else float(piece) * scale
+            share = piece[-1:] == "%"
+            number = real_number(piece[:-1] if share else piece)
+            return number / 100 * nominal if share else number * scale
         except ValueError:
             raise _no_range(self.text) from None
 

@@ -11,17 +11,17 @@ import numpy as np
 from chladni.errors import FileError
 from chladni.parallel import cores
 
-from .local_workers import ENDED, local_results
 from .sample import SampleResult, StudyModel, computed
 from .worker_memory import keep_freed_memory
 
 PATIENCE = 15  # seconds a scheduler may take to answer
 MOST_PER_CORE = 4  # local processes a core
 WORTH = 10.0  # seconds in one process above which others are started
+ENDED = "its worker ended without a message in every attempt; there may be too little memory"
 NO_WORKER = "the scheduler has no worker yet; waiting until one joins it"
 ALONE = 3.0  # seconds without a sample after which the cluster is checked for workers
 _AHEAD = 2  # samples per thread that are on the cluster at a time
-_GLANCE = 0.005  # seconds between two checks for a finished sample
+_GLANCE = 0.05  # seconds between two checks for a finished sample
 _COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, are counted again
 
 
@@ -63,14 +63,38 @@ def results(
     """
     if not todo:
         return
-    if scheduler is None and workers == 1:
-        for k in todo:
-            yield computed(study, k, X[k])
-        return
     if scheduler is not None:
         yield from _distributed(scheduler, study, X, todo, report)
-        return
-    yield from local_results(study, X, todo, workers)
+    elif workers > 1:
+        with _local_cluster(workers) as client:
+            yield from _distributed(client, study, X, todo, report)
+    else:
+        keep_freed_memory()
+        yield from (computed(study, k, X[k]) for k in todo)
+
+
+@contextmanager
+def _local_cluster(workers: int) -> Iterator[Any]:
+    """A client of processes of this machine, one thread each; one that ends is started again.
+
+    Raises
+    ------
+    FileError
+        If workers end in their start again and again.
+    """
+    from distributed import Client, LocalCluster
+
+    options = {"threads_per_worker": 1, "memory_limit": None, "dashboard_address": None}
+    with _quiet("distributed", "distributed.nanny", "distributed.scheduler", "distributed.worker"):
+        try:
+            cluster = LocalCluster(workers, silence_logs=logging.CRITICAL, **options)
+        except (OSError, RuntimeError, TimeoutError) as error:
+            raise FileError(
+                f"{workers} local workers could not be started; --workers 1 needs none, and a "
+                'script with more workers needs if __name__ == "__main__":'
+            ) from error
+        with cluster, Client(cluster) as client:
+            yield client
 
 
 @contextmanager
@@ -132,14 +156,18 @@ def _distributed(
     """Compute few samples at a time, so that a lost worker or a kill costs only these.
 
     The model is a task of its own: the scheduler repeats it where the worker that held it dies.
+    A worker that ends is counted against every sample it had; the suspects are tried one by one.
     """
     from distributed import as_completed
 
     held = client.submit(_itself, study, pure=False)
     running: dict[Any, int] = {}
     waiting = list(reversed(todo))
+    suspects: list[int] = []
     ready, counted, ahead = as_completed(), -np.inf, 1
-    while waiting or running:
+    while waiting or running or suspects:
+        if not waiting and not running:
+            waiting, counted, ahead = [suspects.pop()], np.inf, 1
         if time.monotonic() - counted > _COUNTED:
             counted = time.monotonic()
             ahead = _AHEAD * _threads(client)
@@ -150,7 +178,12 @@ def _distributed(
             ready.add(future)
         _wait(ready, client, report)
         future = next(ready)
-        yield _result(future, running.pop(future))
+        k = running.pop(future)
+        found = _result(future, k)
+        if found.why == ENDED and ahead > 1:
+            suspects.append(k)
+        else:
+            yield found
 
 
 def _wait(ready: Any, client: Any, report: Callable[[str], None]) -> None:

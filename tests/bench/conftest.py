@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.builders.quick_runs import coarse_pictures
+from tests.builders.quick_runs import unrendered_pictures
 
 from chladni_bench.accelerometers import AccelerometerType
 from chladni_bench.bench_article import BenchArticle
@@ -14,8 +14,8 @@ R = 16  # modes, six of them rigid
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _coarse_pictures():
-    with coarse_pictures():
+def _unrendered_pictures():
+    with unrendered_pictures():
         yield
 
 

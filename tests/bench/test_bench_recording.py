@@ -156,6 +156,7 @@ def test_a_converter_of_b_bits_leaves_a_twelfth_of_its_step_squared():
     """Widrow: rounding of a busy signal is uniform noise of variance Δ²/12."""
     front = FrontEnd(volts=1.0, bits=10, noise=0.0)
     x = np.random.default_rng(0).normal(size=(2, 200_000)) / 8
+    assert front.step == 2.0 / 2**10
     y, over = digitised(x, np.zeros(2), 1.0, front, rng())
     assert ((y - x) ** 2).mean() == pytest.approx(front.step**2 / 12, rel=0.02)
     assert not over.any()

@@ -50,10 +50,11 @@ def record(path, t=T, mass=0.0, shakers=SHAKERS[:1], seed=0):
     return round(chladni.modes(model, 7).mass, 5)
 
 
-def a_case(folder, mass, *recordings):
-    """A case.toml with these [[recording]]."""
+def a_case(folder, mass, *recordings, tried=()):
+    """A case.toml with these [[recording]] and, if any are given, effects that are tried."""
     write_assembly(DECK, folder / "plate.bdf")
     more = ["[[recording]]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in r.items())
             for r in recordings]  # fmt: skip
-    (folder / "case.toml").write_text(HEAD.format(mass=mass) + "\n".join(more) + "\n")
+    search = f"[search]\neffects = {list(tried)}\n" if tried else ""
+    (folder / "case.toml").write_text("\n".join([HEAD.format(mass=mass) + search, *more, ""]))
     return chladni.load_case(folder)

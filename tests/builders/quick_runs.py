@@ -1,20 +1,23 @@
 """What commands and workflows spend most time on, made short where a test is not about it."""
 
+import hashlib
 import pickle
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import Identified, identify
 from chladni.progress import Progress, silent
 from chladni.search.calibration import CalibrationSettings
-from chladni.view import canvas
+from chladni.view import canvas, paper
 from chladni.view.camera import Camera
 from chladni.view.surface import Surface
 
@@ -29,6 +32,7 @@ CALLERS = (  # names under which modules hold the function that identifies
     "chladni.workflows.screening_of_case.identify",
 )
 _KNOWN: dict[bytes, Identified] = {}
+_PHOTO, _SAVE, _WORDS = canvas._photo, Figure.savefig, paper._no_formulas
 
 
 @contextmanager
@@ -59,17 +63,67 @@ def few_starts() -> Iterator[None]:
 
 
 @contextmanager
+def quick_runs() -> Iterator[None]:
+    """What the tests of commands and workflows need: their words, numbers and files."""
+    with unrendered_pictures(), identified_once(), few_starts():
+        yield
+
+
+@contextmanager
 def coarse_pictures() -> Iterator[None]:
-    """Pictures of a quarter of the pixels each way: they are most of the work of a command."""
-    photo, save = canvas._photo, Figure.savefig
+    """Pictures of a quarter of the pixels each way, for tests that look at them."""
 
     def coarse(seen: Surface, camera: Camera, paint: canvas.Paint, width: int) -> np.ndarray:
-        return photo(seen, camera, paint, width // 4)
+        return _PHOTO(seen, camera, paint, width // 4)
 
     def small(self: Figure, path: Any, **look: Any) -> None:
-        save(self, path, **{**look, "dpi": 40})
+        _SAVE(self, path, **{**look, "dpi": 40})
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(canvas, "_photo", coarse)
         patch.setattr(Figure, "savefig", small)
+        patch.setattr(paper, "_no_formulas", _WORDS)
         yield
+
+
+@contextmanager
+def unrendered_pictures() -> Iterator[None]:
+    """Figures are made as always; of each, the file has one colour, which follows its content.
+
+    To render them is most of the work of a command. Equal content gives equal bytes.
+    """
+
+    def photo(seen: Surface, camera: Camera, paint: canvas.Paint, width: int) -> np.ndarray:
+        colour = _colour(seen.points, seen.faces, paint.values, paint.limits, camera.toward)
+        return np.full((8, 8, 4), (*colour, 255), np.uint8)
+
+    def plain(self: Figure, path: Any, **look: Any) -> None:
+        if Path(path).suffix != ".png":
+            _SAVE(self, path, **look)
+            return
+        size = tuple(int(40 * inches) for inches in self.get_size_inches())
+        Image.new("RGB", size, _colour(*_content(self))).save(path)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(canvas, "_photo", photo)
+        patch.setattr(Figure, "savefig", plain)
+        patch.setattr(paper, "_no_formulas", lambda figure: None)
+        yield
+
+
+def _content(figure: Figure) -> Iterator[Any]:
+    """What the axes of a figure show: lines, images, points, words."""
+    for ax in figure.axes:
+        yield from (ax.get_title(), ax.get_xlabel(), ax.get_ylabel(), ax.get_xlim(), ax.get_ylim())
+        yield from (line.get_xydata() for line in ax.lines)
+        yield from (image.get_array() for image in ax.images)
+        yield from (points.get_offsets() for points in ax.collections)
+        yield from (text.get_text() for text in ax.texts)
+
+
+def _colour(*content: Any) -> tuple[int, int, int]:
+    digest = hashlib.sha256()
+    for one in content:
+        digest.update(repr(one).encode() if isinstance(one, str) else np.asarray(one).tobytes())
+    red, green, blue = digest.digest()[:3]
+    return red, green, blue

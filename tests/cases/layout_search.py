@@ -17,7 +17,6 @@ def search(deck: str) -> dict[str, float]:
         "random": agents.at_random(seed=1),
         "effective independence": agents.efi,
         "exchange": agents.exchange(env),
-        "annealing": agents.annealing(env),
     }
     return {name: agents.play(env, agent)["log_det"] for name, agent in players.items()}
 

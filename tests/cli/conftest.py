@@ -1,10 +1,10 @@
-"""Commands draw coarsely and identify a recording once: tests read their words and numbers."""
+"""Commands render no pictures and identify a recording once: tests read words and numbers."""
 
 import pytest
-from tests.builders.quick_runs import coarse_pictures, identified_once
+from tests.builders.quick_runs import quick_runs
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _quick():
-    with coarse_pictures(), identified_once():
+    with quick_runs():
         yield

@@ -263,6 +263,7 @@ def test_a_library_that_makes_an_error_of_the_interruption_is_no_fault(number, o
     assert capsys.readouterr().err == "chladni: interrupted; no file was written\n"
 
 
+PLAIN = {**os.environ, "CHLADNI_GRAPHICS": "matplotlib"}
 MAIN = [sys.executable, "-m", "chladni"]
 
 
@@ -271,7 +272,7 @@ def test_who_reads_may_leave(deck, tmp_path):
     read, write = os.pipe()
     os.close(read)
     words = [*MAIN, "modes", str(deck), "--out", str(tmp_path / "out")]
-    done = subprocess.run(words, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(words, stdout=write, stderr=subprocess.PIPE, text=True, env=PLAIN)
     os.close(write)
     assert (done.returncode, spoken(done.stderr)) == (0, [])
     assert (tmp_path / "out" / "modes.json").exists()
@@ -288,7 +289,7 @@ def test_a_full_disk_is_a_sentence_and_the_earlier_results_stay(deck, tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
 
     words = [*MAIN, "modes", str(deck), "--count", "1", "--out", str(out)]
-    done = subprocess.run(words, capture_output=True, text=True, preexec_fn=small, check=False)
+    done = subprocess.run(words, capture_output=True, text=True, preexec_fn=small, env=PLAIN)
     assert done.returncode == 2, done.stderr
     (said,) = spoken(done.stderr)
     assert said.startswith("chladni: ")

@@ -141,13 +141,6 @@ def test_backends_agree(shell_box, backend):
     np.testing.assert_allclose(a.frequency[6:], b.frequency[6:], rtol=1e-8)
 
 
-def test_points_change_the_work_only(shell_box):
-    structure_ = box(0.3, 0.2, 0.1, h=0.025)
-    points = structure_.points[np.searchsorted(structure_.ids, shell_box.dofs[:, 0])]
-    a, b = normal_modes(shell_box, 15), normal_modes(shell_box, 15, points=points)
-    np.testing.assert_allclose(a.frequency[6:], b.frequency[6:], rtol=1e-9)
-
-
 def forgetful(times):
     """block_lanczos that loses the fourth mode for so many calls."""
     left = [times]

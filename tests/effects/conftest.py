@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from chladni.effects import registry
 from chladni.effects.family import Family
 from chladni.reduced.reduced_problem import reduced_problem
+from chladni_evidence.effect_ground import GROUNDS
 from chladni_specimens import jointed_plates, tied_plates
 
 
@@ -84,6 +86,12 @@ def example_family(request, tmp_path_factory):
 
 
 JOINTED_TOP = 300.0  # Hz; six flexible modes of the two plates lie below
+
+
+@pytest.fixture(scope="session")
+def grounds():
+    """The structures on which families are tried, by name, each prepared once."""
+    return cache(lambda name: GROUNDS[name]())
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,6 @@ from chladni.io.nastran import write_assembly
 from chladni.model.point_masses import with_masses
 from chladni.model.properties import BeamSection
 from chladni_evidence.effect_check import PROPOSES, RULES, checked_rules
-from chladni_evidence.effect_ground import GROUNDS
 from chladni_specimens import STEEL, folded_panel
 
 from .conftest import example
@@ -31,8 +30,8 @@ def stringer(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def on_plate():
-    return GROUNDS["plate"]()
+def on_plate(grounds):
+    return grounds("plate")
 
 
 def broken(family, **methods):

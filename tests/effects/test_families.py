@@ -1,7 +1,6 @@
 """What every family promises, ours and those of packages: physics, candidates, bench and deck."""
 
 import pickle
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.point_mass import PointMass
 from chladni.reduced.reduced_model import evaluate
 from chladni_evidence.effect_check import RULES
-from chladni_evidence.effect_ground import GROUNDS, usual_grounds
+from chladni_evidence.effect_ground import usual_grounds
 from chladni_evidence.family_rules import tried
 
 FLEXIBLE = slice(6, 12)
@@ -25,12 +24,6 @@ CONTRACT = {  # names that issue texts, cases and other programs may use
     *("point-mass", "mass-patch", "sensor-mass", "local-resonator", "suspension"),
     *("shaker-restraint", "extra-support", "compliant-support", "sensor-fault", "crack"),
 }
-
-
-@pytest.fixture(scope="module")
-def grounds():
-    """The structures on which families are tried, each prepared once."""
-    return cache(lambda name: GROUNDS[name]())
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from chladni.dynamics.frf import FRF
 from chladni.ema.chain_checks import fitted_delay, level_checks, modal_gains
 from chladni.ema.channel_checks import channel_checks
-from chladni.ema.identification import identify
+from chladni.ema.identification import Identified, identify
 from chladni.ema.recording_screening import screened, strong_modes
 from chladni.ema.setup import Recording
 from chladni.ema.shape_faults import ModelShapes, shape_faults
@@ -146,8 +146,8 @@ def test_the_fit_of_a_delay_is_modulo_pi() -> None:
     assert fitted_delay(omega, np.full(len(omega), np.pi / 2)).quarter == 1
 
 
-def gains(frf: FRF) -> tuple:
-    found = strong_modes(identify(frf))
+def gains(frf: FRF, known: Identified | None = None) -> tuple:
+    found = strong_modes(known or identify(frf))
     return found, *modal_gains(found, PHI, PHI[:1], 1.07 * MODES)
 
 
@@ -167,15 +167,17 @@ def test_wrong_units_are_named_with_the_factor_that_mends_them(factor: float) ->
     assert level_checks(*gains(wrong), known_gain=False, outputs=N)[0] == []
 
 
-@pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize("quantity", ["receptance", "mobility"])
-def test_a_wrong_quantity_is_named(quantity: str, known: bool) -> None:
+def test_a_wrong_quantity_is_named(quantity: str) -> None:
+    """Whether the gain is known or not."""
     wrong = replace(recording().to(quantity), quantity="accelerance")  # type: ignore[arg-type]
-    found = [f for f in screened(Recording("a", wrong), identify(wrong)).findings]
-    more, _ = level_checks(*gains(wrong), known_gain=known, outputs=N)
-    named = [f for f in (*found, *more) if f.kind == "wrong quantity"]
-    assert named
-    assert f'quantity = "{quantity}"' in " ".join(f.repair for f in named)
+    modes = identify(wrong)
+    found = [f for f in screened(Recording("a", wrong), modes).findings]
+    for known in (True, False):
+        more, _ = level_checks(*gains(wrong, modes), known_gain=known, outputs=N)
+        named = [f for f in (*found, *more) if f.kind == "wrong quantity"]
+        assert named
+        assert f'quantity = "{quantity}"' in " ".join(f.repair for f in named)
 
 
 def test_a_reversed_force_turns_every_mode() -> None:

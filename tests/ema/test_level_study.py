@@ -309,7 +309,7 @@ def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control, kin
     errors are 1.2 times what is stated.
     """
     held, scores = [], []
-    for seed in range(585, 590):
+    for seed in range(585, 588):
         known = structure(seed, 6, 5)
         levels = [
             AtLevel(x, frf, identify(frf), control)
@@ -328,7 +328,7 @@ def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control, kin
                 scores += [(row.frequency_hz - f) / row.frequency_sd_hz,
                            (row.damping - zeta[k]) / row.damping_sd]  # fmt: skip
                 assert 0 < row.damping_low < row.damping < row.damping_high
-    assert len(held) > 200
+    assert len(held) > 120
     assert np.mean(held) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / len(held))
     assert np.sqrt(np.mean(np.square(scores))) < 1 + 3 / np.sqrt(2 * len(scores))
 

@@ -82,7 +82,7 @@ def test_score_is_the_change_of_log_det():
 
 
 def test_agents_rank_as_the_methods_do():
-    """Random < EFI <= exchange; annealing and the genetic search beat random."""
+    """Random < EFI <= exchange; the genetic search beats random."""
     env = gym.make(SENSORS, phi=random_shapes(40, 5), n_sensors=8)
     score = {
         name: agents.play(env, agent)["score"]
@@ -90,12 +90,10 @@ def test_agents_rank_as_the_methods_do():
             "random": agents.at_random(0),
             "efi": agents.efi,
             "exchange": agents.exchange(env),
-            "annealing": agents.annealing(env, steps=1500),
             "genetic": agents.genetic(env, generations=20),
         }.items()
     }
     assert score["random"] < score["efi"] <= score["exchange"]
-    assert score["annealing"] >= score["efi"] - 0.2
     assert score["random"] < score["genetic"] <= score["exchange"] + 0.1
 
 
@@ -251,5 +249,5 @@ def test_withheld_candidates_are_not_in_the_layout():
 def test_exchange_is_what_the_core_finds():
     env = gym.make(SENSORS, phi=random_shapes(), n_sensors=9)
     end = agents.play(env, agents.exchange(env))
-    core = best_layout(random_shapes(), 9, pairs=True)
+    core = best_layout(random_shapes(), 9, starts=10)
     np.testing.assert_array_equal(np.flatnonzero(end["kept"]), core)

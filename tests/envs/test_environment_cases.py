@@ -15,6 +15,7 @@ from chladni.errors import ChladniError, ShapeError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.workflows.working_model import load
 from chladni_envs import IDS, agents
 from chladni_envs import environment_cases as cases
 from chladni_envs.parameter_selection import ParameterSelectionEnv
@@ -153,6 +154,32 @@ def test_a_bare_deck_takes_its_units(case, tmp_path):
     for id in (i for i in IDS if "Placement" in i):
         with pytest.raises(ChladniError, match="mm-t-s"):
             gym.make(f"chladni_envs:{id}", case=str(deck), units="mm")
+
+
+@pytest.mark.parametrize("id", [i for i in IDS if "Placement" in i])
+def test_a_bare_deck_shows_its_units(tmp_path, id):
+    """Steel in millimetres and tonnes: places are in metres, and a note names the system."""
+    deck = write_assembly(folded_panel(), tmp_path / "panel.bdf", "mm-t-s")
+    shown, said = (
+        gym.make(f"chladni_envs:{id}", case=case, modes=4, **units).unwrapped
+        for case, units in ((str(deck), {}), (deck, {"units": "mm-t-s"}))
+    )
+    assert shown.notes[0].startswith("units = mm-t-s: ")
+    assert said.notes == ()
+    assert shown.reset(seed=0)[1]["notes"] == shown.notes[0]
+    assert "notes" not in said.reset(seed=0)[1]
+    np.testing.assert_array_equal(shown.action_masks(), said.action_masks())
+    structure = gym.make(f"chladni_envs:{id}", case=folded_panel(), modes=4)
+    assert structure.action_space.n > 0
+
+
+@pytest.mark.parametrize("id", [i for i in IDS if "Placement" not in i])
+@pytest.mark.parametrize("form", ["deck", "model", "nowhere"])
+def test_an_environment_of_recordings_refuses_what_has_none(tmp_path, id, form):
+    deck = write_assembly(folded_panel(), tmp_path / "panel.bdf", "mm-t-s")
+    given = {"deck": str(deck), "model": load(deck, "mm-t-s"), "nowhere": str(tmp_path / "no")}
+    with pytest.raises(ChladniError, match=r"holds no recording|no file or folder"):
+        gym.make(f"chladni_envs:{id}", case=given[form])
 
 
 @pytest.fixture(scope="module")

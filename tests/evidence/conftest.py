@@ -1,7 +1,7 @@
 """What every case of the evidence was called, in one table at the end of the run."""
 
 import pytest
-from tests.builders.quick_runs import coarse_pictures
+from tests.builders.quick_runs import quick_runs
 
 from chladni.report.diagnosis_json import diagnosis_json
 from chladni_evidence.blind_diagnosis import Answer
@@ -16,8 +16,8 @@ UNKNOWN = {  # of articles others made
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _coarse_pictures():
-    with coarse_pictures():
+def _quick():
+    with quick_runs():
         yield
 
 

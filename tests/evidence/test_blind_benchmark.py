@@ -68,6 +68,49 @@ def calls(monkeypatch):
     return asked
 
 
+@pytest.mark.parametrize(
+    "name", ["answers", "answers/case-1.diagnose", "answers/case-1.diagnose.log"]
+)
+def test_no_link_leads_answers_out_of_the_folder(tmp_path, calls, name):
+    """Remains of a killed run are removed in the folder alone."""
+    place, mine = sealed(tmp_path / "out"), tmp_path / "mine"
+    (mine / "case-1.diagnose").mkdir(parents=True)
+    (mine / "case-1.diagnose" / "precious").write_text("mine")
+    link = tmp_path / "out" / name
+    link.parent.mkdir(exist_ok=True)
+    link.symlink_to(mine)
+    if name == "answers":
+        with pytest.raises(FileError, match="is a link or no folder"):
+            run(place.out, 1, str)
+    else:
+        run(place.out, 1, str)
+        assert not link.is_symlink()
+    assert [p.name for p in mine.rglob("*")] == ["case-1.diagnose", "precious"]
+
+
+@pytest.mark.parametrize("name", ["cases", "sealed", "cases/case-1"])
+def test_no_link_leads_cases_out_of_the_folder(tmp_path, monkeypatch, name):
+    mine, out = tmp_path / "mine", tmp_path / "out"
+    (mine / "case-1").mkdir(parents=True)
+    (mine / "case-1" / "precious").write_text("mine")
+
+    def write_case(made, folder, truth):
+        folder.mkdir(parents=True)
+        truth.write_text("{}")
+
+    monkeypatch.setattr(blind_make, "made_of", lambda order, cache: None)
+    monkeypatch.setattr(blind_make, "write_case", write_case)
+    link = out / name
+    link.parent.mkdir(parents=True, exist_ok=True)
+    link.symlink_to(mine / "case-1" if "/" in name else mine)
+    if "/" in name:
+        assert blind_make._made("case-1", NULL, BlindFolder(out))
+    else:
+        with pytest.raises(FileError, match="is a link or no folder"):
+            blind_make._made("case-1", NULL, BlindFolder(out))
+    assert [p.name for p in mine.rglob("*")] == ["case-1", "precious"]
+
+
 def test_sets_hold_what_they_promise():
     """Five seeds: 60 cases on forms, half of them nulls; 30 outside; all kinds on the tailgate."""
     five = range(560, 565)

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from tests.builders.quick_runs import coarse_pictures
 
 from chladni.errors import LabelError
 from chladni_evidence import blind_power
@@ -39,7 +40,8 @@ def test_intervals_hold_their_share_and_narrow_as_the_root_of_the_cases():
 def test_folders_stand_side_by_side(tmp_path, monkeypatch):
     rows, said = {"old": SIZED[:2], "new": [*SIZED, *NULLS]}, []
     monkeypatch.setattr(blind_power, "score", lambda outs, say: rows[outs[0].name])
-    power([tmp_path / "new", tmp_path / "old"], said.append)
+    with coarse_pictures():
+        power([tmp_path / "new", tmp_path / "old"], said.append)
     written = json.loads((tmp_path / "new" / "power.json").read_text())
     assert [s["cases"] for s in written[str(tmp_path / "old")]] == [2]
     assert sum("none" in line.split() for line in said) == 1

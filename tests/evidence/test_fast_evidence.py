@@ -1,14 +1,18 @@
-"""Evidence in every run of the suite: one hidden effect is found, nothing is found in one null.
+"""One hidden effect is found, nothing is found in one null, among all effects of the catalogue.
 
-Through :func:`chladni.diagnose` alone, on the plate of the blind benchmark.
+Through :func:`chladni.diagnose` alone, on the plate of the blind benchmark. In every run of the
+suite the same is asked of smaller plates (``tests/workflows/test_moving_base.py``).
 """
 
 import numpy as np
+import pytest
 
 import chladni
 from chladni_evidence.blind_make import made_of
 from chladni_evidence.evidence_sets import Order
 from chladni_evidence.made_case import write_case
+
+pytestmark = pytest.mark.slow
 
 
 def blind(effect, folder):

@@ -68,7 +68,7 @@ def answers(width):
     rng = np.random.default_rng(3)
     return [
         CalibratedArticle(
-            "plate", "fine", k, "identified", float(p), (PosteriorOffset("E", off / width, 0.5),)
+            "plate", "fine", k, "formulation", float(p), (PosteriorOffset("E", off / width, 0.5),)
         )
         for k, (off, p) in enumerate(zip(rng.normal(size=400), rng.uniform(size=400), strict=True))
     ]

@@ -57,10 +57,8 @@ fit = [20.0, 400.0]
     return folder
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["5L", pytest.param("5R", marks=pytest.mark.slow), pytest.param("2L", marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["5L", "5R", "2L"])
 def test_the_grain_of_a_spruce_plate(name, tmp_path, evidence):
     out = tmp_path / "answer"
     source = case(name, tmp_path)

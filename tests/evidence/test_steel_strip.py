@@ -50,6 +50,7 @@ def strip(recordings, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exclude", ["", "exclude = [[620.0, 700.0], [950.0, 1000.0]]\n"])
 def test_nothing_is_named_and_nothing_is_called_right(strip, exclude):
     """Whether or not the user knows the bumps of the rig."""

@@ -136,6 +136,7 @@ def test_Q_leaves_the_cords_out():
     assert band_Q(other, H, (10.0, 40.0)) == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_the_deck_is_that_of_table_1(tested):
     """Values are read back from the deck that was written; the plan sees all modes."""
     desk, chapters = tested
@@ -149,6 +150,7 @@ def test_the_deck_is_that_of_table_1(tested):
     assert len(desk.case(DECK, tested=False).outputs.labels) in (8, 9)
 
 
+@pytest.mark.slow
 def test_formed_thickness_changes_the_mass(tested):
     """The sheets become as thin as the forming simulation says; the deck is edited, not new."""
     _, chapters = tested
@@ -156,6 +158,7 @@ def test_formed_thickness_changes_the_mass(tested):
     assert after / before == pytest.approx(THINNER, abs=0.003)
 
 
+@pytest.mark.slow
 def test_the_articles_own_model_is_the_best(tested, tmp_path):
     """Mapped thickness and a stiff bead approach it; its Q is near that between two articles."""
     desk, chapters = tested
@@ -169,6 +172,7 @@ def test_the_articles_own_model_is_the_best(tested, tmp_path):
     assert best.error < min(stiff["mean_frequency_error"], nominal["mean_frequency_error"])
 
 
+@pytest.mark.slow
 def test_only_what_changed_differs_in_the_decks(tested):
     """Mapping edits shells, the stiff bead one material."""
     desk, _ = tested
@@ -178,6 +182,7 @@ def test_only_what_changed_differs_in_the_decks(tested):
     assert "MAT1" in changed[0][0]
 
 
+@pytest.mark.slow
 def test_the_deviation_fit_finds_a_wrong_modulus(tested, tmp_path):
     """The article's own model with E 15 % too high: the metric alone brings it back."""
     desk, _ = tested

@@ -64,3 +64,32 @@ def test_a_free_plate_is_whole_and_two_are_not():
     assert rigid_modes(modal).sum() == 6
     assert loose_grids(s, modal.shapes[:, :6]) == ()
     assert len(loose_grids(s, modal.shapes[:, :7])) == 1
+
+
+def blocks(shared: str, turned: bool) -> str:
+    """Two cubes of steel that share a face, an edge or a corner; in turned frames where said."""
+    cube = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    step = {"face": (1, 0, 0), "edge": (1, 1, 0), "corner": (1, 1, 1)}[shared]
+    second = [tuple(a + b for a, b in zip(p, step, strict=True)) for p in cube]
+    points = list(dict.fromkeys(cube + second))
+    grids = [f"GRID,{k},,{x}.,{y}.,{z}.,{8 * turned}" for k, (x, y, z) in enumerate(points, 1)]
+    solids = [
+        f"CHEXA,{k},1,{','.join(str(points.index(p) + 1) for p in body[:6])}\n"
+        f",{','.join(str(points.index(p) + 1) for p in body[6:])}"
+        for k, body in enumerate((cube, second), 1)
+    ]
+    other = ["PSOLID,1,1", "MAT1,1,2.+11,,.3,7800.", "CORD2R,8,,0.,0.,0.,1.,2.,3.", ",2.,0.,1."]
+    return "\n".join(["SOL 103", "CEND", "BEGIN BULK", *grids, *solids, *other, "ENDDATA"])
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("shared", "motions"), [("face", 0), ("edge", 1), ("corner", 3)])
+def test_free_solids_are_whole_unless_they_hinge(tmp_path, shared, motions, turned):
+    """Grids of solids do not turn, and no grid misses it: an edge is a hinge, a corner a ball."""
+    deck = tmp_path / "deck.bdf"
+    deck.write_text(blocks(shared, turned))
+    found = chladni.modes(chladni.load(deck, "SI"), 14)
+    assert found.rigid.sum() == 6 + motions
+    said = [n for n in found.notes if "a part is loose" in n]
+    assert len(said) == bool(motions)
+    assert not said or said[0].startswith(f"{motions} motion")

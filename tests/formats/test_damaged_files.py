@@ -282,8 +282,9 @@ def test_coherence_in_percent_is_refused(tmp_path):
 
 def test_text_that_is_none_says_where(tmp_path):
     path = tmp_path / "a.csv"
-    path.write_bytes(b"frequency_hz,output,input,real,imag\n1,1:+Z,\xe9,1,1\n")
-    with pytest.raises(ChladniError, match=r"a\.csv is not UTF-8 text: byte 44 is 0xe9"):
+    path.write_bytes(b"frequency_hz,output,input,real,imag\n1,1:+Z,\x81,1,1\n")
+    said = r"a\.csv is not UTF-8 text: byte 44 \(line 2\) is 0x81; save it as UTF-8"
+    with pytest.raises(ChladniError, match=said):
         read_csv(path, "mobility")
 
 

@@ -56,6 +56,51 @@ READ = {
 }  # fmt: skip
 
 
+G, MICRO, TWO = 9.80665, "\xb5", "\xb2"
+# unit label of the ordinate, of the denominator: data type, factor to SI
+LABELS = {
+    ("m/s" + TWO, "N"): (12, 1.0),
+    (f"(1/N)*(m/s{TWO})", "NONE"): (12, 1.0),
+    ("m/s\xfd", "N"): (12, 1.0),  # squared in the code pages of DOS
+    (MICRO + "m", "N"): (8, 1e-6),
+    (f"{MICRO}m/s/N", "NONE"): (11, 1e-6),
+    ("gravity", "Newton"): (12, G),
+    ("G's", "lbs"): (12, G / POUND),
+    ("in/lbf-sec", "NONE"): (11, INCH / POUND),
+    ("m/N-s", "NONE"): (11, 1.0),
+    ("(mm/sec^2) / (kN)", "NONE"): (12, 1e-6),
+    ("1/kg", "NONE"): (12, 1.0),
+    ("m s^-2 N^-1", "NONE"): (12, 1.0),
+    ("Meters", "Newtons"): (8, 1.0),
+    ("in/sec/sec", "pounds"): (12, INCH / POUND),
+    ("mils", "lbf"): (8, 1e-3 * INCH / POUND),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("units", LABELS)
+def test_unit_labels_of_test_systems(tmp_path, units, binary):
+    """Spellings of labels, in the Latin-1 or CP1252 of Windows programs, in text and in 58b."""
+    kind, factor = LABELS[units]
+    data = file(function(
+        numerator=(kind, units[0]), denominator=(13, units[1]), abscissa=(18, "cycles/s"),
+        title=TITLES, double=True))  # fmt: skip
+    if binary:
+        bits = np.column_stack([H.real, H.imag]).astype("<f8").tobytes()
+        mark = f"    58b{1:6d}{2:6d}{11:12d}{len(bits):12d}{0:6d}{0:6d}{0:12d}{0:12d}".encode()
+        head = data.split(b"\n")[2:13]
+        data = b"\n".join([b"    -1", mark, *head, bits, b"    -1", b""])
+    frf = read(tmp_path, data).frf
+    np.testing.assert_allclose(frf.values[:, 0, 0], factor * H, rtol=1e-9)
+    assert frf.quantity == {8: "receptance", 11: "mobility", 12: "accelerance"}[kind]
+
+
+@pytest.mark.parametrize("label", ["furlong", "(m/s^2)^2/Hz", "N/(m/s^2)", "dB", "m/s^3"])
+def test_a_unit_that_is_no_motion_over_a_force(tmp_path, label):
+    with pytest.raises(FileError, match=r"dataset 1 .*the unit .* is not known; known are m, mm"):
+        read(tmp_path, file(function(numerator=(12, label))))
+
+
 @pytest.mark.parametrize("name", READ)
 def test_read_rightly(tmp_path, name):
     data, quantity, factor = READ[name]

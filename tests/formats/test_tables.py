@@ -1,13 +1,20 @@
 """Tables: round trips to the last digit; one sentence for each kind of fault."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
 
+import chladni
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import PoleTable
 from chladni.errors import FileError
+from chladni.io.tables.csv_table import escaped, unescaped
 from chladni.io.tables.read_tables import read_poles, read_recordings
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.io.tables.write_tables import write_csv, write_npz, write_poles
@@ -23,6 +30,59 @@ def H():
     return FRF(values, f, outputs, inputs, "mobility", spread, gamma)
 
 
+FORMULAS = (
+    "=cmd|' /C calc'!A0",
+    "@SUM(1)",
+    "+1+cmd",
+    "-2+3",
+    "\tx",
+    "\r=1",
+    " =1",
+    "\uff1d1",
+    "+Z",
+)
+CELLS = st.text(st.sampled_from("=+-@'\t\r\n ,\"\\x1b5c07aZ0\x1b\x9b\uff1d"), min_size=1)
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_no_cell_is_a_formula(text):
+    """OWASP, CSV Injection: nothing begins with = + - @, a tab or a line end, behind blanks too."""
+    assert str(escaped(text)).startswith("'")
+    assert unescaped(str(escaped(text))) == text
+
+
+@settings(max_examples=300)
+@given(CELLS)
+def test_an_escaped_cell_comes_back(text):
+    cell = str(escaped(text))
+    assert unescaped(cell) == text
+    assert not re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]", cell)
+    number = re.fullmatch(r"[-+][\d.]+(e[-+]?\d+)?", cell)
+    assert number or not re.match(r"\s*[=+\-@\uff1d]|[\t\r\n]", cell)
+
+
+@pytest.mark.parametrize("number", [-1.5, "-1.5", "+2e-3", "-.5", "1e5", 7, "-inf", "nan"])
+def test_numbers_stay_numbers(number):
+    assert escaped(number) == number
+
+
+def test_labels_come_back_whatever_they_are(tmp_path, H):
+    odd = ("=1+1", "-\x1b[31m", "\\x1b")
+    write_csv(tmp_path / "a.csv", replace(H, outputs=odd))
+    text = (tmp_path / "a.csv").read_text()
+    assert "\x1b" not in text
+    assert read_recordings(tmp_path / "a.csv", "mobility")[0].frf.outputs == odd
+
+
+def test_every_table_is_written_by_one_function():
+    """No other module makes rows of cells."""
+    source = Path(chladni.__file__).parents[1]
+    makers = {
+        p.name for p in source.rglob("*.py") if re.search(r"csv\.(Dict)?[wW]rit", p.read_text())
+    }
+    assert makers == {"csv_table.py"}
+
+
 @pytest.mark.parametrize("ending", ["csv", "npz"])
 def test_every_digit_comes_back(tmp_path, H, ending):
     path = tmp_path / f"a.{ending}"
@@ -34,6 +94,39 @@ def test_every_digit_comes_back(tmp_path, H, ending):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.parametrize(("outputs", "inputs"), [(3, 2), (3, 1), (1, 2), (1, 1)])
+def test_a_mat_holds_frfs_by_the_names_of_npz(tmp_path, H, outputs, inputs):
+    """MATLAB drops axes of length one at the end, and its texts are cells or rows of characters."""
+    H = H.sel(H.outputs[:outputs], H.inputs[:inputs])
+    held = {"frequency_hz": H.frequency[:, None], "values": H.values, "quantity": H.quantity,
+            "coherence": H.coherence, "inputs": np.array(H.inputs, object),
+            "outputs": np.array(H.outputs), "level": 2.5}  # fmt: skip
+    savemat(tmp_path / "a.mat", held)
+    (back,) = read_recordings(tmp_path / "a.mat")
+    np.testing.assert_array_equal(back.frf.values, H.values)
+    np.testing.assert_array_equal(back.frf.coherence, H.coherence)
+    assert (back.frf.outputs, back.frf.inputs, back.level) == (H.outputs, H.inputs, 2.5)
+    assert back.frf.quantity == "mobility"
+
+
+@pytest.mark.parametrize(
+    ("held", "said"),
+    [
+        ({"FRF": np.ones((3, 3, 9)), "frequencyBand": np.arange(9.0)},
+         "unknown array FRF, frequencyBand.*of FRFs frequency_hz, values, outputs, inputs"),
+        ({"frequency_hz": np.arange(9.0), "values": np.ones(9)}, "no array outputs, inputs"),
+        ({"frequency_hz": np.arange(9.0), "values": np.ones((2, 9)), "outputs": ["1:+Z", "2:+Z"],
+          "inputs": ["1:+Z"], "quantity": "mobility"}, r"values are \(2, 9\)"),
+        ({"Signal": {"x_values": {"increment": 1.0}, "y_values": {"values": np.array([1j, 2.0])}}},
+         "record 1 is complex, a function of frequency; export FRFs as a universal file"),
+    ],
+)  # fmt: skip
+def test_a_mat_of_other_frfs_is_a_sentence(tmp_path, held, said):
+    savemat(tmp_path / "a.mat", held)
+    with pytest.raises(FileError, match=rf"a\.mat: .*{said}"):
+        read_recordings(tmp_path / "a.mat")
+
+
 def test_order_of_rows_and_columns_is_free(tmp_path, H):
     write_csv(tmp_path / "a.csv", H)
     head, *rows = (tmp_path / "a.csv").read_text().splitlines()
@@ -42,6 +135,37 @@ def test_order_of_rows_and_columns_is_free(tmp_path, H):
     back = read_recordings(tmp_path / "b.csv", "mobility")[0].frf
     again = back.sel(H.outputs, H.inputs)
     np.testing.assert_array_equal(again.values, H.values)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_tables_as_windows_programs_write_them(tmp_path, encoding, mark):
+    """Code page, separator and decimal comma change nothing."""
+    lines = ["frequency_hz,output,input,real,imag,article"]
+    lines += [f"{f},1:+Z,2:+Z,{f},-1e-3,Tür µ" for f in (1.5, 2.25)]
+    text = "\r\n".join(lines).replace(",", mark)
+    text = text if mark == "," else text.replace(".", ",")
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    (read,) = read_recordings(tmp_path / "a.csv", "accelerance")
+    np.testing.assert_allclose(read.frf.values[:, 0, 0], np.array([1.5, 2.25]) - 1e-3j)
+    assert read.article == "Tür µ"
+
+
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_time_data_as_windows_programs_write_them(tmp_path, mark):
+    rows = ["time_s,1:+Z [N],2:+Z [m/s²]", *(f"{k / 64},{k % 7}.5,{k % 5}.25" for k in range(64))]
+    text = "\n".join(rows).replace(",", mark)
+    text = text if mark == "," else text.replace(".", ",")
+    (tmp_path / "a.csv").write_bytes(text.encode("cp1252"))
+    (read,) = read_recordings(tmp_path / "a.csv")
+    assert (read.time.rate, read.time.quantity) == (64.0, "accelerance")
+    np.testing.assert_allclose(read.time.response[0, 0, :3], [0.25, 1.25, 2.25])
+
+
+def test_a_decimal_comma_beside_a_decimal_point_is_not_guessed(tmp_path):
+    (tmp_path / "a.csv").write_text("mode;frequency_hz\n1;1,234\n2;2.5\n")
+    with pytest.raises(FileError, match="line 2: frequency_hz is '1,234', which is not a number"):
+        read_recordings(tmp_path / "a.csv")
 
 
 def test_levels_and_articles_are_recordings_of_their_own(tmp_path):
@@ -180,3 +304,11 @@ def test_the_quantity_must_be_known(tmp_path, H):
         read_recordings(tmp_path / "a.csv")
     with pytest.raises(FileError, match=r"end in .uff, .unv, .npz, .csv, .mat or .wav, not '.txt'"):
         read_recordings(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize("text", ["1_0", "\u0661\u0660", "nan", "inf", "1e999", "0x10", "1\u00b2"])
+def test_what_python_alone_takes_for_a_number_is_none(tmp_path, text):
+    path = tmp_path / "poles.csv"
+    path.write_text(f"mode,frequency_hz\n1,5.\n2,{text}\n", encoding="utf-8")
+    with pytest.raises(FileError, match=r"line 3: frequency_hz is .* not a number"):
+        read_poles(path)

@@ -6,9 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.dynamics.frf import FRF
+from chladni.ema.channel_checks import drive_points
 from chladni.errors import FileError
 from chladni.io.uff.read_uff import read_uff, write_uff
 from chladni.io.uff.uff_units import ratio
+from chladni.io.uff.write_shapes import write_shapes
 
 LINES = (np.arange(2, 403) * 0.5, np.geomspace(10.0, 300.0, 101))
 
@@ -135,6 +137,36 @@ def test_labels_of_units(length, rate):
     assert (a, b) == ({"m": 1.0, "mm": 1e-3, "in": 0.0254}[length], 1.0)
 
 
+def test_node_0_is_a_base_only_of_a_transmissibility(tmp_path):
+    """Its quantity says so, or the case does; else the file does not know where the force acts."""
+    path = foreign(tmp_path / "a.uff", record(ref_node=0))
+    assert read_uff(path).frf.inputs == ("0:+Z",)
+    assert "node 0, so the file does not say where the force acts" in read_uff(path).notes[0]
+    assert read_uff(path, "transmissibility").frf.inputs == ("base:+Z",)
+    moved = foreign(tmp_path / "b.uff", record(ref_node=0, orddenom_spec_data_type=12))
+    assert read_uff(moved).frf.inputs == ("base:+Z",)
+    assert not read_uff(moved).notes
+
+
+def test_points_that_have_a_name_in_place_of_a_number_are_no_repeats(tmp_path):
+    """Response entities tell points of node 0 apart, and nodes of one number on two parts."""
+    named = [record(rsp_node=0, ref_node=0, rsp_ent_name=n) for n in ("P 1", "P2", "P3")]
+    frf = read_uff(foreign(tmp_path / "a.uff", *named)).frf
+    assert (frf.outputs, frf.inputs) == (("P_1:+Z", "P2:+Z", "P3:+Z"), ("0:+Z",))
+    parts = [record(rsp_ent_name="LEFT"), record(rsp_ent_name="RIGHT"), record(rsp_node=7)]
+    frf = read_uff(foreign(tmp_path / "b.uff", *parts)).frf
+    assert frf.outputs == ("LEFT:1:+Z", "RIGHT:1:+Z", "7:+Z")
+    alone = record(rsp_ent_name="WING", ref_ent_name="SHAKER")
+    coherent = record(func_type=6, data=np.ones(10))
+    frf = read_uff(foreign(tmp_path / "c.uff", alone, coherent)).frf
+    assert (frf.outputs, frf.coherence is None) == (("1:+Z",), False)
+
+
+def test_node_0_at_both_ends_is_no_drive_point(tmp_path):
+    frf = read_uff(foreign(tmp_path / "a.uff", record(rsp_node=0, ref_node=0))).frf
+    assert drive_points(frf) == []
+
+
 def test_opposite_signs_of_one_dof_are_one_channel(tmp_path):
     """1:-Z from the second hit is the first one's 1:+Z with the other sign."""
     path = foreign(tmp_path / "a.uff", record(), record(rsp_dir=-3, ref_node=4))
@@ -170,6 +202,32 @@ def test_shapes_complex_and_real(tmp_path):
     np.testing.assert_allclose(shapes.damping, 0.3 / abs(pole), rtol=1e-5)
     assert shapes.dofs[:3] == ("1:+X", "1:+Y", "1:+Z")
     np.testing.assert_allclose(shapes.values[:, 0], [z[0], 2 * z[0], 0, z[1], 2 * z[1], 0])
+
+
+@pytest.mark.parametrize("complex_", [False, True])
+def test_shapes_that_are_written_come_back(tmp_path, complex_):
+    """A normal mode is its own, a complex one keeps its imaginary part, its pole gives f and ζ."""
+    motion = np.arange(12.0).reshape(2, 3, 2) + (1j * np.arange(12.0, 0, -1).reshape(2, 3, 2)
+                                                 if complex_ else 0.0)  # fmt: skip
+    ids, places = np.array([4, 9]), np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    f = np.array([12.5, 40.0])
+    back = read_uff(write_shapes(tmp_path / "a.unv", f, motion, ids, places, 0.01)).shapes
+    np.testing.assert_allclose(back.values.reshape(2, 3, 2), motion, rtol=1e-5)
+    assert np.iscomplexobj(back.values) is complex_
+    np.testing.assert_allclose(back.frequency, f, rtol=1e-5)
+    np.testing.assert_allclose(back.damping, 0.01, rtol=1e-3)
+
+
+def test_mode_shapes_alone_give_natural_frequencies(tmp_path):
+    """In order, without rigid motions; where the file holds FRFs they are not used."""
+    motion, ids, places = np.ones((1, 3, 3)), np.array([4]), np.zeros((1, 3))
+    path = write_shapes(tmp_path / "a.unv", np.array([40.0, 1e-4, 12.5]), motion, ids, places)
+    poles = read_uff(path).poles
+    np.testing.assert_allclose(poles.frequency, [12.5, 40.0], rtol=1e-5)
+    assert np.isnan(poles.frequency_sd).all()
+    with_frf = foreign(path, record())
+    assert read_uff(with_frf).frf is not None
+    assert read_uff(with_frf).poles is None
 
 
 def test_hammer_test_of_a_plate(recordings):

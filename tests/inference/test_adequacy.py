@@ -28,7 +28,7 @@ SCALES = MassMeasurement(1.413, 1.4e-3)
 def answered(reduced, data, effects):
     state = evaluate(reduced.model, effects, np.zeros(2))
     fit = fitted(reduced.model, effects, data.allowing_errors(state), SCALES, np.zeros(2))
-    return adequacy(HypothesisFit(Effect(), fit, reduced.model), SCALES, tuple("abcd"), 100)
+    return adequacy(HypothesisFit(Effect(), fit, reduced.model), SCALES, tuple("abcd"), 200)
 
 
 def test_draws_of_the_model_itself_have_uniform_p(reduced, damped):

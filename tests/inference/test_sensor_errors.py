@@ -7,11 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.ema.recording_noise import EqualisedError
 from chladni.ema.setup import SensorAccuracy
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.inference.likelihood import Responses
-from chladni.inference.sensor_errors import columns, sensor_errors, variance
+from chladni.inference.sensor_errors import sensor_errors, variance
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
@@ -149,58 +148,3 @@ def test_a_test_without_faults_is_what_plain_calibration_assumes(made, state):
     half = np.zeros_like(data.use)
     half[:10] = True
     assert len(data.using(half).known.whitened(np.zeros(2 * 2 * 30))) == 120
-
-
-def identified(made, state, e):
-    """A recording whose first output has errors e (5,) [sd], known to a ten-thousandth."""
-    data = recorded(made, state, use=np.ones((len(S), 3), bool))
-    slopes, _ = columns(data.sensors, data, state, np.ones(data.values.shape))
-    wrong = data.values.copy()
-    wrong[:, 0] *= 1 + np.einsum("j,jfi->fi", e, slopes[:, :, 0])
-    own = 1e-4 * np.eye(2 * len(S)).reshape(2 * len(S), 2, len(S))
-    own = np.broadcast_to((own[:, 0] + 1j * own[:, 1])[..., None, None], (2 * len(S), len(S), 3, 2))
-    error = EqualisedError(own, np.zeros((0, len(S), 3, 2)), np.zeros(data.values.shape))
-    return replace(data, values=wrong, identified=error), slopes
-
-
-LARGE = np.array([2.5, -2.0, 1.0, 2.5, -2.5])
-
-
-def test_large_errors_of_a_sensor_lie_along_their_own_slopes(made, state):
-    """H is linear in them and ln H is not: at the likely errors the tangent holds them all."""
-    data, slopes = identified(made, state, LARGE)
-    data = data.allowing_errors(state, 1e-4)
-    ratio = 1 + np.einsum("j,jfi->fi", LARGE, slopes[:, :, 0])
-    assert np.abs(ratio - 1).max() > 0.3
-    along = np.einsum("j,jfi->fi", LARGE, slopes[:, :, 0] / data.likely.factor[:, 0])
-    left = data.deviation(state)[:, 0] + along / np.log(10)
-    plain = -np.log10(ratio) + np.einsum("j,jfi->fi", LARGE, slopes[:, :, 0]) / np.log(10)
-    assert np.abs(left).max() < 0.03 * np.abs(plain).max()
-    assert_allclose(data.likely.factor[:, 0], ratio, rtol=0.05)
-    assert_allclose(data.likely.factor[:, 1:], 1, atol=1e-9)
-
-
-def test_sound_sensors_leave_the_recording_as_it_is(made, state):
-    data, _ = identified(made, state, np.zeros(5))
-    near = data.allowing_errors(state, 1e-4)
-    assert_allclose(near.values, data.values, rtol=1e-9)
-    assert_allclose(near.likely.factor, 1, atol=1e-9)
-
-
-def test_the_recording_is_itself_again_without_errors(made, state):
-    data, _ = identified(made, state, LARGE)
-    near = data.allowing_errors(state, 1e-4)
-    assert np.abs(near.values / data.values - 1).max() > 0.01
-    assert_allclose(near.exactly().values, data.values)
-    assert_allclose(near.allowing_errors(state, 1e-4).values, near.values)
-
-
-def test_lines_that_were_held_out_tell_of_errors_too(made, state):
-    """A channel without a line in use has no likely errors; with lines it has its own."""
-    data, slopes = identified(made, state, LARGE)
-    held = data.use.copy()
-    held[:, 0] = False
-    near = replace(data, use=held).allowing_errors(state, 1e-4)
-    assert_allclose(near.likely.factor[:, 0], 1)
-    ratio = 1 + np.einsum("j,jfi->fi", LARGE, slopes[:, :, 0])
-    assert_allclose(near.using(data.use).likely.factor[:, 0], ratio, rtol=0.05)

@@ -21,7 +21,7 @@ def resonances(damping=0.01, lines=4000, channels=2, gain=1.0):
 
 
 def seen(**curves):
-    from chladni.report.figures import Shown
+    from chladni.report.shown import Shown
 
     return Shown(None, curves=curves, held_out=["1:+Z"])
 

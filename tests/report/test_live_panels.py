@@ -11,9 +11,9 @@ from chladni.ema.level_table import LevelRow, LevelTable, TriedElement
 from chladni.report import live_curves, live_pages, live_panels
 from chladni.report.blocks import Live, Picture
 from chladni.report.drawings import drawings_of
-from chladni.report.figures import Shown
 from chladni.report.level_blocks import level_section
 from chladni.report.page import write_sections
+from chladni.report.shown import Shown
 from chladni.view import plots
 from chladni.view.surface import Surface
 

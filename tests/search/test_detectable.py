@@ -89,7 +89,7 @@ def a_case(folder, article):
     folder.mkdir()
     write_assembly(MADE, folder / "plate.bdf")
     model = chladni.load(write_assembly(article, folder / "article.bdf"), "SI")
-    H = model.frf([f"{g}:+Z" for g in SENSORS], "2:+Z", np.linspace(15, 180, 900))
+    H = model.frf([f"{g}:+Z" for g in SENSORS], "2:+Z", np.linspace(15, 180, 450))
     noise = np.random.default_rng(500).normal(size=(2, *H.values.shape)) / np.sqrt(2)
     values = H.values * (1 + 0.01 * (noise[0] + 1j * noise[1]))
     write_npz(folder / "frf.npz", replace(H, values=values))

@@ -1,11 +1,13 @@
 """Small and odd data end in an answer or in a sentence, and never in a name they cannot bear."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tests.builders.decks import flat_sheet
+from tests.builders.quick_runs import quick_runs
 
 from chladni.case import load_case
 from chladni.dynamics.eigen import normal_modes
@@ -23,6 +25,15 @@ from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
 from chladni.workflows.diagnose import diagnose
 from chladni.workflows.identify import identify
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _quick() -> Iterator[None]:
+    with quick_runs():
+        yield
+
+
+TRIED = ["point-mass", "stiffness-patch", "extra-support", "thickness-distribution"]
 
 
 def plate_deck(held: bool = False) -> str:
@@ -47,6 +58,7 @@ def case_of(folder: Path, text: str, deck: str, test: str = "") -> Path:
     (folder / "deck.bdf").write_text(deck)
     (folder / "case.toml").write_text(
         f'[model]\ndeck = "deck.bdf"\nunits = "SI"\n[test]\n{test}recordings = ["{text}"]\n'
+        f"[search]\neffects = {TRIED}\n"
     )
     return folder
 

@@ -5,23 +5,20 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.sparse.csgraph import structural_rank
 
 from chladni.errors import AccuracyError, LabelError, ModelError, ShapeError
-from chladni.sparse import dissection
+from chladni.sparse import elimination_fronts
 from chladni.sparse.factor import backward_error, factorise, inertia
 from chladni.sparse.multifrontal import Multifrontal, NotDefinite, counted
 
 
 def grid(nx, ny, dofs=2):
-    """Stiffness of a grid of points with coupled dofs, its points and nodes; positive definite."""
+    """Stiffness of a grid of points with coupled dofs, and its nodes; positive definite."""
     one = [sp.diags_array([-np.ones(n - 1), -np.ones(n - 1)], offsets=[1, -1]) for n in (nx, ny)]
     A = sp.kron(one[0], sp.eye_array(ny)) + sp.kron(sp.eye_array(nx), one[1])
     A = A - sp.diags_array(A.sum(axis=1)) + 0.05 * sp.eye_array(nx * ny)
     coupling = np.eye(dofs) + 0.3 * np.ones((dofs, dofs))
-    places = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), [0.0], indexing="ij"), -1)
-    rows = np.repeat(places.reshape(-1, 3), dofs, axis=0)
-    return sp.csr_array(sp.kron(A, coupling)), rows, np.repeat(np.arange(nx * ny), dofs)
+    return sp.csr_array(sp.kron(A, coupling)), np.repeat(np.arange(nx * ny), dofs)
 
 
 def random_symmetric(seed, n=150, hubs=0, groups=1):
@@ -44,9 +41,9 @@ def random_symmetric(seed, n=150, hubs=0, groups=1):
 def test_every_backend_solves_the_same(backend):
     if backend == "cholmod":
         pytest.importorskip("sksparse")
-    A, points, nodes = grid(15, 11)
+    A, nodes = grid(15, 11)
     B = np.random.default_rng(0).standard_normal((A.shape[0], 3))
-    factor = factorise(A, points, nodes=nodes, backend=backend)
+    factor = factorise(A, nodes=nodes, backend=backend)
     np.testing.assert_allclose(factor.solve(B), np.linalg.solve(A.toarray(), B), rtol=1e-9)
     np.testing.assert_allclose(factor.solve(B[:, 0]), factor.solve(B)[:, 0], rtol=1e-12)
     assert factor.nnz >= sp.tril(A).nnz
@@ -54,14 +51,16 @@ def test_every_backend_solves_the_same(backend):
 
 @given(st.integers(0, 10**6), st.integers(0, 3), st.integers(1, 4), st.booleans())
 @settings(max_examples=40, deadline=None)
-def test_any_pattern_any_order(seed, hubs, groups, placed):
+def test_any_pattern_any_order(seed, hubs, groups, metis):
     """The order changes the work, never the answer; nodes of uneven size, hubs, loose groups."""
     A = random_symmetric(seed, hubs=hubs, groups=groups)
     rng = np.random.default_rng(seed)
     nodes = np.sort(rng.integers(0, 60, A.shape[0]))
-    points = rng.standard_normal((60, 3))[nodes] if placed else None
     b = rng.standard_normal(A.shape[0])
-    x = Multifrontal(A, points, nodes).solve(b)
+    with pytest.MonkeyPatch.context() as patch:
+        if not metis:
+            patch.setattr(elimination_fronts, "pymetis", None)
+        x = Multifrontal(A, nodes).solve(b)
     np.testing.assert_allclose(A @ x, b, atol=1e-10)
 
 
@@ -76,17 +75,17 @@ def test_inertia_counts_eigenvalues(seed, shift):
 
 
 def test_indefinite_and_complex_matrices_are_solved():
-    A, points, nodes = grid(16, 12)
+    A, nodes = grid(16, 12)
     b = np.random.default_rng(0).standard_normal(A.shape[0])
     for Z in (A - 1.7 * sp.eye_array(len(b)), A * (1 + 0.02j) - 1.7 * sp.eye_array(len(b))):
-        factor = factorise(Z, points, nodes=nodes, definite=False)
+        factor = factorise(Z, nodes=nodes, definite=False)
         assert backward_error(Z, factor) < 1e-13
         np.testing.assert_allclose(Z @ factor.solve(b.astype(Z.dtype)), b, atol=1e-9)
 
 
 def test_renewed_keeps_the_order_and_changes_the_values():
-    A, points, nodes = grid(12, 12)
-    old = Multifrontal(A, points, nodes)
+    A, nodes = grid(12, 12)
+    old = Multifrontal(A, nodes)
     new = old.renewed(3 * A)
     assert new.fronts is old.fronts
     b = np.ones(A.shape[0])
@@ -95,8 +94,8 @@ def test_renewed_keeps_the_order_and_changes_the_values():
 
 def test_dissection_is_an_elimination_order():
     """Each row once; entries of the lower factor lie within the fronts."""
-    A, points, nodes = grid(20, 20)
-    fronts = dissection.analyse(A, points, nodes)
+    A, nodes = grid(20, 20)
+    fronts = elimination_fronts.analyse(A, nodes)
     assert sorted(fronts.order) == list(range(A.shape[0]))
     position = np.argsort(fronts.order)
     for i in range(len(fronts.boundary)):
@@ -106,74 +105,74 @@ def test_dissection_is_an_elimination_order():
         assert np.isin(later, fronts.boundary[i]).all()
 
 
-@given(st.integers(0, 10**6), st.integers(1, 40))
-@settings(max_examples=40, deadline=None)
-def test_separator_is_the_smallest_cover(seed, edges):
-    """It touches every edge of the cut, and is as large as a matching (König): none is smaller."""
-    rng = np.random.default_rng(seed)
-    u, v = rng.integers(0, 10, edges), rng.integers(10, 20, edges)
-    cover = dissection._cover(u, v, 20)
-    assert np.all(cover[u] | cover[v])
-    cut = sp.csr_array((np.ones(edges), (u, v - 10)), shape=(10, 10))
-    assert cover.sum() == structural_rank(cut)
-
-
-def test_fill_grows_like_n_log_n():
+@pytest.mark.parametrize("metis", [True, False])
+def test_fill_grows_like_n_log_n(metis, monkeypatch):
     """George 1973: nnz(L) = O(n log n) on a square grid; a band order has n^1.5."""
+    if not metis:
+        monkeypatch.setattr(elimination_fronts, "pymetis", None)
     sizes = np.array([20, 40, 80])
-    for placed in (True, False):
-        fill = [
-            dissection.analyse(A, points if placed else None, nodes).nnz
-            for A, points, nodes in (grid(n, n, 1) for n in sizes)
-        ]
-        n = sizes**2
-        rate = np.diff(np.log(fill)) / np.diff(np.log(n))
-        assert rate[-1] < 1.35
+    fill = [elimination_fronts.analyse(*grid(n, n, 1)).nnz for n in sizes]
+    rate = np.diff(np.log(fill)) / np.diff(np.log(sizes**2))
+    assert rate[-1] < 1.35
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None)
+def test_parent_is_the_first_row_below_the_diagonal_of_the_factor(seed):
+    """Liu 1990: in the column of each vertex of L, without accidental zeros."""
+    A = random_symmetric(seed, n=40)
+    filled = (abs(A) > 0).toarray()
+    for k in range(40):
+        below = np.flatnonzero(filled[k + 1 :, k]) + k + 1
+        filled[np.ix_(below, below)] = True
+    due = [int(np.argmax(c)) + k + 1 if c.any() else -1
+           for k, c in enumerate(filled[k + 1 :, k] for k in range(40))]  # fmt: skip
+    assert elimination_fronts.elimination_tree(A).tolist() == due
 
 
 def test_not_definite_names_the_row():
-    A, points, nodes = grid(8, 8)
+    A, nodes = grid(8, 8)
     A = sp.csr_array(A - 100 * sp.csr_array(([1.0], ([17], [17])), shape=A.shape))
     for backend in ("multifrontal", "superlu"):
         with pytest.raises(NotDefinite) as caught:
-            factorise(A, points, nodes=nodes, backend=backend)
+            factorise(A, nodes=nodes, backend=backend)
         assert isinstance(caught.value, ModelError)
     with pytest.raises(ModelError):
         factorise(sp.csr_array((4, 4)), backend="superlu")
 
 
 def test_misuse_is_named():
-    A, points, nodes = grid(4, 4)
+    A, nodes = grid(4, 4)
     with pytest.raises(LabelError, match=r"mumps.*multifrontal"):
         factorise(A, backend="mumps")
-    with pytest.raises(ShapeError, match=r"5 points.*32 rows"):
-        factorise(A, points[:5], nodes=nodes)
+    with pytest.raises(ShapeError, match=r"5 nodes.*32 rows"):
+        factorise(A, nodes=nodes[:5])
 
 
 def test_what_a_count_lets_go_of_still_makes_the_matrix():
     """Its fronts multiplied out are A, definite ones and indefinite ones."""
-    A, points, nodes = grid(20, 14, dofs=3)
+    A, nodes = grid(20, 14, dofs=3)
     for shift in (0.0, 1.3, 4.1):
         S = sp.csr_array(A - shift * sp.eye_array(A.shape[0]))
-        negative, error = counted(S, points, nodes)
+        negative, error = counted(S, nodes)
         assert negative == np.sum(np.linalg.eigvalsh(S.toarray()) < 0)
         assert error < 1e-12  # a tenth of what proves a count
 
 
 def test_a_count_whose_pivots_grow_proves_nothing():
     """With an eigenvalue of the first front's own block at zero, its inverse is rounding alone."""
-    A, points, nodes = grid(20, 14)
-    fronts = dissection.analyse(A, points, nodes)
+    A, nodes = grid(20, 14)
+    fronts = elimination_fronts.analyse(A, nodes)
     first = fronts.order[: fronts.start[1]]
     own = np.linalg.eigvalsh(A.toarray()[np.ix_(first, first)])[1]
     with pytest.raises(AccuracyError, match="prove no inertia"):
-        inertia(A - own * sp.eye_array(A.shape[0]), points, nodes=nodes)
+        inertia(A - own * sp.eye_array(A.shape[0]), nodes=nodes)
 
 
 def test_a_count_takes_less_memory_than_the_factor():
     """Only fronts that wait for their parents are held, O(n) of O(n log n)."""
-    A, points, nodes = grid(60, 60)
-    fronts, peaks = dissection.analyse(A, points, nodes), []
+    A, nodes = grid(60, 60)
+    fronts, peaks = elimination_fronts.analyse(A, nodes), []
     for run in (factorise, inertia):
         tracemalloc.start()
         kept = run(A, fronts=fronts)

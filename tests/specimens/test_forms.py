@@ -35,7 +35,10 @@ def test_is_one_free_piece(name, seed):
     assert f[6] > 5.0
 
 
-@every
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [pytest.param(n, s, marks=[pytest.mark.slow] * (s != SEEDS[-1])) for n in FORMS for s in SEEDS],
+)
 def test_the_mesh_changes_neither_mass_nor_modes_much(name, seed):
     """A finer mesh weighs the same; ten modes stay within 12 % (bolts hold what shell is near)."""
     (deck, f), article = drawn(name, seed), FORMS[name].made(seed, 1.7)

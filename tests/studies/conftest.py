@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.builders.quick_runs import coarse_pictures
+from tests.builders.quick_runs import unrendered_pictures
 
 import chladni
 from chladni.io.nastran import write_assembly
@@ -13,8 +13,8 @@ THREE = ("t=90%:110%", "E=80%:120%", "rho=85%:115%")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _coarse_pictures():
-    with coarse_pictures():
+def _unrendered_pictures():
+    with unrendered_pictures():
         yield
 
 

@@ -167,13 +167,14 @@ def study(request, deck):
     return Killed(mesh_path("tailgate_30mm.bdf"), TAILGATE, samples, workers, "mm-t-s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("study", "kills", "seed"),
     [
         (("plate", 60, 1), 2, 7),
-        pytest.param(("plate", 600, 2), 25, 8, marks=pytest.mark.slow),
-        pytest.param(("plate", 600, 2), 25, 9, marks=pytest.mark.slow),
-        pytest.param(("tailgate", 60, 2), 12, 10, marks=pytest.mark.slow),
+        (("plate", 600, 2), 25, 8),
+        (("plate", 600, 2), 25, 9),
+        (("tailgate", 60, 2), 12, 10),
     ],
     indirect=["study"],
 )

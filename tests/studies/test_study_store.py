@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 import chladni
+from chladni.dynamics.frf import FRF
 from chladni.errors import FileError, Interrupted
-from chladni.output import write_json
+from chladni.output import write_json, write_text
 from chladni_studies import StudySettings, parameter_study
-from chladni_studies.study_store import BEGUN, ROWS
+from chladni_studies.sample import SampleResult
+from chladni_studies.study_store import BEGUN, FRFS, LOCK, ROWS, opened_store
 
 from .conftest import THREE
 
@@ -115,6 +117,23 @@ def test_files_that_are_no_study_are_left_alone(model, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
     with pytest.raises(FileError, match="is a file"):
         chladni.study(model, THREE, SETTINGS, out=tmp_path / "notes.txt")
+
+
+@pytest.mark.parametrize("name", [ROWS, LOCK, FRFS])
+def test_no_link_leads_a_study_out_of_its_folder(tmp_path, name):
+    """Nothing is written to, cut or made where a link in the folder leads."""
+    out, mine = tmp_path / "out", tmp_path / "mine"
+    write_text(mine / "rows", '{"sample": 0, "status": "done"}\nhalf a line')
+    before = {p.name: p.read_text() for p in mine.iterdir()}
+    given = out, {}, {}, ["a"], np.ones((2, 1))
+    H = FRF(np.ones((2, 1, 1)), np.array([1.0, 2.0]), ("1:+Z",), ("1:+Z",))
+    with opened_store(*given):
+        pass
+    (out / name).unlink(missing_ok=True)
+    (out / name).symlink_to({ROWS: mine / "rows", LOCK: mine / "new", FRFS: mine}[name])
+    with pytest.raises(FileError, match="is a link"), opened_store(*given) as store:
+        store.keep(SampleResult(0, {}, frf=H), {"a": 1.0})
+    assert {p.name: p.read_text() for p in mine.iterdir()} == before
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,7 @@ import threading
 import time
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context
-from operator import call, is_
+from operator import call
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,10 +17,9 @@ from distributed import Client
 
 import chladni
 from chladni.errors import FileError
-from chladni_studies import StudySettings, local_workers
-from chladni_studies.local_workers import ENDED, local_results
+from chladni_studies import StudySettings
 from chladni_studies.study_store import ROWS
-from chladni_studies.workers import _AHEAD, NO_WORKER
+from chladni_studies.workers import _AHEAD, ENDED, NO_WORKER, results
 
 RANGES = ["t=90%:110%", "E=80%:120%"]
 SETTINGS = StudySettings(samples=40, modes=3)
@@ -75,32 +73,17 @@ def test_a_worker_killed_costs_no_other_sample(deck, straight, tmp_path):
     assert not [p for p in children if p.is_running()], "workers outlived the study"
 
 
-@pytest.mark.parametrize("ended", [2, 99])
-def test_a_worker_that_ends_in_its_start(model, straight, monkeypatch, ended):
-    """Others are started in its place, two in turn; then it is one sentence."""
-    made, tries = local_workers._work, []
-
-    def work():
-        tries.append(1)
-        return is_ if len(tries) <= ended else made
-
-    class Started:
-        """The worker's work, drawn anew for each."""
-
-        def __init__(self, context):
-            self.Pipe = context.Pipe
-            self.Process = lambda target, **options: context.Process(target=work(), **options)
-
-    def context(kind):
-        return Started(get_context(kind))
-
-    monkeypatch.setattr(local_workers, "get_context", context)
-    if ended == 99:
-        with pytest.raises(FileError, match=r"2 local workers could not be started in 3 tries"):
-            chladni.study(model, RANGES, SETTINGS, workers=2)
-        return
-    found = chladni.study(model, RANGES, SETTINGS, workers=2)
-    np.testing.assert_allclose(found.column("f1_hz"), straight.column("f1_hz"), rtol=1e-9)
+@pytest.mark.slow
+def test_workers_that_cannot_start_are_one_sentence(deck):
+    """A script without a guard starts itself anew in each worker."""
+    script = f"import chladni; model = chladni.load({str(deck)!r}, 'SI')\n"
+    script += "chladni.study(model, ['t=90%:110%'], workers=2)"
+    file = deck.parent / "without_guard.py"
+    file.write_text(script)
+    ran = subprocess.run([sys.executable, str(file)], capture_output=True, text=True)
+    last = ran.stderr.splitlines()[-1]
+    assert "2 local workers could not be started" in last
+    assert 'needs if __name__ == "__main__":' in last
 
 
 @contextmanager
@@ -145,6 +128,7 @@ FOUND = """[str(t.key) for s in __import__("distributed").Scheduler._instances
             for t in s.transition_log if t.finish == "memory"]"""
 
 
+@pytest.mark.slow
 def test_a_cluster_of_others_that_gets_workers_and_loses_one(deck, straight, tmp_path):
     """Without any it is said once, and waited for; one that is lost costs what it had not handed
     over, and few samples are on the cluster at a time."""
@@ -219,12 +203,13 @@ def test_jobs_of_a_batch_system(deck, straight, tmp_path):
     agrees(tmp_path / "out", straight)
 
 
+@pytest.mark.slow
 def test_a_sample_that_ends_every_worker_has_failed_and_costs_no_other():
     """Each time the sample that waited behind it goes to the next worker."""
     study = SimpleNamespace(assembly=call)  # a sample of which does what its values say
     X = [partial(int, "no number")] * 8
     X[3] = partial(os._exit, 1)
-    found = {r.number: r.why for r in local_results(study, X, range(8), 2)}
+    found = {r.number: r.why for r in results(study, X, range(8), 2)}
     assert found.pop(3) == ENDED
     assert sorted(found) == [0, 1, 2, 4, 5, 6, 7]
     assert all("no number" in why for why in found.values())
@@ -232,6 +217,6 @@ def test_a_sample_that_ends_every_worker_has_failed_and_costs_no_other():
 
 def test_a_fault_of_the_program_ends_the_study(capfd):
     study = SimpleNamespace(assembly=call)
-    with pytest.raises(TypeError, match="NoneType"):
-        list(local_results(study, [partial(int, None)] * 3, range(3), 2))
+    with pytest.raises(FileError, match=r"could not run a sample \(TypeError"):
+        list(results(study, [partial(int, None)] * 3, range(3), 2))
     assert "Traceback" not in capfd.readouterr().err

@@ -1,11 +1,12 @@
-"""The small case of all workflows, and what they find in it, once a session."""
+"""The small case of all workflows, and what they find in it, made once for all processes."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.builders.cases import SENSORS, write_case
-from tests.builders.quick_runs import coarse_pictures, few_starts, identified_once
+from tests.builders.quick_runs import quick_runs
+from tests.builders.shared_results import folder_of_run, shared_folder, shared_result
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
@@ -14,22 +15,21 @@ from chladni.fem import modelled as fem_modelled
 
 @pytest.fixture(scope="module", autouse=True)
 def _quick():
-    with coarse_pictures(), identified_once():
-        yield
-
-
-@pytest.fixture(scope="module")
-def few():
-    """Calibrations begin at two points, as that of ``calibrated`` does."""
-    with few_starts():
+    with quick_runs():
         yield
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("case")
-    write_case(folder, 6, SENSORS, np.linspace(15, 200, 900), 170.0)
-    return folder
+def shared(tmp_path_factory):
+    """The folder of what all processes of this run share."""
+    return folder_of_run(tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def folder(shared):
+    """Nothing is written here."""
+    lines = np.linspace(15, 200, 900)
+    return shared_folder(shared, "case", lambda place: write_case(place, 6, SENSORS, lines, 170.0))
 
 
 @pytest.fixture(scope="session")
@@ -38,17 +38,21 @@ def case(folder):
 
 
 @pytest.fixture(scope="session")
-def diagnosis(case):
+def diagnosis(case, shared):
     """The result, and every system whose modes were solved on the way."""
-    solved = []
 
-    def counted(system, *given, **named):
-        solved.append(system)
-        return normal_modes(system, *given, **named)
+    def made():
+        solved = []
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fem_modelled, "normal_modes", counted)
-        return chladni.diagnose(case), solved
+        def counted(system, *given, **named):
+            solved.append(system)
+            return normal_modes(system, *given, **named)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(fem_modelled, "normal_modes", counted)
+            return chladni.diagnose(case), solved
+
+    return shared_result(shared, "diagnosis", made)
 
 
 @pytest.fixture(scope="session")
@@ -57,9 +61,8 @@ def diagnosed(diagnosis):
 
 
 @pytest.fixture(scope="session")
-def calibrated(case):
-    with few_starts():
-        return chladni.calibrate(case)
+def calibrated(case, shared):
+    return shared_result(shared, "calibration", lambda: chladni.calibrate(case))
 
 
 @pytest.fixture

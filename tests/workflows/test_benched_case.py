@@ -82,7 +82,7 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
                  "position_sd": 0.002, "hangers": [1, 620]},
         "band": {"fit": [15.0, 110.0], "exclude": [[50.0, 51.0]]},
         "held_out": {"sensors": ["240:+Y"], "band": [110.0, 119.0]},
-        "search": {"effects": ["point-mass"], "noise": "identified"},
+        "search": {"effects": ["point-mass"]},
         "[parameter]": {"name": "mine", "parts": named, "field": "E", "sd": 0.1, "low": 0.5,
                         "high": 2.0},
     }  # fmt: skip

@@ -13,6 +13,7 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
+from tests.builders.quick_runs import coarse_pictures
 from typer.testing import CliRunner
 
 import chladni
@@ -132,9 +133,21 @@ def _session(base, profile):
         window.call("DELETE", "")
 
 
-pytestmark = pytest.mark.skipif(
-    not (CHROMIUM and DRIVER), reason="needs chromium and chromedriver (Debian: chromium-driver)"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (CHROMIUM and DRIVER),
+        reason="needs chromium and chromedriver (Debian: chromium-driver)",
+    ),
+]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _rendered(_quick):
+    with coarse_pictures():
+        yield
+
+
 EVIL = (
     '<b>e</b></script><img src=x onerror="window.hit=1"><a href="javascript:window.hit=1">evil</a>'
 )

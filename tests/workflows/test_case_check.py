@@ -9,12 +9,20 @@ import numpy as np
 import pytest
 from PIL import Image
 from tests.builders.commands import ran
+from tests.builders.quick_runs import coarse_pictures
 
 import chladni
+from chladni.errors import ChladniError
+from chladni.io.uff.uff_function import Axis, FunctionSet
+from chladni.io.uff.write_shapes import write_shapes
+from chladni.io.uff.write_uff import binary_set, head_records, write_sets
 from chladni.output import plain
 from chladni.report.check_page import check_page
 from chladni.report.result_json import to_json
 from chladni.workflows.case_check import CaseFinding
+from chladni.workflows.output_only import with_natural_frequencies
+from chladni.workflows.ready_case import ready
+from chladni.workflows.states import each_state
 from chladni.workflows.unit_check import refuse_other_units
 
 
@@ -42,7 +50,8 @@ def test_a_good_case_is_not_blamed(case):
 
 def test_what_the_command_writes(copied, tmp_path):
     out = tmp_path / "out"
-    done = ran("check", copied, "--out", out)
+    with coarse_pictures():
+        done = ran("check", copied, "--out", out)
     assert "Nothing looks wrong" in done.output
     case = chladni.load_case(copied)
     assert json.loads((out / "check.json").read_text()) == plain(to_json(chladni.check(case)))
@@ -158,17 +167,146 @@ def test_a_case_without_a_recording_is_told_what_that_means(copied):
 
 
 def test_of_a_long_recording_few_lines_are_identified(case, monkeypatch):
-    """What is said stays; any other command has all lines."""
-    correlation, lines = import_module("chladni.workflows.correlate"), []
-    plainly = correlation.identified
+    """What is said stays; a fit has all lines."""
+    preparation, lines = import_module("chladni.search.preparation"), []
+    plainly = preparation.identify
 
     def counted(*words, use, **more):
         lines.append(int(use.sum()))
         return plainly(*words, use=use, **more)
 
-    monkeypatch.setattr(correlation, "identified", counted)
-    chladni.correlate(case)
+    monkeypatch.setattr(preparation, "identify", counted)
+    ready(case, diagnosing=True)
     monkeypatch.setattr("chladni.ema.screening_lines.LONG", 0)
     assert not chladni.check(case).findings
-    chladni.correlate(case)
+    ready(case, diagnosing=True)
     assert lines[0] == lines[2] > lines[1] > 0
+
+
+def with_recording(place, name, write):
+    write(place / name)
+    return rewritten(place, "frf.npz", name)
+
+
+def poles(path):
+    path.write_text("mode,frequency_hz\n1,40.5\n2,77.0\n3,90.0\n")
+
+
+def shapes(path):
+    write_shapes(path, np.array([40.5, 77.0, 90.0]), np.ones((1, 3, 3)), np.array([2]),
+                 np.zeros((1, 3)))  # fmt: skip
+
+
+def noise(path):
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=(400, 2, 1)) + 1j * rng.normal(size=(400, 2, 1))
+    np.savez(path, frequency_hz=np.linspace(15, 200, 400), values=values,
+             outputs=["4:+Z", "7:+Z"], inputs=["2:+Z"], quantity="accelerance")  # fmt: skip
+
+
+def steady(path):
+    """A motion without a force and without a resonance."""
+    np.savez(path, rate=500.0, acceleration=np.random.default_rng(4).normal(size=4096))
+
+
+def spectra(path):
+    """A coherence and nothing else."""
+    f = np.linspace(15, 200, 5)
+    made = FunctionSet(
+        function=6, response=(4, 3), reference=(2, 3), due=5, x=f, y=f / f.max(),
+        abscissa=Axis(18, "Hz"), ordinate=Axis(), denominator=Axis(),
+    )  # fmt: skip
+    head = head_records(made, "x", even=False)
+    write_sets(path, {}, "x", [binary_set(head, np.column_stack([f, made.y]).tobytes())])
+
+
+def solids(place):
+    block = "\n".join(
+        f"GRID,{1 + k},,{0.3 * (k % 2)},{0.2 * (k // 2 % 2)},{0.1 * (k // 4)}" for k in range(8)
+    )
+    cards = "MAT1,1,2.1+11,,0.3,7850.\nPSOLID,1,1\nCHEXA,1,1,1,2,4,3,5,6\n,8,7\n"
+    (place / "plate.bdf").write_text(f"BEGIN BULK\n{block}\n{cards}ENDDATA\n")
+    text = (place / "case.toml").read_text()
+    mass = next(line for line in text.splitlines() if line.startswith("mass"))
+    return with_recording(rewritten(place, mass, ""), "poles.csv", poles)
+
+
+def no_line(place):
+    return rewritten(place, "[band]", "[band]\nexclude = [[20.0, 169.9]]")
+
+
+ASKED = {  # how a case is changed: the refusal of diagnose, "" for none
+    "as it is": (lambda place: place, ""),
+    "poles": (lambda place: with_recording(place, "poles.csv", poles), ""),
+    "mode shapes alone": (lambda place: with_recording(place, "modes.unv", shapes), ""),
+    "no line": (no_line, "no mode is above the noise"),
+    "a steady motion": (
+        lambda place: with_recording(place, "steady.npz", steady), "no natural frequency"),
+    "neither FRFs nor poles": (
+        lambda place: with_recording(place, "coherence.uff", spectra), "neither FRFs nor"),
+    "solids": (solids, "neither shells nor beams"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_what_is_in_order_is_not_refused_before_a_fit(copied, tmp_path, name):
+    """Check finds a fault where the preparation of diagnose refuses, and only there."""
+    change, due = ASKED[name]
+    place = change(copied)
+    case, refused = chladni.load_case(place), ""
+    found = chladni.check(case)
+    try:
+        for state in each_state(with_natural_frequencies(case)):
+            ready(state, diagnosing=True)
+    except ChladniError as error:
+        refused = str(error)
+    assert due in refused
+    assert bool(refused) is bool(due)
+    assert due in found.faults[0].text if due else not found.findings
+    if not due:
+        chladni.correlate(case)
+    run = ran("check", place, "--out", tmp_path / "out", code=3 if due else 0)
+    assert ("Nothing looks wrong" in run.output) is not bool(due)
+
+
+DRAFTED = {
+    "poles": "the case can be used",
+    "noise": "not ready yet: ",
+    "steady": "not ready yet: steady.npz: no natural frequency",
+    "coherence": "not ready yet: the recordings have neither FRFs nor",
+}
+
+
+@pytest.mark.parametrize("name", DRAFTED)
+def test_a_draft_says_usable_only_of_what_check_finds_in_order(copied, tmp_path, name):
+    file, write = {"poles": ("poles.csv", poles), "noise": ("noise.npz", noise), "steady": (
+        "steady.npz", steady), "coherence": ("coherence.uff", spectra)}[name]  # fmt: skip
+    write(tmp_path / file)
+    rows = "label,grid,role\n4:+Z,4,output\n7:+Z,7,output\n2:+Z,2,input\n"
+    (tmp_path / "table.csv").write_text(rows)
+    words = ["init", copied / "plate.bdf", tmp_path / file, "--units", "SI"]
+    said = ran(*words, "--sensors", tmp_path / "table.csv", "--out", tmp_path / "out").output
+    assert DRAFTED[name] in said
+    assert ("can be used" in said) is (name == "poles")
+
+
+def test_a_draft_of_solids_says_what_takes_them(copied, tmp_path):
+    solids(copied)
+    words = ["init", copied / "plate.bdf", copied / "poles.csv", "--units", "SI"]
+    said = ran(*words, "--out", tmp_path / "out").output
+    assert "not ready yet: the deck has neither shells nor beams" in said
+    assert "calibrate and correlate accept any deck" in said
+
+
+def test_every_state_is_asked(copied):
+    """The recording of the second state holds nothing but noise."""
+    held = dict(np.load(copied / "frf.npz"))
+    rng = np.random.default_rng(3)
+    held["values"] = rng.normal(size=held["values"].shape) * (1 + 1j)
+    np.savez(copied / "noise.npz", **held)
+    more = '[[recording]]\nfile = "{}"\nstate = "{}"\n'
+    text = (copied / "case.toml").read_text()
+    assert not chladni.check(copied).faults
+    both = more.format("frf.npz", "bare") + more.format("noise.npz", "glued")
+    (copied / "case.toml").write_text(text + both)
+    assert chladni.check(copied).faults

@@ -127,6 +127,43 @@ def test_channel_numbers_are_missing_until_coordinates_confirm_grids(
             chladni.load_case(out)
 
 
+GRIDS = {  # outputs and inputs whose labels are grids, though one end alone may count
+    "a sensor at grid 1, a roving hammer": (("1:+Z",), ("1:+Z", "3:+Z", "8:+Z", "30:+Z")),
+    "a sensor at grid 3, a roving hammer": (("3:+Z",), ("1:+Z", "3:+Z", "8:+Z", "30:+Z")),
+    "a shaker at grid 1": (("3:+Z", "8:+Z", "30:+Z"), ("1:+Z",)),
+    "two sensors, a roving hammer": (("1:+Z", "2:+Z"), ("5:+Z", "9:+Z", "17:+Z", "30:+Z")),
+    "every grid of the deck": (tuple(f"{k}:+Z" for k in range(1, 37)), ("2:+Z",)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("ends", GRIDS)
+def test_labels_are_grids_unless_both_ends_together_count(deck, tmp_path, ends):
+    outputs, inputs = GRIDS[ends]
+    model, f = chladni.load(deck, "SI"), np.linspace(15, 100, 8)
+    few = chladni.frf(model, outputs, inputs, f).frfs[0].to("accelerance")
+    write_uff(tmp_path / "a.uff", few, {})
+    made = draft(deck, [tmp_path / "a.uff"])
+    assert {d.matched_by for d in made.dofs} == {"grid"}
+    assert any("no coordinates that confirm" in n for n in made.notes)
+    ran("init", deck, tmp_path / "a.uff", "--out", tmp_path / "case")
+    assert chladni.load_case(tmp_path / "case").outputs.labels == outputs
+
+
+def test_the_place_of_a_force_at_node_0_is_asked_for(deck, frf, tmp_path):
+    """Responses per force drive no base; a row of the table then says where the force acts."""
+    unplaced = replace(frf, inputs=("0:+Z",))
+    write_uff(tmp_path / "a.uff", unplaced, {})
+    said = ran("init", deck, tmp_path / "a.uff", "--out", tmp_path / "case").output
+    assert "does not say where the force acts" in said
+    assert "missing: places of 0:+Z (input)" in said
+    assert "transmissibility" not in said
+    with pytest.raises(ChladniError, match=r"'0:\+Z' has node 0, .* place in sensors\.csv"):
+        chladni.load_case(tmp_path / "case")
+    table = tmp_path / "case" / "sensors.csv"
+    table.write_text(f"{table.read_text()}0:+Z,1,,,,,,,,input,,\n")
+    assert chladni.load_case(tmp_path / "case").inputs.grids.tolist() == [1]
+
+
 def test_numbers_of_grids_without_coordinates_are_said(deck, frf, tmp_path):
     write_npz(tmp_path / "a.npz", frf)
     assert any("no coordinates that confirm" in n for n in draft(deck, [tmp_path / "a.npz"]).notes)

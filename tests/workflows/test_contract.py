@@ -13,7 +13,6 @@ from chladni.report.diagnosis_json import read_diagnosis
 from chladni.report.result_json import to_json
 from chladni_planning import PlanSettings
 
-pytestmark = pytest.mark.usefixtures("few")
 WORKFLOW = {  # command: the function it calls
     "diagnose": "chladni.workflows.diagnose.diagnose",
     "demo": "chladni.workflows.diagnose.diagnose",

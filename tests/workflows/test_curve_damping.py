@@ -44,7 +44,7 @@ def test_a_table_of_frequencies_lends_no_damping(case, seen):
     assert set(table.damping_of(case.outputs, model, 0.03)) == {0.03}
 
 
-def test_a_peak_is_as_high_as_the_identified_damping_lets_it(case, few):
+def test_a_peak_is_as_high_as_the_identified_damping_lets_it(case):
     """|H| at a resonance is 1/ζ: the recording has 1 %, and 5 % in the case changes nothing."""
     result = chladni.calibrate(replace(case, damping=0.05))
     after = result.models.curves["after"]

@@ -23,6 +23,7 @@ from chladni_specimens.plates import plate
 
 SENSORS = [(0.09, 0.05), (0.12, 0.2), (0.15, 0.1), (0.18, 0.025), (0.21, 0.15), (0.24, 0.0),
            (0.3, 0.05), (0.3, 0.175)]  # fmt: skip
+TRIED = ["point-mass", "mass-patch", "stiffness-patch", "compliant-support"]
 PLACE = (0.24, 0.15)  # of 20 g that the deck does not have
 
 
@@ -46,7 +47,8 @@ def a_case(folder, article, seed):
     labels = tuple(f"{g}:+Z" for g in at(clamped(), SENSORS))
     write_npz(folder / "table.npz", replace(T, values=values, outputs=labels))
     mass = round(chladni.modes(model, 3).mass, 5)
-    (folder / "case.toml").write_text(case_text(15.0, 420.0, mass, "table.npz"))
+    tried = f"[search]\neffects = {TRIED}\n"
+    (folder / "case.toml").write_text(case_text(15.0, 420.0, mass, "table.npz") + tried)
     return chladni.load_case(folder)
 
 

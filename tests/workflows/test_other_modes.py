@@ -9,6 +9,8 @@ import pytest
 from tests.builders.commands import ran, refused
 
 import chladni
+from chladni.errors import FileError
+from chladni.io.uff.write_shapes import write_shapes
 
 N = 5  # grids along a side
 
@@ -98,6 +100,52 @@ def test_what_modes_writes_correlate_reads(plain, tmp_path):
     assert len(found["modes"]) == 6
     assert min(m["in_span"] for m in found["modes"]) > 0.9999
     assert {"mac.png", "shapes.png", "report.html"} <= {p.name for p in (tmp_path / "b").iterdir()}
+
+
+def universal(path, f, motion, ids, places):
+    """Complex shapes, of any scale, at numbered places; unmeasured directions are zero."""
+    turned = motion * np.exp(1j * np.linspace(0.3, 2.0, motion.shape[2]))
+    return write_shapes(path, f, turned, ids, places, 0.01)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e3], ids=["m", "mm"])
+@pytest.mark.parametrize("shift", [0.0, 0.013], ids=["on grids", "away from grids"])
+def test_shapes_of_a_test_are_matched_by_their_places(plain, tmp_path, scale, shift):
+    """The lab numbers its points as it likes, measures Z alone, and has complex shapes."""
+    model, f, motion = plain
+    few = np.array([0, 3, 7, 10, 12, 16, 18, 22, 24])
+    places, up = model.assembly.points[few], motion[few] * np.array([0.0, 0.0, 1.0])[:, None]
+    if shift:  # linear in between, so that the mean of an edge is its middle
+        other = few + N
+        few, up = few[other < N * N], up[other < N * N]
+        other = other[other < N * N]
+        places = (model.assembly.points[few] + model.assembly.points[other]) / 2
+        up = (motion[few] + motion[other]) / 2 * np.array([0.0, 0.0, 1.0])[:, None]
+    path = universal(tmp_path / "a.unv", f, up, 1001 + np.arange(len(few)), scale * places)
+    found = chladni.other_modes(model, path)
+    assert found.grids == found.translations == len(few)
+    assert min(found.in_span) > 0.98
+    assert any("complex" in note for note in found.notes)
+    assert any(("away from grids" if shift else "other numbers") in note for note in found.notes)
+
+
+def test_shapes_without_places_on_the_model_are_refused(plain, tmp_path):
+    model, f, motion = plain
+    far = model.assembly.points + 7.0
+    path = universal(tmp_path / "a.unv", f, motion, 1001 + np.arange(N * N), far)
+    with pytest.raises(FileError, match="and no places on it: check that it belongs to this deck"):
+        chladni.other_modes(model, path)
+
+
+def test_axes_of_a_file_that_knows_its_places_are_its_own(plain, tmp_path):
+    """What `write_shapes` writes is in the basic frame, whatever frames the deck's grids have."""
+    model, f, motion = plain
+    other = chladni.load(deck(tmp_path / "turned.bdf", 30.0), "SI")
+    path = write_shapes(tmp_path / "a.unv", f, motion + 0.3 * motion[:, [2, 2, 2]],
+                        model.assembly.ids, model.assembly.points)  # fmt: skip
+    found = chladni.other_modes(other, path)
+    expected = (motion + 0.3 * motion[:, [2, 2, 2]])[:, :, -found.f_other.size :]
+    np.testing.assert_allclose(found.shapes, expected, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.skipif(not importlib.util.find_spec("pyyeti"), reason="OP2 files are read by pyYeti")

@@ -1,6 +1,9 @@
 """Every result explains itself: in words, drawn, saved as its command does, in a notebook."""
 
 import json
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -9,14 +12,15 @@ import chladni
 from chladni.errors import ChladniError
 from chladni.report.diagnosis_json import read_diagnosis
 from chladni.report.result_views import _PAGES
-from chladni.results import Result, _views
+from chladni.results import Result, _views, full_name
 from chladni.workflows.diagnosis_result import DiagnosisResult
 
 
 def with_own_modes(case):
     """The model against the shapes it wrote itself."""
-    folder = chladni.modes(case, 12).save(case.path.parent / "own")
-    return chladni.other_modes(case, folder / "modes.unv")
+    with TemporaryDirectory() as folder:
+        own = chladni.modes(case, 12).save(Path(folder) / "own")
+        return chladni.other_modes(case, own / "modes.unv")
 
 
 MADE = {  # (file of the result, a picture): call
@@ -47,10 +51,12 @@ def subclasses(kind: type) -> set[type]:
 def test_every_type_of_result_has_a_view():
     """No result can be added that prints as a heap of arrays; a package brings its own views."""
     assert all(hasattr(chladni, name) for name in chladni.__all__)  # loads the packages
-    assert set(_views) == subclasses(Result) - {Result}
-    packages = {kind: kind.__module__.split(".")[0] for kind in _views}
-    own = {kind for kind, package in packages.items() if package == "chladni"}
-    assert own == {*_PAGES, DiagnosisResult}
+    for name in _PAGES:
+        import_module(name.rpartition(".")[0])
+    assert set(_views) == {full_name(kind) for kind in subclasses(Result) - {Result}}
+    packages = {name: name.split(".")[0] for name in _views}
+    own = {name for name, package in packages.items() if package == "chladni"}
+    assert own == {*_PAGES, full_name(DiagnosisResult)}
     others = sorted(package for package in packages.values() if package != "chladni")
     assert others == ["chladni_bench", "chladni_evidence", "chladni_planning", "chladni_studies"]
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from tests.builders.commands import ran, refused
+from tests.builders.quick_runs import coarse_pictures
 
 import chladni
 from chladni.effects import registry
@@ -40,7 +41,8 @@ def folder(demo, tmp_path_factory):
     words = ["bench", str(demo), "--band", "15:120", "--resolution", "0.5", "--averages", "4"]
     words += ["--articles", "2", "--levels", "1,2", "--time", "--hide", "point-mass"]
     words += ["--seed", "540"]
-    ran(*words, "--out", out)
+    with coarse_pictures():
+        ran(*words, "--out", out)
     return out
 
 

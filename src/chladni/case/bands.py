@@ -7,7 +7,7 @@ import numpy as np
 from ..effects.registry import names
 from ..ema.setup import Recording
 from ..errors import FileError, LabelError, did_you_mean, named
-from .schema import key, known
+from .schema import known
 from .toml_sections import KeyFile, TomlSection
 
 
@@ -75,21 +75,6 @@ def held_out(
     if count != int(count):
         raise FileError(f"{section.at('sensors')} = {count:g} is not a whole number")
     return int(count), band
-
-
-NARROW = (
-    "the case counts the noise of the identified modes: smaller effects are found, but false "
-    "alarms are more frequent; confirm a name by a measurement"
-)
-
-
-def noise_is_identified(keys: KeyFile, notes: list[str]) -> bool:
-    """True if evidence counts the covariance of the identification."""
-    section = keys.section("search", known("search"))
-    narrow = section.text("noise", among=key("search", "noise").choices) == "identified"
-    if narrow:
-        notes.append(NARROW)
-    return narrow
 
 
 def searched_effects(keys: KeyFile, notes: list[str]) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ Everything is resolved here once: files are read, labels become grids or places 
 shell, bands are compared with the data. Contradictions are refused in one sentence.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,10 +11,12 @@ from typing import get_args
 
 import numpy as np
 
+from ..arguments import checked
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
-from ..errors import ChladniError, FileError, did_you_mean, named
+from ..errors import ChladniError, FileError, did_you_mean, named, shortened
 from ..fem.measured_dofs import MeasuredDofs
+from ..io.file_size import LEADS_OUT, files_within, lies_within
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
 from ..io.tables.read_tables import read_recordings
@@ -24,7 +25,7 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
 from ..units import HERTZ, UNITS, Units
-from .bands import bands, held_out, noise_is_identified, searched_effects
+from .bands import bands, held_out, searched_effects
 from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
 from .mended_recordings import mended, read_as, record_length, with_frf
@@ -63,7 +64,6 @@ class Case:
     keys : KeyFile            the same with what they say
     sensor_masses : (grid, kg) pairs of known mass: on the article while it was measured
     effects : names           that a diagnosis tries; empty: all
-    identified_noise : bool   whether evidence counts the covariance of the identification
     """
 
     path: Path
@@ -87,7 +87,6 @@ class Case:
     keys: KeyFile = field(default_factory=lambda: KeyFile(Path(), {}))
     sensor_masses: tuple[tuple[int, float], ...] = ()
     effects: tuple[str, ...] = ()
-    identified_noise: bool = False
 
     @property
     def frfs(self) -> tuple[FRF, ...]:
@@ -117,6 +116,7 @@ class Case:
         return np.asarray(use)
 
 
+@checked
 def load_case(path: str | Path) -> Case:
     """Read a case from its folder or its case.toml.
 
@@ -134,6 +134,8 @@ def load_case(path: str | Path) -> Case:
     if not path.exists():
         raise FileError(f"no file or folder {path}")
     path = path / "case.toml" if path.is_dir() else path
+    if not lies_within(path, path.parent):
+        raise FileError(f"{path} is a link out of the folder of the case; copy the file into it")
     return resolved(path, read_keys(path, sections()))
 
 
@@ -177,14 +179,16 @@ def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
     outside = model.flag("outside") or held.anywhere
     allow = model.list("allow", str) or []
     deck = held.deck
-    if deck is None:
-        deck = read_deck(_file(model, "deck", str(model.text("deck", due=True)), outside), allow)
-    as_deck = assembly(deck, units)
-    made, notes = _thickness(model, held.assembly or as_deck, units, outside)
-    setup = _setup(test, made, outside, held.sensors)
-    sensors = (*setup.outputs, *setup.inputs)
-    more = keys.sections("recording", known("recording"))
-    recordings = _recordings(test, more, sensors, outside, held.recordings)
+    with files_within(None if outside else path.parent):
+        if deck is None:
+            name = str(model.text("deck", due=True))
+            deck = read_deck(_file(model, "deck", name, outside), allow)
+        as_deck = assembly(deck, units)
+        made, notes = _thickness(model, held.assembly or as_deck, units, outside)
+        setup = _setup(test, made, outside, held.sensors)
+        sensors = (*setup.outputs, *setup.inputs)
+        more = keys.sections("recording", known("recording"))
+        recordings = _recordings(test, more, sensors, outside, held.recordings)
     notes += notes_of(recordings, "use" in test)
     notes += remarks(deck, STRUCTURAL)
     if allow:
@@ -199,7 +203,7 @@ def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
     )
     _base_and_quantity(test, recordings, inputs)
     notes += unrecorded(setup, outputs, inputs)
-    tried, narrow = searched_effects(keys, notes), noise_is_identified(keys, notes)
+    tried = searched_effects(keys, notes)
     return Case(
         path=path,
         deck=deck,
@@ -222,25 +226,25 @@ def resolved(path: Path, keys: KeyFile, held: InMemory = InMemory()) -> Case:
         keys=keys,
         sensor_masses=sensor_masses(made, outputs, inputs),
         effects=tried,
-        identified_noise=narrow,
     )
 
 
 def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
     """A file the case names, in its folder unless others are allowed."""
     if "\0" in name:
-        raise FileError(f"{section.at(key)} = {name[:60]!r} is not a file name")
-    path = section.file.parent / name
-    normal_path = Path(os.path.normpath(name))
-    if not outside and (normal_path.is_absolute() or ".." in normal_path.parts):
-        raise FileError(
-            f"{section.at(key)} = {name!r} leads out of the folder of the case; copy the file "
-            "into it, or write outside = true under [model]"
-        )
-    if not path.is_file():
-        there = sorted(p.name for p in section.file.parent.glob("*") if p.is_file())
+        raise FileError(f"{section.at(key)} = {shortened(repr(name))} is not a file name")
+    folder = section.file.parent
+    path = folder / name
+    if not outside and not lies_within(path, folder):
+        raise FileError(f"{section.at(key)} = {shortened(repr(name))} {LEADS_OUT}")
+    try:
+        exists = path.is_file()
+    except OSError:
+        raise FileError(f"{section.at(key)} = {shortened(repr(name))} is no file name") from None
+    if not exists:
+        there = sorted(p.name for p in folder.glob("*") if p.is_file())
         hint = did_you_mean(Path(name).name, there)
-        said = f"there is no file {name!r}; {hint}there are {named(there, 8)}"
+        said = f"there is no file {shortened(repr(name))}; {hint}there are {named(there, 8)}"
         raise FileError(f"{section.at(key)}: {said}")
     return path
 

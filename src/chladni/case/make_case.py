@@ -1,11 +1,12 @@
 """A case from the arguments of a function: the words of ``case.toml``, without a file."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypedDict, cast, get_args
 
+from ..arguments import checked
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import PoleTable, Recording, Sensor
 from ..errors import FileError, did_you_mean
@@ -52,7 +53,6 @@ class CaseWords(TypedDict, total=False):
     held_out_sensors : a number, or labels
     held_out_band : (low, high) [Hz]
     effects : names of the effects that ``diagnose`` tries; default all
-    noise : "lines" or "identified": whose noise the evidence counts
     parameters : dicts with the keys of a [[parameter]]: field, parts, name, sd, low, high
     """
 
@@ -81,10 +81,10 @@ class CaseWords(TypedDict, total=False):
     held_out_sensors: int | Sequence[str]
     held_out_band: tuple[float, float]
     effects: Sequence[str]
-    noise: str
     parameters: Sequence[Mapping[str, Any]]
 
 
+@checked
 def make_case(
     deck: str | Path | Deck,
     recording: Measured | Sequence[Measured] = (),
@@ -115,7 +115,12 @@ def make_case(
     sensors = _sensors(words.get("sensors"))
     for name, value in words.items():
         if name == "parameters":
-            for one in cast(Sequence[Mapping[str, Any]], value):
+            for one in value if isinstance(value, list | tuple) else [value]:
+                if not isinstance(one, Mapping):
+                    raise FileError(
+                        f"argument parameters holds {one!r}; give dicts with the keys of a "
+                        "[[parameter]]"
+                    )
                 file.add("parameter", one)
         elif value is not None and not (name == "sensors" and sensors is not None):
             file.put(*WORDS[name], value)
@@ -177,7 +182,7 @@ def _sensors(given: object) -> tuple[Sensor, ...] | None:
     """The sensors where they are objects; None where a file holds them."""
     if given is None or isinstance(given, str | Path):
         return None
-    each = tuple(cast(Sequence[object], given))
+    each = tuple(given) if isinstance(given, Iterable) else (given,)
     if wrong := [type(one).__name__ for one in each if not isinstance(one, Sensor)]:
         raise FileError(
             f"argument sensors holds an object of the type {wrong[0]}; give the path of a table, "

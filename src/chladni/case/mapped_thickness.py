@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..errors import FileError
 from ..geometry.formed_mesh import FormedMesh
@@ -97,6 +96,8 @@ def formed_thickness(
 
 def _too_sparse(made: Assembly, formed: FormedMesh, covered: float) -> str:
     """Why points without cells on the deck cover little: their spacing; "" if it is not that."""
+    from scipy.spatial import cKDTree
+
     if len(formed.points) < 2:
         return ""
     reach = default_reach(made)

@@ -169,6 +169,6 @@ def _idle(r: Recording) -> list[str]:
             f"{r.name}: {len(used)} records of responses ({used[0].kind}) and no force: "
             "correlate, calibrate and diagnose use their natural frequencies"
         )
-    if r.shapes is not None:
+    if r.shapes is not None and r.poles is None:
         out.append(f"{r.name}: its {len(r.shapes.frequency)} mode shapes are not used")
     return out

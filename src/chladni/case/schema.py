@@ -79,7 +79,8 @@ SCHEMA = (
         "Unknown cards and case control commands that are ignored.",
         '["CWELD"]', COMMANDS),
     Key("model", "outside", "true or false", "", "false",
-        "True: files of the case may lie outside of its folder (`../`, or a whole path). Leave it "
+        "True: files of the case may lie outside of its folder (`../`, a whole path or a link). "
+        "Leave it "
         "false in a case from somebody else.", "true", COMMANDS),
     Key("test", "recordings", "list of files", "", "none",
         "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data. FRFs of time data "
@@ -94,8 +95,8 @@ SCHEMA = (
     Key("test", "quantity", "word", "", "as in the file", "Quantity of the FRFs.",
         '"accelerance"', _READ, get_args(Quantity)),
     Key("test", "gain", "word", "", "known",
-        "Unknown: one real factor common to all channels is free.", '"unknown"', _SCORE,
-        ("known", "unknown")),
+        "Unknown: one real factor common to all channels is free, its sign included.",
+        '"unknown"', _SCORE, ("known", "unknown")),
     Key("test", "factor", "number, not 0", "", "1",
         "Factor on all FRFs: 9.80665 where g were read as m/s².", "9.80665", _READ),
     Key("test", "delay", "number", "s", "0",
@@ -161,10 +162,6 @@ SCHEMA = (
     Key("search", "effects", "list of effects", "", "all of the catalogue",
         "Effects that are tried; no other effect is named. Faults of the recording are always "
         "tried.", '["point-mass", "stiffness-patch"]', ("diagnose",)),
-    Key("search", "noise", "word", "", "lines",
-        "`lines`: every spectral line has independent noise. `identified`: the noise is that of "
-        "the identified modes. It is narrower: smaller effects are found, with more false alarms.",
-        '"identified"', ("diagnose",), ("lines", "identified")),
     Key("parameter", "name", "text", "", "the field", "Name on the page.", '"E steel"',
         _VARIED),
     Key("parameter", "parts", "list of parts", "", "all that have the field",

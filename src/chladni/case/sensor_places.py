@@ -15,8 +15,9 @@ from ..model.assembly import Assembly
 from ..units import UNITS
 from .label_directions import ways_said
 from .node_numbers import (
+    ENOUGH,
+    NO_NODE,
     OFF,
-    count_channels,
     number_channels,
     numbers_agree,
     on_structure,
@@ -53,10 +54,12 @@ def places(
     spoken = [label for label in labels if label not in table]
     seated = on_structure(made, nodes)
     elsewhere = seated and not numbers_agree(made, nodes)
-    frf = recorded[0].frf if recorded and "sensors" in test else None
-    counted = frf is not None and number_channels(frf.outputs, frf.inputs)
+    frf = recorded[0].frf if recorded else None
     numbers = [label for label in spoken if not label.startswith("base:")]
-    if not seated and numbers and (counted or count_channels(numbers)):
+    outputs, inputs = (numbers, ()) if frf is None else (frf.outputs, frf.inputs)
+    least = 1 if "sensors" in test else ENOUGH
+    counted = number_channels(outputs, inputs, made.ids.tolist(), least)
+    if not seated and numbers and counted:
         raise LabelError(
             f"{test.at('recordings')}: the labels {named(numbers, 3)} are taken as channel "
             "numbers, because no coordinates show that they are grids; give each its grid or "
@@ -104,6 +107,11 @@ def _spoken(
     vector = direction(label, f"{where}: label {label!r}")
     if node == "base":
         return Sensor(label, None, direction=vector)
+    if node == NO_NODE:
+        raise LabelError(
+            f"{where}: label {label!r} has node 0, so the recording does not say where it is; give "
+            "its grid or place in sensors.csv"
+        )
     id = int(node)
     at = np.flatnonzero((made.ids == id) & (not elsewhere or id not in nodes))
     if vector is not None and id in axes:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, did_you_mean, nearest, not_text
+from ..errors import FileError, did_you_mean, nearest, not_text, shortened
 
 _LONGEST = 60  # characters of a value that a sentence repeats
 _QUOTED = r"""(['"])((?:(?!\1)[^\\]|\\.)*)\1"""
@@ -35,8 +35,7 @@ def _short(value: object) -> str:
     """A value for a sentence; of a long one its beginning."""
     if isinstance(value, int) and abs(value) > 10**_LONGEST:
         return "a number of more than 60 digits"
-    text = repr(value)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+    return shortened(repr(value), _LONGEST)
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,20 @@
 """All commands, and what becomes of an error: one sentence and an exit code, never a traceback."""
 
+import ast
 import functools
 import inspect
 import math
 import os
 import re
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
@@ -89,8 +93,14 @@ def _misused(error: Any) -> int:
     return _said(f"{text}{there}; see `{shown}`".replace("?;", "?"), AT_FAULT)
 
 
-def application() -> typer.Typer:
-    """The application with every command; a command's docstring is its help."""
+def application(only: str | None = None) -> typer.Typer:
+    """The application with every command; a command's docstring is its help.
+
+    Parameters
+    ----------
+    only : command whose module is loaded, while the others are listed by their first sentence; by
+        default all are loaded
+    """
     os.environ.pop("MPLBACKEND", None)  # pictures go to files, whatever window is asked for
     app = typer.Typer(
         name="chladni",
@@ -102,11 +112,16 @@ def application() -> typer.Typer:
         pretty_exceptions_enable=False,
     )
     app.callback()(_version)
-    for name, module in commands().items():
+    for name, command in _offered().items():
+        if only not in (None, name) and isinstance(command, str):
+            if said := _said_by_source(command):
+                app.command(name, short_help=said)(_version)
+                continue
+        module = import_module(command) if isinstance(command, str) else command
         if hasattr(module, "STEPS"):
             app.add_typer(_stepped(module), name=name, short_help=module.HELP)
         else:
-            app.command(name, short_help=_first_sentence(module.run))(guarded(module.run))
+            app.command(name, short_help=_first_sentence(module.run.__doc__))(guarded(module.run))
     return app
 
 
@@ -123,20 +138,46 @@ def commands() -> dict[str, ModuleType]:
     ExtensionError
         If an installed package offers a command that cannot be used.
     """
-    own = {name: import_module(f".{name}", __package__) for name in BUILT_IN}
+    offered = _offered().items()
+    return {name: import_module(m) if isinstance(m, str) else m for name, m in offered}
+
+
+def _offered() -> dict[str, str | ModuleType]:
+    """Commands by name: of this distribution by module, which is not loaded; of others loaded."""
+    here = [e for e in entry_points(group=GROUP) if e.dist and e.dist.name == "chladni"]
+    own: dict[str, str | ModuleType] = {name: f"{__package__}.{name}" for name in BUILT_IN}
+    own |= {entry.name: entry.value for entry in sorted(here, key=lambda e: e.name)}
     return own | installed(
         GROUP,
         "command",
         "a module with a function run, or with STEPS and HELP",
         lambda module: callable(getattr(module, "run", None)) or hasattr(module, "STEPS"),
         own,
+        but=here,
     )
+
+
+def _said_by_source(name: str) -> str:
+    """The first sentence of a command, from the source of its module; "" where there is none."""
+    package, *inner = name.split(".")
+    found = find_spec(package)
+    for folder in (found and found.submodule_search_locations) or ():
+        path = Path(folder, *inner).with_suffix(".py")
+        said: dict[str, str | None] = {}
+        for node in ast.parse(path.read_bytes()).body if path.is_file() else ():
+            if isinstance(node, ast.FunctionDef):
+                said[node.name] = ast.get_docstring(node)
+            elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant):
+                said[ast.unparse(node.targets[0])] = str(node.value.value)
+        return _first_sentence(said.get("HELP") or said.get("run"))
+    return ""
 
 
 def main() -> None:
     """Run the command line; a package whose command cannot be used is one sentence."""
+    words = [word for word in sys.argv[1:] if not word.startswith("-")]
     try:
-        run = application()
+        run = application(words[0] if words else "")
     except ChladniError as error:
         raise SystemExit(_said(error, AT_FAULT)) from None
     run()
@@ -146,13 +187,13 @@ def _stepped(module: ModuleType) -> typer.Typer:
     """A command of several steps, each with options of its own."""
     group = typer.Typer(help=module.HELP, no_args_is_help=True, rich_markup_mode=None)
     for step in module.STEPS:
-        group.command(step.__name__, short_help=_first_sentence(step))(guarded(step))
+        group.command(step.__name__, short_help=_first_sentence(step.__doc__))(guarded(step))
     return group
 
 
-def _first_sentence(command: Callable[..., Any]) -> str:
+def _first_sentence(docstring: str | None) -> str:
     """The first paragraph of a docstring, whole: the list of commands would cut what is long."""
-    return " ".join(inspect.cleandoc(command.__doc__ or "").split("\n\n")[0].split())
+    return " ".join(inspect.cleandoc(docstring or "").split("\n\n")[0].split())
 
 
 def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -226,7 +267,7 @@ def _run(command: Callable[[], Any]) -> int:
         return _said(error, AT_FAULT)
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
-        return _said(f"{name}{error.strerror or error}", AT_FAULT)
+        return _said(FileError(f"{name}{error.strerror or error}"), AT_FAULT)
     except KeyboardInterrupt as error:
         return _said(str(error) or "interrupted; no file was written", INTERRUPTED)
     except Exception as error:  # noqa: BLE001  a fault of ours is said as one, too

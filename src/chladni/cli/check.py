@@ -1,18 +1,32 @@
-"""``chladni check``: what of a case will be used, what not, what cannot be right."""
+"""``chladni check``: what of a case or deck will be used, what not, what cannot be right."""
 
-from ..errors import AccuracyError
+from dataclasses import asdict
+from pathlib import Path
+
+from ..errors import AccuracyError, FileError
 from ..progress import within
+from ..report.blocks import Table
 from ..report.result_json import to_json
+from ..report.words import counted
 from ..workflows.case_check import check
-from .run import CaseFolder, Out, opened, started
+from ..workflows.deck_check import check_deck
+from ..workflows.loaded_model import is_case
+from .run import Allow, DeckOrCase, Out, opened, say_sections, started
 
 
 def run(
-    source: CaseFolder,
+    source: DeckOrCase,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Check a case before a long run: units, mass, size, places, band, words."""
+    """Check a case before a long run: units, mass, size, places, band, words; or a deck's cards."""
     from ..report.check_page import check_page
+
+    if source.is_file() and not is_case(source):
+        _deck(source, tuple(allow or ()), out)
+        return
+    if allow:
+        raise FileError("--allow is of a bare deck; a case says [model] allow")
 
     with started("check", source, out) as job:
         case = opened(source)
@@ -29,3 +43,27 @@ def run(
     if found.faults:
         first = found.faults[0]
         raise AccuracyError(f"{source}: {first.text}; {first.remedy}")
+
+
+def _deck(source: Path, allow: tuple[str, ...], out: Path | None) -> None:
+    """The table of a deck's cards: which are read, passed over, not understood.
+
+    Raises
+    ------
+    AccuracyError
+        After the table is written, if the deck is refused.
+    """
+    with started("check", source, out) as job:
+        found = check_deck(source, allow)
+        job.json("check.json", asdict(found))
+        rows = [(c.name, str(c.count), c.use, c.meaning) for c in found.cards]
+        job.lead = f"{counted(len(rows), 'kind', 'kinds')} of cards; " + (
+            "the deck is refused." if found.refused else "the deck is read."
+        )
+        job.section("Cards", [Table(("card", "count", "use", "meaning"), rows, words=_WORDS)])
+        say_sections(job.lead, job.sections)
+    if found.refused:
+        raise AccuracyError(found.refused)
+
+
+_WORDS = ("card", "use", "meaning")

@@ -5,7 +5,6 @@ import shlex
 import sys
 import threading
 import time
-import unicodedata
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -16,7 +15,7 @@ from typing import IO
 
 import typer
 
-from ..errors import FileError
+from ..errors import FileError, plain_line
 from ..progress import Progress, terminal
 from ..report.blocks import Table
 from ..report.text_tables import table_lines
@@ -137,19 +136,6 @@ def _echo(text: str, error: bool) -> None:
     except BrokenPipeError:  # as of `| head`: who reads has gone, the work goes on
         stream = sys.stderr if error else sys.stdout
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def plain_line(text: str) -> str:
-    """Text without what would steer a terminal: names in files may hold anything.
-
-    >>> plain_line("a" + chr(27) + "[31mb")
-    'a?[31mb'
-    """
-    return "".join("?" if _steers(c) else c for c in text)
-
-
-def _steers(c: str) -> bool:
-    return c not in "\n\t" and unicodedata.category(c) in ("Cc", "Cf", "Cs")
 
 
 def say_table(table: Table) -> None:

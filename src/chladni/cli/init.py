@@ -1,16 +1,17 @@
 """``chladni init``: a commented case.toml and sensors.csv from a deck and a recording."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..case import load_case
+from ..case import Case, load_case
 from ..errors import ChladniError, FileError
 from ..output import write_text
+from ..workflows.case_check import NO_RECORDING, check
 from ..workflows.case_draft import CaseDraft, case_text, draft, said_of, sensors_text
-from .console import say
+from ..workflows.ready_case import refuse_without_effects
+from .console import say, watched
 from .run import Allow, Out, Units, place_of, started
 
 
@@ -45,7 +46,7 @@ def run(
             write_text(job.folder / "sensors.csv", sensors_text(made))
         for sentence in _sentences(made):
             job.say(sentence)
-    say(_next(place, made.missing))
+    say(_next(place, made))
 
 
 def _sentences(made: CaseDraft) -> list[str]:
@@ -55,11 +56,28 @@ def _sentences(made: CaseDraft) -> list[str]:
     return [*out, *made.notes, *(f"missing: {text}" for text in made.missing)]
 
 
-def _next(place: Path, missing: Sequence[str]) -> str:
-    """State if the case can be used, else the words without which it cannot."""
+def _next(place: Path, made: CaseDraft) -> str:
+    """State if the case can be used, else the first reason why a comparison would refuse it."""
+    if made.nowhere:
+        return "not complete yet: no output or input has a place; add rows to sensors.csv"
     try:
-        load_case(place)
+        case = load_case(place)
     except ChladniError as error:
         return f"not complete yet: {error}"
-    said = "can be used; what is missing would improve it" if missing else "is complete"
+    if not made.read:
+        return f"not complete yet: there is no recording; {NO_RECORDING}"
+    if why := _refusal(case):
+        return f"not ready yet: {why}; next: chladni check {place}"
+    said = "can be used; what is missing would improve it" if made.missing else "is complete"
     return f"the case {said}; next: chladni check {place}"
+
+
+def _refusal(case: Case) -> str:
+    """The first reason why diagnose would refuse the case before its fit; "" for none."""
+    try:
+        refuse_without_effects(case)
+        with watched() as progress:
+            faults = check(case, progress=progress).faults
+    except ChladniError as error:
+        return str(error).removeprefix(f"{case.path}: ")
+    return f"{faults[0].text}; {faults[0].remedy}" if faults else ""

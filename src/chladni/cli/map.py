@@ -69,6 +69,6 @@ def run(
 def _pair(text: str) -> tuple[str, int]:
     """PART=ID."""
     name, _, number = text.rpartition("=")
-    if not name.strip() or not number.strip().isdecimal():
+    if not name.strip() or not (number.strip().isdecimal() and number.isascii()):
         raise FileError(f"--pair {text!r} is not of the form PART=ID, for example inner=3")
     return name.strip(), int(number)

@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from ..arrays import whole_number
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import FileError
 from ..geometry.clearance import Gaps, PairClearance, all_gaps, nearest, summary
@@ -82,7 +83,7 @@ def numbers(text: str) -> list[int]:
     try:
         for piece in filter(None, text.replace(" ", "").split(",")):
             first, _, last = piece.partition("-")
-            found += range(int(first), int(last or first) + 1)
+            found += range(whole_number(first), whole_number(last or first) + 1)
     except ValueError:
         raise FileError(f"--modes {text!r} is not of the form 1-12 or 7,9") from None
     if found and min(found) < 1:

@@ -24,7 +24,8 @@ def run(
 ) -> None:
     """Write report.html of a diagnosis again, for example with a changed note or title."""
     result = read_diagnosis(folder)
-    figures = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix in (".png", ".gif", ".svg")}
+    files = [p for p in sorted(folder.iterdir()) if not p.is_symlink()]
+    figures = {p.stem: p for p in files if p.suffix in (".png", ".gif", ".svg")}
     tables = [Section("Pictures as files", [Links([(p.name, n) for n, p in figures.items()])])]
     old = drawings_of(folder / "report.html")
     if out is None or out.resolve() == folder.resolve():

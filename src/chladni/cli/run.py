@@ -6,21 +6,22 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
-from ..case import Case, load_case
-from ..case.files_of_source import files_of
+from ..arrays import real_number
 from ..errors import FileError
 from ..output import run_folder, write_json
 from ..progress import Progress, within
 from ..report.blocks import Block, Code, Items, Links, PageParts, Section, Table
 from ..report.drawings import Drawings
 from ..report.page import write_sections
-from ..workflows.diagnosis_result import DiagnosisResult
-from ..workflows.loaded_model import is_case
 from .console import console, say, say_results, say_table, watched
+
+if TYPE_CHECKING:
+    from ..case import Case
+    from ..workflows.diagnosis_result import DiagnosisResult
 
 
 def folder_named(text: str) -> Path:
@@ -141,6 +142,8 @@ def started(
     command: str, source: Path | str, out: Path | None, *, listed: bool = True, adds: bool = False
 ) -> Iterator[Run]:
     """A run whose files appear in ``out`` only if nothing failed; by default in ./runs."""
+    from ..case.files_of_source import files_of
+
     place = place_of(command, Path(source), out)
     with run_folder(place, command, files_of(Path(source)), listed=listed, adds=adds) as folder:
         with watched() as progress:
@@ -167,7 +170,7 @@ def place_of(command: str, source: Path, out: Path | None) -> Path:
     return out or Path("runs") / f"{command}-{_name(source)}"
 
 
-def opened(source: Path) -> Case:
+def opened(source: Path) -> "Case":
     """The case of a folder or a case.toml.
 
     Raises
@@ -175,6 +178,9 @@ def opened(source: Path) -> Case:
     FileError
         If it is no case.
     """
+    from ..case import load_case
+    from ..workflows.loaded_model import is_case
+
     if source.exists() and not is_case(source):
         raise FileError(
             f"{source} is not a case; give a folder with a case.toml (chladni init drafts one)"
@@ -185,13 +191,13 @@ def opened(source: Path) -> Case:
 class Diagnosing(Protocol):
     """A workflow from a case to a diagnosis."""
 
-    def __call__(self, source: Case, *, progress: Progress) -> DiagnosisResult:
+    def __call__(self, source: "Case", *, progress: Progress) -> "DiagnosisResult":
         """Diagnose or calibrate."""
 
 
 def diagnosed(
     command: str, source: Path, out: Path | None, workflow: Diagnosing
-) -> DiagnosisResult:
+) -> "DiagnosisResult":
     """Diagnose or calibrate a case into a folder and say the verdict.
 
     Raises
@@ -221,7 +227,7 @@ def limits(text: str) -> tuple[float, float]:
     (20.0, 200.0)
     """
     try:
-        low, high = (float(x) for x in text.replace(",", ":").split(":"))
+        low, high = (real_number(x) for x in text.replace(",", ":").split(":"))
     except ValueError:
         raise FileError(f"--band {text!r} is not of the form 20:200") from None
     if not 0 <= low < high < float("inf"):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import real_number
 from ..errors import FileError
 from ..geometry.cross_section import cross_section, thick_lines
 from ..io.scanned_surface import read_scan
@@ -23,7 +24,7 @@ def plane(text: str) -> tuple[int, float]:
     """
     name, _, value = text.replace(" ", "").partition("=")
     try:
-        return "xyz".index(name.lower() or "?"), float(value)
+        return "xyz".index(name.lower() or "?"), real_number(value)
     except ValueError:
         raise FileError(f"--section {text!r} is not of the form x=0.3, y=-0.1 or z=1.2") from None
 

@@ -11,7 +11,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
 from ..parallel import one_blas_thread
-from ..sparse.dissection import Fronts, analyse, pattern
+from ..sparse.elimination_fronts import Fronts, analyse, pattern
 from ..sparse.factor import Backend, Factor, factorise, inertia
 from ..sparse.lanczos import Ritz, block_lanczos
 from ..sparse.multifrontal import NotDefinite
@@ -42,7 +42,6 @@ def normal_modes(
     *,
     band: float | None = None,
     shift: float | None = None,
-    points: np.ndarray | None = None,
     backend: Backend = "multifrontal",
     proof: bool = True,
 ) -> ModalModel:
@@ -58,7 +57,6 @@ def normal_modes(
                                 dofs with mass), else 20
     band : float, optional      all modes up to this frequency [Hz] (with ``count``: the fewer)
     shift : float, optional     σ [rad²/s²], negative; default from the scale of the problem
-    points : (n, 3), optional   place of each row's node [m]: a better elimination order
     backend : str               of :func:`factorise`
     proof : bool                False omits the Sturm count (a quarter of the time)
 
@@ -78,7 +76,7 @@ def normal_modes(
     elif massive.sum() <= _DENSE:
         lam, phi = _condensed(K, M, system.dofs, massive, count, limit)
     else:
-        fronts = analyse(pattern(K, M), points, system.dofs[:, 0])
+        fronts = analyse(pattern(K, M), system.dofs[:, 0])
         order = fronts.order  # Lanczos runs in the order of elimination
         problem = _Problem(K, M, M[order][:, order], system.dofs, backend, fronts)
         lam, phi = _held(lambda p: _sparse(p, count, limit, shift, proof), problem)

@@ -6,11 +6,12 @@ from typing import Literal, Self, get_args
 
 import numpy as np
 
+from ..arguments import checked
 from ..arrays import readonly
 from ..dofs import label as text_of
 from ..dofs import positions
 from ..errors import LabelError, ShapeError, named
-from ..sparse.dissection import analyse, pattern
+from ..sparse.elimination_fronts import analyse, pattern
 from ..sparse.factor import factorise
 from .massless import static_solver
 from .modes import ModalModel
@@ -86,6 +87,7 @@ class FRF:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         object.__setattr__(self, "inputs", tuple(self.inputs))
 
+    @checked
     def sel(
         self,
         outputs: Sequence[str] | None = None,
@@ -95,6 +97,8 @@ class FRF:
         """Select labels (in this order) and a band [Hz]."""
         outputs = self.outputs if outputs is None else tuple(outputs)
         inputs = self.inputs if inputs is None else tuple(inputs)
+        if band[0] > band[1]:
+            raise LabelError(f"band = {band} is empty; give (low, high) in Hz")
         k = np.flatnonzero((band[0] <= self.frequency) & (self.frequency <= band[1]))
         cut = np.ix_(k, positions(outputs, self.outputs), positions(inputs, self.inputs))
         return replace(
@@ -107,6 +111,7 @@ class FRF:
             coherence=None if self.coherence is None else self.coherence[cut],
         )
 
+    @checked
     def to(self, quantity: Quantity) -> Self:
         """Convert to another kinematic quantity: each derivative is a factor iω.
 
@@ -193,6 +198,7 @@ def _weighted(h: np.ndarray, phi_out: np.ndarray, phi_in: np.ndarray) -> np.ndar
     return H.reshape(shape)
 
 
+@checked
 def synthesise(
     modal: ModalModel,
     phi_out: np.ndarray,
@@ -232,7 +238,6 @@ def residual_flexibility(
     load: np.ndarray,
     *,
     shift: float | None = None,
-    points: np.ndarray | None = None,
 ) -> Residual:
     """R_0 = b_oᵀ A⁻¹ b_i - Σ φφᵀ/(λ_r - σ), R_1 = b_oᵀ A⁻¹ M A⁻¹ b_i - ..., A = K - σ M.
 
@@ -246,7 +251,7 @@ def residual_flexibility(
     """
     lam = (2 * np.pi * modal.frequency) ** 2
     sigma = -1e-2 * lam[-1] if shift is None else shift
-    solve = static_solver(system, sigma, points)
+    solve = static_solver(system, sigma)
     X = solve(np.asarray(load, dtype=float))
     Y = solve(system.M @ X)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
@@ -274,7 +279,6 @@ def direct_frf(
     frequency: np.ndarray,
     *,
     structural: float = 0.0,
-    points: np.ndarray | None = None,
 ) -> FRF:
     """Receptance without modes, H(ω) = (K (1 + i g) - ω² M + i ω V)⁻¹: a slow, exact reference.
 
@@ -286,7 +290,7 @@ def direct_frf(
     frequency = np.asarray(frequency, dtype=float)
     load = unit_columns(len(system.dofs), rows_in)
     K = system.K * (1 + 1j * structural)
-    order = analyse(pattern(K, system.M, system.V), points, system.dofs[:, 0])
+    order = analyse(pattern(K, system.M, system.V), system.dofs[:, 0])
     H = np.empty((len(frequency), len(rows_out), len(rows_in)), dtype=complex)
     for k, omega in enumerate(2 * np.pi * frequency):
         Z = K - omega**2 * system.M + 1j * omega * system.V

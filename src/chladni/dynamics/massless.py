@@ -23,9 +23,7 @@ def stiffened(K: sp.csr_array) -> sp.csr_array:
     return sp.csr_array(K + _STIFFENED * sp.diags_array(K.diagonal()))
 
 
-def static_solver(
-    system: System, sigma: float, points: np.ndarray | None = None
-) -> Callable[[np.ndarray], np.ndarray]:
+def static_solver(system: System, sigma: float) -> Callable[[np.ndarray], np.ndarray]:
     """X = (K - σM)⁻¹ B for columns B (n, k), σ < 0; massless mechanisms are held.
 
     Raises
@@ -35,10 +33,10 @@ def static_solver(
     """
     K, M, nodes = sp.csr_array(system.elastic), system.M, system.dofs[:, 0]
     try:
-        return factorise(K - sigma * M, points, nodes=nodes).solve
+        return factorise(K - sigma * M, nodes=nodes).solve
     except NotDefinite:
         held = stiffened(K)
-        factor = factorise(held - sigma * M, points, nodes=nodes)
+        factor = factorise(held - sigma * M, nodes=nodes)
 
     def solve(B: np.ndarray) -> np.ndarray:
         X = factor.solve(B)

@@ -133,7 +133,7 @@ class Basis:
         return out
 
 
-def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> Factor:
+def shifted(system: System, hertz: float) -> Factor:
     """Factor of K + (2π f)² M, positive definite for a free structure too.
 
     The dofs of a node are kept together, because ordering them separately takes forty times as
@@ -146,11 +146,11 @@ def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> F
     """
     mass = (2 * np.pi * hertz) ** 2 * system.M
     try:
-        return factorise(sp.csc_array(system.K + mass), points, nodes=system.dofs[:, 0])
+        return factorise(sp.csc_array(system.K + mass), nodes=system.dofs[:, 0])
     except NotDefinite:
         held = stiffened(sp.csr_array(system.elastic))
     try:
-        return factorise(sp.csc_array(held + mass), points, nodes=system.dofs[:, 0])
+        return factorise(sp.csc_array(held + mass), nodes=system.dofs[:, 0])
     except NotDefinite as error:
         point, component = system.dofs[error.row].tolist()
         raise ModelError(

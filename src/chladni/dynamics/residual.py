@@ -14,9 +14,7 @@ _ROUNDING = 1e-18  # of the energy in the modes: less is rounding, and the modes
 _BEYOND = 1e8  # times the highest λ kept: a residual vector above it has practically no mass
 
 
-def with_residual_vectors(
-    system: System, modal: ModalModel, load: np.ndarray, points: np.ndarray | None = None
-) -> ModalModel:
+def with_residual_vectors(system: System, modal: ModalModel, load: np.ndarray) -> ModalModel:
     """The modes and R = (K + ε M)⁻¹ (P - M Φ Φᵀ P) made orthogonal, as modes above them.
 
     Rayleigh-Ritz in span(R) gives vectors with unit mass, orthogonal to Φ and to each other in M
@@ -29,7 +27,7 @@ def with_residual_vectors(
     """
     phi, K, M = modal.shapes, system.elastic, system.M
     top = float((2 * np.pi * modal.frequency[-1]) ** 2) or 1.0
-    solve = static_solver(system, -_NEAR_STATIC * top, points)
+    solve = static_solver(system, -_NEAR_STATIC * top)
     R = solve(load - M @ (phi @ (phi.T @ load)))
     R = R - phi @ (phi.T @ (M @ R))
     lam = (2 * np.pi * modal.frequency) ** 2

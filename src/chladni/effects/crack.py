@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from ..fem.sparse_assembly import blocks, congruence
 from ..geometry.facets import cell_areas, cell_normals, tangents, unit
@@ -334,6 +333,8 @@ def _scored(context: SearchContext, effect: Effect, x: np.ndarray) -> tuple[floa
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """Remove 50 to 80 % of the bending stiffness of the finer shells along a line of the deck."""
+    from scipy.spatial import cKDTree
+
     lines = LineFinder.of(article.deck)
     options = lines.drawn(farthest_point_sample(lines.middle, PLACES), (1.0, 1.7))
     line = options[int(rng.integers(len(options)))]

@@ -6,7 +6,6 @@ from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import linear_sum_assignment
 
 from ..dynamics.modes import ModalModel
 from ..fem.assemble import Structure
@@ -178,6 +177,8 @@ class _CoarseModes:
 
     def changed_to(self, finer: Structure, modes: ModalModel) -> _ModalChange:
         """The change by a finer structure with modes Ψ."""
+        from scipy.optimize import linear_sum_assignment
+
         overlap = self.rows @ (finer.rows(self.dofs) @ modes.shapes)
         own, partner = linear_sum_assignment(-(overlap**2))
         soft = np.argsort(self.omega[own], kind="stable")

@@ -13,7 +13,6 @@ from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from ..geometry.facets import cell_normals, tangents
 from .effect import WIDER, Effect, Parameter, PointTerm, Traits, Weight
@@ -286,6 +285,8 @@ def attachments(
 
 def around(grids: ElementGrids, places: ElementGrids, k: int) -> ElementGrids:
     """A denser sample of the grids round one of the places, up to half-way to the others."""
+    from scipy.spatial import cKDTree
+
     nearest = cKDTree(places.point).query(grids.point)[0]
     own = np.linalg.norm(grids.point - places.point[k], axis=1)
     near = np.flatnonzero(own <= nearest * (1 + 1e-9))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .effect import Effect
 from .effect_context import EffectContext, ElementGrids
@@ -214,6 +213,8 @@ def valleys(
     point : (n, 3)     [m]; positions that share a point are neighbours
     taken : positions chosen before
     """
+    from scipy.spatial import cKDTree
+
     places, place = np.unique(point, axis=0, return_inverse=True)
     least = np.full(len(places), np.inf)
     np.minimum.at(least, place, score)

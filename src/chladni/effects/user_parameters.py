@@ -45,6 +45,7 @@ SD_OTHERS = 0.3  # joints and directional moduli are less certain
 NEAR_BOUND = 0.9  # of the way to a bound: the value counts as on the bound
 SAME = 1e-9
 AWAY = 1e-3  # relative step of the finite difference for the second slope
+FARTHEST = 20.0  # largest factor on the deck's own value: beyond it the unit is another
 SERVES = 0.3  # of the way of nu to 1/2: there two terms of 1/(1 - 2 nu) are accurate to 3 %
 
 
@@ -253,6 +254,24 @@ def with_factor(assembly: Assembly, free: FreeParameter, factor: float) -> Assem
         if rows:
             assembly = _with_lumps(assembly, factor, family, rows)
     return assembly
+
+
+def why_implausible(
+    field: str, value: float, own: float, farthest: float = FARTHEST, scale: float = 1.0
+) -> str:
+    """Say why a value cannot replace the deck's own; "" where it can.
+
+    Parameters
+    ----------
+    own : the deck's value, in the unit of ``value``
+    farthest : largest factor between them
+    scale : unit in which the sentence names both
+    """
+    if field == "nu" and value >= 0.5:
+        return f"{value:.3g} is too large: materials have less than 0.5"
+    if 1 / farthest <= value / own <= farthest:
+        return ""
+    return f"{value / scale:g} is {value / own:.3g} times the deck's own {own / scale:g}"
 
 
 def values_of(assembly: Assembly, free: FreeParameter) -> np.ndarray:

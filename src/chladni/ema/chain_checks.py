@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .finding import Check, Finding
+from .frf_maps import Misreading
 from .identification import Identified
 from .shapes import constants
 
@@ -87,6 +88,14 @@ def hinted_delay(identified: Identified) -> float:
     return fit.delay if hint and fit.before > HINTED * fit.after else 0.0
 
 
+def is_quarter_turn(identified: Identified) -> bool:
+    """Return True if the phases of the modal constants are 90 degrees from real."""
+    if identified.order < LEAST_MODES:
+        return False
+    fit = fitted_delay(np.abs(identified.poles), phases(identified))
+    return bool(fit.quarter and fit.after < QUARTER)
+
+
 def phase_checks(
     identified: Identified, corrected: Identified | None = None, delay: float = 0.0
 ) -> tuple[list[Finding], Check]:
@@ -98,11 +107,9 @@ def phase_checks(
     """
     if identified.order < LEAST_MODES:
         return [], Check("phase of the modes", f"needs {LEAST_MODES} modes", None)
-    omega, theta = np.abs(identified.poles), phases(identified)
-    before = float(np.sqrt((np.sin(theta) ** 2).mean()))
+    before = float(np.sqrt((np.sin(phases(identified)) ** 2).mean()))
     said = f"the rms phase error of the modal constants is {np.degrees(before):.2g} degrees"
     found: list[Finding] = []
-    fit = fitted_delay(omega, theta)
     if corrected is not None and corrected.order > LEAST_MODES:
         rest = fitted_delay(np.abs(corrected.poles), phases(corrected))
         whole = delay + rest.delay
@@ -110,7 +117,7 @@ def phase_checks(
         better = BETTER * max(rest.after, 1e-3) < before and corrected.chi < identified.chi
         if better and abs(whole) > SURE * rest.sd and abs(whole) * top > TURNED:
             found.append(_late(whole, rest.sd, top))
-    elif fit.quarter and fit.after < QUARTER:
+    elif is_quarter_turn(identified):
         found.append(_quarter(identified.quantity))
     return found, Check("phase of the modes", said, not found)
 
@@ -136,28 +143,27 @@ def _quarter(quantity: str) -> Finding:
     return Finding("wrong quantity", text, "fault", (), mend, 1.0)
 
 
-def other_quantity(identified: Identified, others: dict[str, Identified]) -> list[Finding]:
-    """Find the quantity under which a recording without clear modes has many.
+def other_reading(identified: Identified, others: dict[Misreading, Identified]) -> list[Finding]:
+    """Find the reading under which a recording that has no clear modes, or other ones, has them.
 
     Parameters
     ----------
-    others : {quantity: the modes of the same numbers read as this quantity}
+    others : {error: the modes of the same numbers, read as this error says}
     """
-    able = {
-        name: o
-        for name, o in others.items()
-        if o.order >= LEAST_MODES + identified.order and HINTED * o.chi < identified.chi
-    }
+    few = identified.order < LEAST_MODES
+    least, much = (identified.order + LEAST_MODES, HINTED) if few else (identified.order, BETTER)
+    able = {e: o for e, o in others.items() if o.order >= least and much * o.chi < identified.chi}
     if not able:
         return []
-    best = min(able, key=lambda name: able[name].chi)
+    best = min(able, key=lambda error: able[error].chi)
     text = (
         f"read as {identified.quantity} the recording has {identified.order} modes and a residual "
-        f"of {identified.chi:.3g} times its noise; read as {best} it has {able[best].order} modes "
-        f"and a residual of {able[best].chi:.3g}."
+        f"of {identified.chi:.3g} times its noise; read as if {best.text}, it has "
+        f"{able[best].order} modes and a residual of {able[best].chi:.3g}."
     )
-    mend = f'in case.toml, [test]: quantity = "{best}"'
-    return [Finding("wrong quantity", text, "fault", (), mend)]
+    next_best = min((o.chi for e, o in others.items() if e != best), default=np.inf)
+    undo = best.mend if BETTER * able[best].chi < next_best else ()
+    return [Finding(best.kind, text, "fault", (), best.repair, mend=undo)]
 
 
 def modal_gains(
@@ -206,13 +212,14 @@ def level_checks(
         found.append(_quantity(identified, order))
     level = float(np.median(rest))
     opposite = positive if abs(order) == 2 else 1 - positive  # two derivatives turn every sign
-    if opposite > 0.8 and abs(order) != 1:
+    if known_gain and opposite > 0.8 and abs(order) != 1:
         text = (
             f"{100 * opposite:.0f} % of the modes have the sign opposite to the model's: the force "
             "gauge (or every sensor) is reversed."
         )
         mend = f"in sensors.csv reverse the direction of input {identified.inputs[0]}"
-        found.append(Finding("reversed force", text, "fault", (), mend, -1.0))
+        undo = ("factor", "-1")
+        found.append(Finding("reversed force", text, "fault", (), mend, -1.0, undo))
     if known_gain and abs(level) > np.log(LOUD):
         found.append(_unit(level))
     said = f"{np.exp(np.median(size)):.3g} times the model, over {len(gains)} modes"
@@ -256,6 +263,7 @@ def _unit(level: float) -> Finding:
     said = f"the recording is {np.exp(level):.3g} times the model"
     if abs(level + np.log(factor)) < NEAR_FACTOR:
         mend = f"in case.toml, [test]: factor = {factor:.7g}"
-        return Finding("wrong units", f"{said}: {why}.", "fault", (), mend, factor)
+        undo = ("factor", f"{factor:.7g}")
+        return Finding("wrong units", f"{said}: {why}.", "fault", (), mend, factor, undo)
     mend = 'check the calibration, or in case.toml, [test]: gain = "unknown"'
     return Finding("level", f"{said}, which no unit explains.", "warning", (), mend, np.exp(level))

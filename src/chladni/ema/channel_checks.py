@@ -12,6 +12,7 @@ import numpy as np
 from ..dynamics.frf import FRF
 from .finding import Check, Finding
 from .screening import noise_of
+from .value_checks import cut_off, jumping_phase, without_phase
 
 LEAST_LINES = 12
 NOISE_ONLY = 0.3  # noise over power of the median line: nothing but noise has more
@@ -41,10 +42,13 @@ def channel_checks(
     findings: list[Finding] = []
     checks: list[Check] = []
     for found, check in (
-        dead(frf, alive), incoherent(frf), reversed_drive(frf), reciprocity(frf)
+        jumping_phase(frf, NOISE_ONLY), dead(frf, alive), incoherent(frf), reversed_drive(frf),
+        reciprocity(frf), without_phase(frf), cut_off(frf),
     ):  # fmt: skip
         findings += found
         checks.append(check)
+    if findings and findings[0].kind == "jumping phase":
+        findings = [f for f in findings if f.kind != "dead channel"]
     silent = {c for f in findings if f.kind == "dead channel" for c in f.channels}
     alive = [o for o in frf.outputs if o not in silent]
     if alive:
@@ -106,13 +110,13 @@ def incoherent(frf: FRF) -> tuple[list[Finding], Check]:
 
 
 def drive_points(frf: FRF) -> list[tuple[int, int, int]]:
-    """(output, input, sign) of dofs that are both, by their labels."""
+    """(output, input, sign) of dofs that are both, by their labels; node 0 is no place."""
     bare = {label: re.sub(r":[+-]", ":", label) for label in (*frf.outputs, *frf.inputs)}
     return [
         (i, j, 1 if (":-" in o) == (":-" in p) else -1)
         for i, o in enumerate(frf.outputs)
         for j, p in enumerate(frf.inputs)
-        if bare[o] == bare[p] and not p.startswith("base")
+        if bare[o] == bare[p] and not p.startswith(("base", "0:"))
     ]
 
 

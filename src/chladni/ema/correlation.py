@@ -12,12 +12,14 @@ from typing import Literal
 
 import numpy as np
 
+from ..arguments import checked
 from ..dynamics.frf import FRF
 from ..errors import LabelError, ShapeError, named
 
 _LN10 = np.log(10.0)
 
 
+@checked
 def mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
     """Modal assurance criterion |φᴴψ|² / (φᴴφ ψᴴψ), every mode of Φ against every mode of Ψ.
 
@@ -37,6 +39,7 @@ def mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
     >>> mac(np.eye(2), np.array([[1.0, 1.0], [0.0, 1.0]]))
     array([[1. , 0.5], [0. , 0.5]])
     """
+    phi, psi = np.asarray(phi), np.asarray(psi)
     if len(phi) != len(psi):
         raise ShapeError(f"shapes over {len(phi)} and {len(psi)} dofs cannot be compared")
     power = np.outer(_power(phi, 0), _power(psi, 0))

@@ -7,7 +7,8 @@ from typing import Literal
 
 from ..errors import named
 
-Severity = Literal["fault", "warning"]
+Severity = Literal["fault", "warning", "mended"]
+_BEGINS = {"fault": "Measurement fault", "warning": "Look at this", "mended": "Mended"}
 TINY = 1e-12  # a smaller probability is a word, not a number
 
 
@@ -28,10 +29,13 @@ class Finding:
     ----------
     kind : what it is, in a few words (duplicated channels, reversed sign, delay, ...)
     text : one sentence with the numbers
-    severity : a fault is to be mended before anything is fitted; a warning is to be checked
+    severity : a fault is to be mended before anything is fitted; a warning is to be checked; what
+        was a fault is mended where the diagnosis applied ``mend``
     channels : labels of the outputs (or inputs) it concerns; none: the whole chain
     repair : a line of case.toml or sensors.csv that would mend it, or what to do
     value : its size (a gain, a delay [s], a ratio, ...), nan where it has none
+    mend : name and arguments of the map of the FRFs (:mod:`.frf_maps`) that undoes it exactly; none
+        where no map does, or the cause is not beyond doubt
     """
 
     kind: str
@@ -40,6 +44,7 @@ class Finding:
     channels: tuple[str, ...] = ()
     repair: str = ""
     value: float = float("nan")
+    mend: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,16 +91,22 @@ class Screening:
         count = Counter(f.kind + _of(f.channels) for f in self.findings)
         kinds = ", ".join(f"{n} times {what}" if n > 1 else what for what, n in count.items())
         word = "at fault" if self.faults else "to be checked"
+        if all(f.severity == "mended" for f in self.findings):
+            word = "mended"
         return f"{self.name} is {word}: {kinds}"
 
     @property
     def notes(self) -> tuple[str, ...]:
         """One sentence a finding, with its repair."""
         return tuple(
-            f"{'Measurement fault' if f.severity == 'fault' else 'Look at this'}: {f.text}"
-            + (f" Repair: {f.repair}." if f.repair else "")
-            for f in self.findings
+            f"{_BEGINS[f.severity]}: {f.text}" + (f" Repair: {f.repair}." if f.repair else "")
+            for f in sorted(self.findings, key=lambda f: f.severity != "mended")
         )
+
+    @property
+    def mended(self) -> tuple[str, ...]:
+        """Sentence on each fault that was undone before the fit."""
+        return tuple(f.text for f in self.findings if f.severity == "mended")
 
     def with_more(self, findings: Sequence[Finding], checks: Sequence[Check]) -> "Screening":
         """Add findings and checks; a fault already known for a channel is not repeated."""
@@ -112,7 +123,8 @@ def of_all(screenings: Sequence[Screening]) -> str:
     'at fault: reversed sign in a, b; to be checked: delay in b'
     """
     said = []
-    for severity, word in (("fault", "at fault"), ("warning", "to be checked")):
+    words = (("fault", "at fault"), ("warning", "to be checked"), ("mended", "mended"))
+    for severity, word in words:
         where: dict[str, list[str]] = {}
         for s in screenings:
             for f in s.findings:

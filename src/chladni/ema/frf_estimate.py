@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from ..arguments import refuse_fields
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError
 from .local_polynomial import local_polynomial
@@ -47,6 +48,9 @@ class EstimateSettings:
     resolution: float | None = None
     exponential: float | None = None
     band: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        refuse_fields(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,15 @@ Füllekrug and Link (2005), for modal tests at several levels.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
-from scipy.stats import chi2
 
 from .level_elements import ELEMENTS, Element
 from .level_modes import ModeLevels
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 FLOOR_FREQUENCY = 5e-4  # ln f between runs: what 4 K of temperature do to steel
 FLOOR_DAMPING = 0.05  # ln ζ between runs: what damping of clamped objects repeats to
@@ -57,6 +59,8 @@ class ElementFit:
     def p(self) -> float:
         """Chance of so large a χ² of the right element; nan where nothing could contradict it."""
         free = self.data - self.count
+        from scipy.stats import chi2
+
         return float(chi2.sf(self.chi2, free)) if free > 0 else float("nan")
 
     def at(
@@ -105,6 +109,8 @@ def fitted_elements(mode: ModeLevels) -> tuple[ElementFit, ...]:
 
 def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
     """Fit an element from its best starting values and keep the best fit."""
+    from scipy.optimize import least_squares
+
     largest = float(mode.amplitude.max())
     s_f, s_z = weights(mode)
     a, s = mode.amplitude / largest, mode.amplitude_sd / largest

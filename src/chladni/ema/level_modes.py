@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..dynamics.frf import FRF
 from .coincident_poles import alike_shapes, twins_joined
@@ -131,6 +130,8 @@ def chi2_about_mean(value: np.ndarray, sd: np.ndarray) -> float:
 
 
 def _p(value: np.ndarray, sd: np.ndarray) -> float:
+    from scipy.stats import chi2
+
     return float(chi2.sf(chi2_about_mean(value, sd), len(value) - 1))
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..dynamics.frf import Quantity
 from .identification import DERIVATIVES
@@ -178,6 +177,8 @@ def _studied(mode: ModeLevels) -> ModeStudy:
 
 def _p_of_runs(mode: ModeLevels) -> float:
     """Chance of such differences between runs at one level."""
+    from scipy.stats import chi2
+
     s_f, s_z = weights(mode)
     total = chi2_about_mean(np.log(mode.frequency), s_f) + chi2_about_mean(
         np.log(mode.damping), s_z
@@ -207,6 +208,8 @@ def _drifts(modes: Sequence[ModeLevels]) -> bool:
 
     The model ln f_r(level) = a_r + d(level) is fitted to modes seen at every level. It must fit.
     """
+    from scipy.stats import chi2
+
     most = max((len(m.level) for m in modes), default=0)
     whole = [m for m in modes if len(m.level) == most]
     moved = [m for m in whole if m.frequency_moves]

@@ -5,7 +5,6 @@ even distortion (Pintelon and Schoukens 2012, System Identification, section 4.3
 """
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from ..dynamics.frf import FRF
 from ..errors import FileError
@@ -35,6 +34,8 @@ def of_periods(record: TimeRecord, method: Estimator) -> tuple[FRF, float, str]:
     FileError
         If there is more than one input, or too few lines are driven.
     """
+    from scipy.ndimage import maximum_filter1d
+
     if len(record.inputs) > 1:
         raise FileError("periodic excitation drives one input at a time; give each its own file")
     s = spectra(record.force, record.response, record.rate)

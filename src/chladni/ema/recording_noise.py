@@ -31,12 +31,10 @@ class EqualisedError:
     ----------
     own : (k, n_s, n_out, n_in)      a channel's own linear unknowns, independent between channels
     common : (m, n_s, n_out, n_in)   the poles, one factor for all channels
-    upper : (n_s, n_out, n_in)       the whole upper residual of each channel
     """
 
     own: np.ndarray
     common: np.ndarray
-    upper: np.ndarray
 
 
 def equalised_error(
@@ -66,7 +64,7 @@ def equalised_error(
     value, vector = np.linalg.eigh(information)
     root = vector * np.sqrt(np.maximum(value, 0.0))
     columns = _equalised_columns(s / omega_max, p, q, identified.moved)
-    own, common, upper = [], [], []
+    own, common = [], []
     for c, (triangle, tied, _) in enumerate(known):
         x = np.concatenate([_pairs(R[:, c]), identified.lower.ravel()[c : c + 1] / omega_max**2,
                             identified.upper.ravel()[c : c + 1]])  # fmt: skip
@@ -74,10 +72,9 @@ def equalised_error(
         own.append(solve_triangular(triangle, columns.T, trans="T") / H)
         slopes = _equalised_slopes(s / omega_max, p, R[:, c], q, identified.moved).T
         common.append(root.T @ (slopes / H - tied.T @ own[-1]))
-        upper.append(columns[:, -1] * x[-1] / H)
     shape = len(s), *identified.lower.shape
     local, shared = (np.stack(z, axis=-1).reshape(-1, *shape) for z in (own, common))
-    return EqualisedError(local, shared, np.stack(upper, axis=-1).reshape(shape))
+    return EqualisedError(local, shared)
 
 
 def equalised_noise(

@@ -1,26 +1,28 @@
 """Screening of a recording by itself and by the modes identified from it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
-from ..dynamics.frf import FRF, Quantity
+from ..dynamics.frf import FRF
+from .axis_shift import axis_check
 from .chain_checks import (
-    LEAST_MODES,
     LOUD,
     QUANTITIES,
     hinted_delay,
-    other_quantity,
+    other_reading,
     phase_checks,
 )
 from .channel_checks import channel_checks, dead
+from .channel_delays import channel_delays
 from .finding import Check, Finding, Screening
+from .frf_maps import Misreading, mapped, misreadings
 from .identification import Identified, identify
 from .screening import levels_checked
 from .setup import Recording
 from .shapes import lines_per_bandwidth
+from .signal_faults import signal_checks
 from .time_record import overloaded
 
 LINES = 3.0  # in a half-bandwidth: fewer leave the damping uncertain
@@ -35,6 +37,7 @@ def screened(
     places: dict[str, np.ndarray] | None = None,
     use: np.ndarray | None = None,
     calmer: Sequence[Recording] = (),
+    alone: bool = True,
 ) -> Screening:
     """Screen a recording: channels, overload, levels, and phases of the modes.
 
@@ -45,6 +48,7 @@ def screened(
     places : {output: (3,)} [m]
     use : (n_f,) bool, lines of that identification, default all; used again for a repetition
     calmer : more recordings of the test: a channel that works at a lower level is not dead
+    alone : False where a model follows, which tells how the numbers are to be read
     """
     frf = recording.frf
     if frf is None:
@@ -58,6 +62,12 @@ def screened(
             mend = "choose a larger range of the front end and measure again"
             findings.append(Finding("overload", text, "fault", (name.split()[-1],), mend, blocks))
         checks.append(Check("overload", f"{len(clipped)} channels are cut off", not clipped))
+        more, some = signal_checks(recording.time, frf)
+        findings += more
+        checks += some
+        more, one = channel_delays(frf, found)
+        findings += more
+        checks.append(one)
     else:
         checks.append(Check("overload", "needs time data", None))
     more, check = levels_checked(recording, others)
@@ -65,9 +75,16 @@ def screened(
     checks += check
     if found is not None:
         strong = strong_modes(found)
-        more, one = _phases(frf, strong, use)
+        read = other_readings(frf, strong, use) if alone else []
+        said = f"the identified modes leave {strong.chi:.3g} times the noise"
+        failed = Check("phase of the modes", said, False)
+        more, one = (read, failed) if read else _phases(frf, strong, use)
         findings += more
         checks.append(one)
+        if not more:
+            more, one = axis_check(frf, found, use)
+            findings += more
+            checks.append(one)
         checks.append(_lines(strong, frf.frequency))
     return Screening(recording.name, tuple(findings), tuple(checks))
 
@@ -89,23 +106,39 @@ def _alive_when_calm(recording: Recording, others: Sequence[Recording]) -> set[s
     return alive
 
 
+def _otherwise(frf: FRF) -> Iterator[Misreading]:
+    """Other quantities, the other sign of time, and other forms of complex numbers."""
+    for q in QUANTITIES:
+        if q != frf.quantity:
+            mend = f'in case.toml, [test]: quantity = "{q}"'
+            yield Misreading("wrong quantity", f"it were {q}", mend, ("quantity", q))
+    mend = "in case.toml, [test]: conjugated = true"
+    yield Misreading("conjugated FRFs", "it were conjugated", mend, ("conjugated",))
+    yield from misreadings(frf)
+
+
 def _rms(frf: FRF) -> np.ndarray:
     """Root mean square of each output over lines and inputs (n_out,)."""
     return np.sqrt((np.abs(frf.values) ** 2).mean(axis=(0, 2)))
 
 
+def other_readings(frf: FRF, strong: Identified, use: np.ndarray | None) -> list[Finding]:
+    """Identify a recording again in every other reading where its modes do not explain it.
+
+    A passive structure has stable poles with real modal constants: the right reading leaves the
+    noise alone.
+    """
+    if frf.quantity not in QUANTITIES or strong.chi <= POOR:
+        return []
+    read = {
+        error: strong_modes(identify(mapped(frf, error.mend), strong.band, use=use))
+        for error in _otherwise(frf)
+    }
+    return other_reading(strong, read)
+
+
 def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[Finding], Check]:
     """Check delay and quantity; in case of doubt, identify the recording again."""
-    if strong.order < LEAST_MODES and frf.quantity in QUANTITIES and strong.chi > POOR:
-        others = {
-            q: replace(frf, quantity=cast(Quantity, q)) for q in QUANTITIES if q != frf.quantity
-        }
-        read = {
-            q: strong_modes(identify(other, strong.band, use=use)) for q, other in others.items()
-        }
-        findings = other_quantity(strong, read)
-        if findings:
-            return findings, Check("phase of the modes", "too few modes are above the noise", False)
     delay = hinted_delay(strong)
     if not delay:
         return phase_checks(strong)

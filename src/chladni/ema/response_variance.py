@@ -1,7 +1,6 @@
 """Noise of frequency responses, as stated by a recording or estimated from its scatter."""
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from ..dynamics.frf import FRF
 
@@ -106,4 +105,6 @@ def _median_square(square: np.ndarray, size: np.ndarray, faint: bool) -> np.ndar
 
 def moving_mean(x: np.ndarray, lines: int) -> np.ndarray:
     """Moving mean over a number of lines (n_f, ...); the ends are repeated."""
+    from scipy.ndimage import uniform_filter1d
+
     return np.asarray(uniform_filter1d(x, min(lines, len(x)), axis=0, mode="nearest"))

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.special import gammaincc
 
 from ..dynamics.frf import FRF
@@ -209,6 +208,8 @@ def roughness(frf: FRF) -> np.ndarray:
     The residual of the middle of five against the least-squares parabola has variance 18/35 σ²
     on an even grid; medians over 21 lines keep resonances out.
     """
+    from scipy.ndimage import median_filter
+
     n = len(frf.frequency)
     if n < 5:
         raise ShapeError(f"{n} lines are too few to estimate the noise")

@@ -5,7 +5,6 @@ identification of all lines only makes them surer. No grid need be even.
 """
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ..dynamics.frf import FRF
 
@@ -22,6 +21,8 @@ def screening_lines(frf: FRF) -> np.ndarray:
     A resonance as narrow as the lines are apart keeps them all. Noise may look like one, never the
     other way about: noisier recordings keep more lines.
     """
+    from scipy.signal import find_peaks
+
     n = len(frf.frequency)
     if frf.values.size <= LONG:
         return np.ones(n, bool)

@@ -249,7 +249,8 @@ def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float, over: float)
     unless = "" if g == -1.0 else _UNLESS
     text += f" ({evidence_in_words(gain)}){unless}."
     severity: Severity = "fault" if g == -1.0 else "warning"
-    return _Fault(gain, over, Finding(kind, text, severity, (label,), mend, g))
+    undo = ("reversed", label) if g == -1.0 else ()
+    return _Fault(gain, over, Finding(kind, text, severity, (label,), mend, g, undo))
 
 
 def _exchanges(
@@ -276,7 +277,9 @@ def _exchanges(
         f"({evidence_in_words(gain)})."
     )
     mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
-    return _Fault(gain, np.inf, Finding("swapped channels", text, "fault", names, mend))
+    undo = ("exchanged", *names)
+    found = Finding("swapped channels", text, "fault", names, mend, mend=undo)
+    return _Fault(gain, np.inf, found)
 
 
 def _other_rows(

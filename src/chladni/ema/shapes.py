@@ -55,7 +55,7 @@ def driven_shapes(identified: Identified) -> np.ndarray:
 
 def real_shapes(identified: Identified) -> np.ndarray:
     """Real parts of the shapes (n_out, r), rotated to be as real as possible, of unit norm."""
-    psi = _turned(driven_shapes(identified).T).T.real
+    psi = turned(driven_shapes(identified).T).T.real
     return psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300)
 
 
@@ -105,8 +105,8 @@ def shapes(identified: Identified) -> MeasuredShapes:
     if drive is None:
         peak = np.take_along_axis(left, np.abs(left).argmax(axis=1)[:, None], axis=1)
         factor = 1 / np.where(peak == 0, 1, peak)
-        turned = _turned(left * factor)
-        values = turned / np.abs(turned).max(axis=1, keepdims=True)
+        real = turned(left * factor)
+        values = real / np.abs(real).max(axis=1, keepdims=True)
         factor, polarity = np.ones_like(factor), np.ones(len(A))
     else:
         i, j, sign = drive
@@ -139,12 +139,12 @@ def _drive(identified: Identified) -> tuple[int, int, int] | None:
         return identified.outputs.index(same[0]), identified.inputs.index(same[0]), 1
     for j, (node, component, sign) in enumerate(inputs):
         for i, (n, c, s) in enumerate(outputs):
-            if (n, c) == (node, component):
+            if (n, c) == (node, component) and node:  # node 0 is no place
                 return i, j, s * sign
     return None
 
 
-def _turned(psi: np.ndarray) -> np.ndarray:
+def turned(psi: np.ndarray) -> np.ndarray:
     """Each row turned by the phase that makes Σ ψ² real and positive (r, n)."""
     phase = 0.5 * np.angle((psi**2).sum(axis=1))
     return psi * np.exp(-1j * phase)[:, None]

@@ -33,7 +33,8 @@ def demodulated(record: TimeRecord) -> tuple[FRF, np.ndarray, tuple[str, ...]]:
     for force, response in zip(record.force, record.response, strict=True):
         for first, last in dwells(force[0]):
             settle = first + int(SETTLED * (last - first))
-            rows.append(_line(np.vstack([force, response])[:, settle:last], record.rate))
+            dwell = [force[:, settle:last], response[:, settle:last]]
+            rows.append(_line(np.vstack(dwell), record.rate))
     if len(rows) < 5:
         raise FileError(f"{len(rows)} dwells of constant frequency are found; five are needed")
     rows.sort(key=lambda row: row[0])

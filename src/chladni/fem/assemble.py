@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..dofs import rows as label_rows
 from ..dynamics.system import System
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
 from . import shell
+from .negative_springs import refuse_unstable
 from .shell_section import SectionArrays, section_arrays
 from .sparse_assembly import (
     EVERY,
@@ -122,7 +124,7 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     Raises
     ------
     ModelError
-        If no degree of freedom is left free.
+        If no degree of freedom is left free, or a spring of negative stiffness makes it unstable.
     """
     M, V, K, loss = over_all_motions(assembly, residual_bending)
     T, dofs = _transformation(assembly)
@@ -132,11 +134,11 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     idle = _without_stiffness(K, M, dofs, assembly.auto_spc)
     kept = np.flatnonzero(~idle)
     if not len(kept):
-        raise ModelError(
-            "no degree of freedom is free; check that the supports do not hold all of them"
-        )
+        why = "the supports hold all" if held.all() else "no element stiffens those that are free"
+        raise ModelError(f"no degree of freedom is left: {why}")
     if idle.any():
         K, M, T, dofs = K[kept][:, kept], M[kept][:, kept], sp.csr_array(T[:, kept]), dofs[kept]
+    refuse_unstable(assembly, K, dofs)
     labels = np.column_stack([assembly.ids[dofs[:, 0]], dofs[:, 1]])
     K, M, T = map(narrowed, (K, M, T))
     system = System(M, congruence(T, V), K, labels)
@@ -236,6 +238,17 @@ def supported(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
     return sp.csr_array(T[:, held]), dofs[held]
 
 
+def idle_motions(built: Structure) -> tuple[sp.csr_array, np.ndarray]:
+    """Unit motions of all points (6n, k) of dofs left out as without stiffness, and their rows.
+
+    The rows (k,) count six dofs a point, in displacement frames.
+    """
+    T, dofs = _transformation(built.assembly)
+    labels = np.column_stack([built.assembly.ids[dofs[:, 0]], dofs[:, 1]])
+    idle = (label_rows(labels, built.system.dofs) < 0) & ~_held(built.assembly, dofs)
+    return sp.csr_array(T[:, idle]), (6 * dofs[:, 0] + dofs[:, 1] - 1)[idle]
+
+
 def frames(assembly: Assembly) -> sp.csr_array:
     """u_basic = T q with q counted in each point's displacement frame: csr (6n, 6n)."""
     n = len(assembly.points)
@@ -289,17 +302,21 @@ def _diagonal_blocks(K: sp.csr_array, dofs: np.ndarray, triple: np.ndarray) -> n
 
 
 def _suspects(D: np.ndarray) -> np.ndarray:
-    """Triples with a small determinant in comparison with their cubed trace."""
-    scale = np.einsum("kii->k", D)
-    return np.flatnonzero(np.linalg.det(D) <= 10 * EMPTY * scale**3)
+    """Triples with a small determinant in comparison with their cubed norm."""
+    scale = np.linalg.norm(D, axis=(1, 2))
+    return np.flatnonzero(np.abs(np.linalg.det(D)) <= 10 * EMPTY * scale**3)
 
 
 def _idle(D: np.ndarray) -> np.ndarray:
-    """(k, 3) bool: for each direction of D (k, 3, 3) without stiffness, the nearest component."""
+    """(k, 3) bool: for each direction of D (k, 3, 3) without stiffness, the nearest component.
+
+    A negative stiffness is a stiffness.
+    """
     value, vector = np.linalg.eigh(D)
+    least = EMPTY * np.abs(value).max(axis=1)
     idle, every = np.zeros((len(D), 3), bool), np.arange(len(D))
     for r in range(3):
-        soft = value[:, r] <= EMPTY * np.maximum(value[:, 2], 0)
+        soft = np.abs(value[:, r]) <= least
         nearest = np.argmax(np.where(idle, -1, np.abs(vector[:, :, r])), axis=1)
         idle[every[soft], nearest[soft]] = True
     return idle

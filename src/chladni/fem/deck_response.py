@@ -67,12 +67,8 @@ def _modes(built: Structure, analysis: Analysis, case: Subcase) -> ModalModel:
     if band is None and not count:
         raise ModelError(f"METHOD {case.method} gives neither an upper frequency nor a count")
     n = len(built.system.dofs)
-    modal = normal_modes(built.system, min(count, n) or None, band=band, points=_places(built))
+    modal = normal_modes(built.system, min(count, n) or None, band=band)
     return modal.sel(modal.frequency >= low) if np.isfinite(low) else modal
-
-
-def _places(built: Structure) -> np.ndarray:
-    return built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
 
 
 def _completed(
@@ -80,7 +76,7 @@ def _completed(
 ) -> ModalModel:
     """Add residual vectors to the modes, and the damping of TABDMP1 at their frequencies."""
     if case.residual and patterns.shape[1] and len(modal):
-        modal = with_residual_vectors(built.system, modal, patterns, points=_places(built))
+        modal = with_residual_vectors(built.system, modal, patterns)
     if case.damping in analysis.damping:
         f, zeta = analysis.damping[case.damping]
         modal = with_table(modal, DampingTable(f, zeta, "crit"))

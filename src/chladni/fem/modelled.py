@@ -61,10 +61,9 @@ def modelled(assembly: Assembly, band: float) -> Modelled:
 
 def solved(built: Structure, band: float) -> Modelled:
     """The modes of a structure up to ``band`` [Hz], the first whatever it is."""
-    points = node_points(built)
-    modes = normal_modes(built.system, band=band, points=points)
+    modes = normal_modes(built.system, band=band)
     if not len(modes):
-        modes = normal_modes(built.system, 1, points=points)
+        modes = normal_modes(built.system, 1)
     return Modelled(built, modes, band)
 
 

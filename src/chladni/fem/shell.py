@@ -27,6 +27,7 @@ from .shell_membrane import membrane as _quad_membrane
 from .shell_plate import plate as _quad_plate
 
 CHUNK = 256  # elements a pass, chosen to fit the cache
+LEAST = 1e-9  # share of the trace of Q: small to a stiffness, large to rounding
 POISSON_03 = np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])  # isotropic, nu = 0.3
 MEMBRANE, BENDING, SHEAR, DRILL = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 9)
 Rows = np.ndarray | slice
@@ -63,9 +64,9 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
         weight, N = _quadrature(geo)
     else:
         sheet = POISSON_03 if reference is None else np.asarray(reference)
-        sheet = np.where(sheet[..., :1, :1] == 0, POISSON_03, sheet)  # plates without membrane
         (weight, inverse), N = jacobians(geo.corners), QUAD_N
-        epsilon, omega = _quad_membrane(geo.corners, weight, inverse, turned(sheet, geo.turn))
+        regular = turned(_regular(sheet), geo.turn)
+        epsilon, omega = _quad_membrane(geo.corners, weight, inverse, regular)
         kappa, gamma = _quad_plate(geo.corners, inverse)
     B = np.zeros((len(geo), len(N), 9, 4, 6))  # nodal motions in the element frame
     B[:, :, MEMBRANE, :, :2] = epsilon.reshape(len(geo), -1, 3, 4, 2)
@@ -76,6 +77,18 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     B[:, :, DRILL] = damped(B[:, :, DRILL], weight)
     B = B.reshape(len(geo), -1, 24) @ to_element(geo)
     return Strains(B.reshape(len(geo), len(N), 9, 24), weight, N)
+
+
+def _regular(sheet: np.ndarray) -> np.ndarray:
+    """A membrane stiffness that has an inverse, for the condensation of the bubbles.
+
+    A sheet without stiffness in some direction (G = 0) gets ``LEAST`` of its trace there. One
+    without any (a plate without membrane) is taken as isotropic, nu = 0.3.
+    """
+    trace = np.trace(sheet, axis1=-2, axis2=-1)[..., None, None]
+    diagonal = np.diagonal(sheet, axis1=-2, axis2=-1).prod(axis=-1)
+    singular = (np.linalg.det(sheet) <= LEAST * diagonal)[..., None, None]
+    return np.where(trace == 0, POISSON_03, sheet + LEAST * trace * np.eye(3) * singular)
 
 
 def stiffness(

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import ModelError, named
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Material, Orthotropic, ShellSection
-from .shell import ShellGeometry, geometry, turned
+from .shell import LEAST, ShellGeometry, geometry, turned
 
 DRILLING = 0.1  # of G t: MacNeal-Harder's twisted beam to 0.1 %; 1e-3 is 30 % too soft
 PENALTY = 1e-6  # of G t: a unit of K6ROT at the corners, exact (see .shell_drilling)
@@ -199,8 +199,23 @@ def _check(assembly: Assembly) -> None:
     for k in np.unique(shells.part):
         if not isinstance(assembly.parts[k].section, ShellSection):
             raise ModelError(f"part {assembly.parts[k].name!r} has shells but no shell section")
-    if (thin := (shells.thickness <= 0).any(axis=1)).any():
+        if _couples_too_much(assembly.parts[k].section):
+            raise ModelError(
+                f"part {assembly.parts[k].name!r} has a coupling (MID4) that its membrane and "
+                "bending cannot hold: the stiffness of the sheet has a negative eigenvalue"
+            )
+    t = shells.thickness  # a wedge may have none at some of its corners
+    if (thin := (t < 0).any(axis=1) | ~(t.mean(axis=1) > 0)).any():
         raise ModelError(f"shells {named(shells.ids[thin])} have no thickness")
+
+
+def _couples_too_much(section: ShellSection) -> bool:
+    """True if [A B; B D] has a negative eigenvalue, whatever the thickness."""
+    if section.coupling is None:
+        return False
+    A, D, B = _constants(section)[:3]
+    value = np.linalg.eigvalsh(np.block([[A, B], [B, D / 12]]))
+    return bool(value[0] < -LEAST * np.abs(value).max())
 
 
 def _constants(section: object) -> tuple:
@@ -228,7 +243,12 @@ def _flexibility(section: ShellSection) -> np.ndarray:
     """Inverse of the transverse moduli (2, 2) [1/Pa]; a small value for rigid shear."""
     if section.bending is None:
         return np.zeros((2, 2))
-    least = STIFF / section.bending.plane_stress()[2, 2] * np.eye(2)
+    Q = section.bending.plane_stress()
+    mean = (Q[0, 0] + Q[1, 1]) / 4  # E/2(1+nu) of an isotropic sheet with nu = 0
+    modulus = Q[2, 2] if Q[2, 2] > LEAST * mean else mean
+    if not modulus > 0:
+        return np.zeros((2, 2))
+    least = STIFF / modulus * np.eye(2)
     shear = section.shear or section.bending
     G = shear.transverse() if not section.rigid_shear else np.zeros((2, 2))
     given = np.diag(G) > 0
@@ -255,5 +275,5 @@ def _diagonal(d: np.ndarray) -> np.ndarray:
 
 def _inverse(Z: np.ndarray, Qb: np.ndarray) -> np.ndarray:
     """Z⁻¹ for shells with bending stiffness, zero for pure membranes."""
-    bends = (Qb[:, 0, 0] > 0)[:, None, None, None]
+    bends = (_pair(Qb).max(axis=1) > 0)[:, None, None, None]
     return np.where(bends, np.linalg.inv(np.where(bends, Z, np.eye(2))), 0.0)

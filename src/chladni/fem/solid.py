@@ -14,10 +14,11 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import ModelError, named
+from ..geometry.solid_shapes import FAMILIES, SolidFamily, jacobians
 from ..model.assembly import Assembly, Solids
 from ..model.properties import Isotropic, SolidSection
-from .solid_shapes import FAMILIES, SolidFamily
 
+LEAST = 1e-9  # share of the trace of C: small to a stiffness, large to rounding
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # of strain components
 
 
@@ -91,9 +92,8 @@ def elasticity_derivative(material: Isotropic, name: str) -> np.ndarray:
 
 def _check(X: np.ndarray, solids: Solids, assembly: Assembly) -> None:
     """Raise if an element has no volume or is turned inside out."""
-    family = FAMILIES[X.shape[1]]
-    dV = np.stack([np.linalg.det(family.gradients(xi) @ X) for xi in family.mass_points])
-    bad = (np.abs(dV).max(axis=0) == 0) | (dV.min(axis=0) < 0) & (dV.max(axis=0) > 0)
+    dV = jacobians(X)
+    bad = (np.abs(dV).max(axis=1) == 0) | (dV.min(axis=1) <= 0) & (dV.max(axis=1) >= 0)
     if np.any(bad):
         raise ModelError(
             f"solid {named(solids.ids[bad], 3)} has no volume or turns inside out; "
@@ -126,12 +126,19 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     The internal strains vary along the element's axes at its centre and are scaled by
     det J₀ / det J. Constant stress then does no work on them, so that the patch test is passed.
     They prevent locking of a brick in bending and of nearly incompressible material. On a box, 21
-    reproduce NX Nastran's hexahedron to its printed digits; plain is its ISOP=FULL.
+    reproduce NX Nastran's hexahedron to its printed digits; plain is its ISOP=FULL. Where C has no
+    stiffness in some direction (G = 0), they follow as if it had ``LEAST`` of its trace.
     """
     modes = np.broadcast_to(np.asarray(modes), len(X))
     K = np.empty((len(X), 3 * X.shape[1], 3 * X.shape[1]))
-    for n in np.unique(modes):
-        at = modes == n
+    scale = np.trace(C, axis1=1, axis2=2)
+    singular = np.linalg.eigvalsh(C)[:, 0] <= LEAST * scale
+    if np.any(singular):
+        least = np.where(scale > 0, LEAST * scale, 1.0)[:, None, None] * np.eye(6)
+        regular = (C + least)[singular]
+        K[singular] = stiffness_derivative(X[singular], regular, C[singular], modes[singular])
+    for n in np.unique(modes[~singular]):
+        at = (modes == n) & ~singular
         K[at] = _integrated(FAMILIES[X.shape[1]], X[at], C[at], int(n))
     return K
 
@@ -245,14 +252,7 @@ def _condensed(K: np.ndarray, n: int) -> np.ndarray:
     """K_uu - K_ua K_aa⁻¹ K_au, the first n dofs kept."""
     if K.shape[1] == n:
         return K
-    try:
-        inner = np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
-    except np.linalg.LinAlgError as error:
-        raise ModelError(
-            "solids have a material without stiffness in some direction; check E, G and NU of "
-            "their MAT1"
-        ) from error
-    return K[:, :n, :n] - K[:, :n, n:] @ inner
+    return K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
 
 
 def _shares(X: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import combinations, permutations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..model.assembly import Assembly, Average, RigidBody
 from .cells import point_means
@@ -116,6 +115,8 @@ def gaps(
 def _gaps(
     assembly: Assembly, sheets: _Sheets, names: tuple[str, str], within: float, away: float
 ) -> Gaps:
+    from scipy.spatial import cKDTree
+
     a, b = (ShellSurface.of(assembly, name) for name in names)
     rows = np.unique(a.nodes)
     rows = rows[_in_box(assembly.points[rows], assembly.points[np.unique(b.nodes)], within)]

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..model.assembly import Assembly, Average, Equation, RigidBody
 from .cells import components, edges_of
@@ -125,6 +124,8 @@ class _Footprints:
         return np.unique(np.concatenate(found))
 
     def _smaller(self, rows: Sequence[int], hung: int | np.ndarray) -> tuple[int, ...]:
+        from scipy.spatial import cKDTree
+
         place = self.points[hung] if isinstance(hung, int | np.integer) else hung
         near = self._shells_of(rows)
         whole = near[self._holds(near, rows)]

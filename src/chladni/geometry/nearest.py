@@ -8,14 +8,17 @@ are tried next.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
 from .facets import tangents, unit
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 
 NEAR_QUADS = 12  # quads around a place whose triangles are tried first
 AT_ONCE = 20_000  # places whose nearest shells are in memory at a time, a third of a gigabyte
@@ -65,7 +68,7 @@ class ShellSurface:
     points: np.ndarray
     nodes: np.ndarray
     rows: np.ndarray
-    tree: cKDTree = field(repr=False)
+    tree: "cKDTree" = field(repr=False)
     owner: np.ndarray = field(repr=False)
     cover: np.ndarray = field(repr=False)
 
@@ -212,7 +215,7 @@ class ShellSurface:
         return nodes[keep], weight[keep]
 
 
-def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, np.ndarray]:
+def _spread(x: np.ndarray) -> tuple["cKDTree", np.ndarray, np.ndarray]:
     """Sample points along the longer mid-line of each cell (m, 4, 3), closer than the usual size.
 
     The centre of a long cell may be far from a place near the cell. Returns a tree of the points,
@@ -232,6 +235,8 @@ def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, np.ndarray]:
     t = (step[:, None] + 0.5) * h
     places = a[owner] + t * (b - a)[owner]
     turned = np.where((longer == 0)[..., None], x, np.roll(x, -1, axis=1))
+    from scipy.spatial import cKDTree
+
     return cKDTree(places), owner, _reach(turned, places, owner, t, h)
 
 

@@ -17,3 +17,23 @@ def skin(nodes: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     _, at, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     at = np.sort(at[count == 1])
     return faces[at], np.asarray(part)[owner[at]], owner[at]
+
+
+def least_warp_cosine(X: np.ndarray) -> np.ndarray:
+    """Least cosine (m,) of corner normals n_1, n_3 and n_2, n_4 of a face with four corners.
+
+    It is Nastran's HEX_WARP (MSC Nastran Quick Reference, GEOMCHECK): 1 for a plane face, less than
+    0.707 for one warped by more than 45 degrees. A corner without area counts as plane.
+
+    Parameters
+    ----------
+    X : (m, 8 or 6, 3)   corners of solids
+    """
+    sides = np.array([s for s in _SIDES[X.shape[1]] if s[2] != s[3]])
+    face = X[:, sides]
+    ahead, back = (np.roll(face, shift, axis=2) - face for shift in (-1, 1))
+    n = np.cross(ahead, back)
+    size = np.linalg.norm(n, axis=3)
+    size = size[:, :, :2] * size[:, :, 2:]
+    cosine = np.einsum("mfki,mfki->mfk", n[:, :, :2], n[:, :, 2:])
+    return np.where(size > 0, cosine / np.where(size > 0, size, 1), 1.0).min(axis=(1, 2))

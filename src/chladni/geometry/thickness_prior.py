@@ -9,7 +9,6 @@ errors give the accuracy on an unseen part.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..errors import ModelError
 from ..model.assembly import Assembly
@@ -53,6 +52,8 @@ def gauge(assembly: Assembly) -> np.ndarray:
 
 def features(assembly: Assembly) -> np.ndarray:
     """1, κ/(κ + 25) of each shell, and its mean within 20 mm on the same part (n, 3)."""
+    from scipy.spatial import cKDTree
+
     kappa = part_curvature(assembly).mean(axis=1)
     bent = kappa / (kappa + HALF)
     middle, area = assembly.points[assembly.shells.nodes].mean(axis=1), shell_area(assembly)

@@ -17,8 +17,6 @@ its modal damping would scatter more than that of one structure.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
-from scipy.stats import norm
 
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
@@ -30,7 +28,7 @@ from .linear_model import LinearModel
 from .map_fit import MassMeasurement, prior_residuals, unknowns
 from .pole_data import SCALE, SCALE_SD, Poles
 from .result import FitStatistic
-from .whitening import Span, Whitening
+from .whitening import Whitening
 
 LEAST_P = 0.01  # p below which an explanation does not fit
 DRAWS = 300
@@ -69,19 +67,11 @@ class _Linear(LinearModel):
     use: np.ndarray
     inputs: int
 
-    @property
-    def span(self) -> Span | None:
-        """Space of the data, where it is known."""
-        return None if self.known is None else self.known.span
-
     def noise(self, rng: np.random.Generator) -> np.ndarray:
-        """Errors (n,) in units of the spread: white in the space of the data, of unit variance.
+        """Errors (n,) in units of the spread: a random share of it, similar on neighbouring lines.
 
-        Without a span they are a random share of the spread and similar on neighbouring lines,
-        because they passed through the modes. Each channel and each line has a size of its own.
+        They passed through the modes. Each channel and each line has a size of its own.
         """
-        if self.span is not None:
-            return self.span.projected(rng.normal(size=len(self.J)))
         shape = *self.use.shape, self.inputs, 2
         error = _along_lines(rng.normal(size=shape))
         of_line = _along_lines(rng.normal(size=shape[0]))
@@ -90,35 +80,26 @@ class _Linear(LinearModel):
         size = SHARE * np.exp(size + OF_ARTICLES * rng.normal())
         return np.moveaxis((size[..., None, None] * error)[self.use], -1, 0).ravel()
 
-    def misfit(self, error: Discrepancy, z: np.ndarray) -> float:
-        """Mean square of the whitened residual z.
-
-        Within a span it is rᵀ C⁻¹ V Vᵀ C⁻¹ r = rᵀ C⁻¹ r - |C⁻¹ r|² with C = I + V Vᵀ.
-        Directions with known errors below the unexplained rest I do not count.
-        """
-        if self.known is None or self.span is None:
-            return float(z @ z) / len(z)
-        q = self.known.transposed(error.whitened(z))
-        return float(z @ z - q @ q) / len(z)
-
     def statistics(self, r: np.ndarray, r0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Size of the error, misfit, worst line, worst channel (4,).
 
         And the mean square of the whitened residual by line and channel (n_f, n_out).
         """
-        error = self.error.with_delta(self.learned(r, r0).delta)
-        z = self.refitted(r, r0, error.delta)
+        delta = self.learned(r, r0).delta
+        z = self.refitted(r, r0, delta)
         square = np.zeros((*self.use.shape, self.inputs, 2))
         square[self.use] = np.moveaxis(z.reshape(2, -1, self.inputs), 0, -1)
         square = (square**2).mean(axis=(2, 3))
         used = np.maximum(self.use.sum(axis=1), 1), np.maximum(self.use.sum(axis=0), 1)
         line, channel = square.sum(axis=1) / used[0], square.sum(axis=0) / used[1]
-        values = (error.delta, self.misfit(error, z), line.max(), channel.max())
+        values = (delta, float(z @ z) / len(z), line.max(), channel.max())
         return np.array(values), square
 
 
 def _along_lines(z: np.ndarray) -> np.ndarray:
     """White noise (n_f, ...) made similar on neighbouring lines; its variance stays one."""
+    from scipy.signal import lfilter
+
     scale = np.sqrt(1 - ALIKE**2)
     fresh = np.concatenate([z[:1], scale * z[1:]])
     return np.asarray(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0))
@@ -215,6 +196,8 @@ def of_poles(data: Poles, state: State) -> FitTest:
     and of at least as many poles without a partner among the modes of ``state``. Each pole is
     spurious with its own probability.
     """
+    from scipy.stats import norm
+
     closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
     alone = np.setdiff1d(poles, data.pairs(state)[0])

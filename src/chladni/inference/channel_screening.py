@@ -11,7 +11,7 @@ from ..ema.chain_checks import level_checks, modal_gains
 from ..ema.channel_checks import left_out
 from ..ema.finding import Check, Finding, Screening
 from ..ema.identification import Identified
-from ..ema.recording_screening import strong_modes
+from ..ema.recording_screening import other_readings, strong_modes
 from ..ema.shape_faults import LEAST_CHANNELS, LEAST_MODES, ModelShapes, shape_faults
 from ..ema.shapes import real_shapes
 from ..fem.assemble import Structure
@@ -20,13 +20,14 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..geometry.grid_normals import grid_normals
 from ..geometry.sampling import farthest_point_sample
-from .chain_hypotheses import chain_faults
+from .chain_hypotheses import NOTHING_FITS, chain_faults
 
 ACROSS = 0.9  # cosine to the normal: a sensor is glued flat on its sheet
 AWAY = 0.12  # of the structure: a patch that the model lacks bends shapes as a shorter move would
 PLACES = 400  # of the shells where a misplaced sensor may sit
 EQUAL_LINES, EQUAL_DAMPING = 200, 0.02  # of the model's responses at two channels that are equal
 UNLIKE = 0.3  # 1: nothing in common; the recorded difference below this share of the model's
+FAR_BELOW = 1.5  # times: a deck that is so much too stiff has E more than twice too large
 REACH = 1.3  # times the band: modes of the model that may mix with those of the test
 
 
@@ -52,19 +53,53 @@ def against_model(
     found : what was identified from it, its outputs in the order of ``outputs``; None where nothing
     model : up to ``REACH`` times the band at least
     """
-    faults, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
-    if faults:
-        kept = tuple(f for f in before.findings if f.kind not in _FOLLOWS)
+    found_in, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
+    faults = [f for f in found_in if f.severity == "fault"]
+    if found is not None and not any(f.mend for f in faults):
+        alone = other_readings(frf, strong_modes(found), lines)
+        if alone and (not faults or alone[0].kind == faults[0].kind):
+            found_in = faults = alone
+    follows = _FOLLOWS if found_in else _CONFIRMED
+    if found_in or any(f.kind in _CONFIRMED for f in before.findings):
+        kept = tuple(f for f in before.findings if f.kind not in follows)
         before = replace(before, findings=kept)
-    before = before.with_more(faults, [check])
-    return (
-        before
-        if faults or found is None
-        else _by_modes(before, found, model, outputs, inputs, gain_known)
+    before = before.with_more(found_in, [check])
+    if faults or found is None:
+        return before
+    before = before.with_more(*_supports(strong_modes(found), model))
+    return _by_modes(before, found, model, outputs, inputs, gain_known)
+
+
+def _supports(strong: Identified, model: Modelled) -> tuple[list[Finding], list[Check]]:
+    """Modes of the test far below the first elastic mode of a deck without supports.
+
+    A free structure has none there. Cords do, and are softer than supports; both are said.
+    """
+    f, rigid = model.modes.frequency, rigid_modes(model.modes)
+    count = int(rigid.sum())
+    if not count or rigid.all() or not strong.order:
+        return [], []
+    first = float(f[~rigid].min())
+    low = strong.frequency[strong.frequency < first / FAR_BELOW]
+    said = f"{count} motions of the deck are free, {len(low)} modes of the test far below the rest"
+    if not len(low):
+        return [], [Check("supports", said)]
+    text = (
+        f"the deck is free to move ({count} motions without stiffness; first elastic mode "
+        f"{first:.4g} Hz), but the test has {len(low)} modes below, from {low.min():.4g} Hz: the "
+        "article was held, or hangs on stiff cords."
     )
+    mend = (
+        "check that the case control selects the SPC set of the test, or name the cords' grids "
+        "under [test] hangers"
+    )
+    found = Finding("supports", text, "warning", (), mend, float(len(low)))
+    return [found], [Check("supports", said, False)]
 
 
-_FOLLOWS = ("wrong quantity", "reversed sign", "not reciprocal", "delay", "equal channels")
+_CONFIRMED = ("wrong quantity",)  # phases speak for it, and the model says whether it is so
+_FOLLOWS = ("wrong quantity", "reversed sign", "not reciprocal", "delay", "equal channels",
+            "cut off")  # fmt: skip
 
 
 def _by_modes(
@@ -92,6 +127,8 @@ def _by_modes(
         return before.with_more([], [Check("channels against the model", why, None)])
     gains, omega = modal_gains(strong, phi_o, phi_i, near.frequency)
     findings, check = level_checks(strong, gains, omega, gain_known, len(phi_o))
+    if any(f.kind == NOTHING_FITS for f in before.findings):
+        findings = []  # the level of responses that are unlike the model's has no meaning
     bad = {c for f in before.findings for c in f.channels if f.kind in _UNUSABLE}
     keep = np.array([k for k, label in enumerate(labels) if label not in bad], int)
     shapes = ModelShapes(

@@ -14,7 +14,6 @@ mass make no mode complex, so an effect of stiffness or mass alone cannot explai
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
 
 from ..ema.identification import Identified
 from ..ema.propagation import standard_deviations
@@ -56,6 +55,8 @@ class ModeCoupling:
         pairs with equal signs.  Equal signs are as likely as opposite ones where close poles make
         shapes complex without coupling.  They are less likely where damping couples the modes.
         """
+        from scipy.stats import binom
+
         n = len(self.frequency)
         ratio = self.complexity / self.bound
         over = np.flatnonzero(ratio > MARGIN)

@@ -19,7 +19,6 @@ import scipy.linalg as sl
 
 from ..dynamics.modal_sum import modal_sum
 from ..reduced.reduced_model import Reduced, State
-from .whitening import Span
 
 MEDIAN = 0.01  # of δ before it is learned
 REACH = 1.5  # modes up to this many times the highest line take part
@@ -27,7 +26,6 @@ RIGID = 0.02  # of the highest line: below it a mode counts as rigid and is know
 MOST_PAIRS = 2000  # pairs of modes, or samples, that are decomposed
 CUT = 0.02  # variances below this share of the noise, at the largest δ, are left out
 USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
-LARGEST = 0.006  # the same at most, where δ is learned: of 42 tuning articles without an effect
 WRAPS = 0.4  # relative deviation of H from which its phase may wrap
 
 
@@ -73,10 +71,6 @@ class Lines(Protocol):
     @property
     def use(self) -> np.ndarray:
         """Lines and channels in use (n_f, n_out)."""
-
-    @property
-    def span(self) -> Span | None:
-        """Space of the residuals, where it is smaller than the samples."""
 
     @property
     def power(self) -> int:
@@ -186,16 +180,9 @@ def discrepancy(data: Lines, state: State) -> Discrepancy:
     """How errors of modal stiffness and mass at a state spread over the whitened residual.
 
     The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST_PAIRS``
-    strongest pairs. Where the residuals have a span of their own, W is in its coordinates.
+    strongest pairs.
     """
     W = columns(data, state, form(state, float(data.s.imag.max())))
-    if data.span is not None:
-        error = _decomposed(data.span.coordinates(W))
-        return replace(error, U=data.span.columns(error.U), prior=LEARNED)
-    return _decomposed(W)
-
-
-def _decomposed(W: np.ndarray) -> Discrepancy:
     if not W.size:  # no flexible mode of the model is near what was measured
         return Discrepancy(np.zeros((len(W), 0)), np.zeros(0))
     within = len(W) <= min(W.shape[1], MOST_PAIRS)
@@ -208,7 +195,7 @@ def _decomposed(W: np.ndarray) -> Discrepancy:
     return Discrepancy(np.ascontiguousarray(U if within else W @ (U / np.sqrt(s))), s)
 
 
-def curvature(data: Lines, state: State, delta: float = USUAL) -> np.ndarray:
+def curvature(data: Lines, state: State) -> np.ndarray:
     """Standard deviation of log10 H beyond what is linear in G (n_f, n_out, n_in).
 
     For H = H_0 (1 + z) with z of variance σ², ln(1 + z) = z - z²/2. Near a zero of H, where σ is
@@ -217,7 +204,7 @@ def curvature(data: Lines, state: State, delta: float = USUAL) -> np.ndarray:
     """
     every = data.only(np.ones(data.use.shape, bool))
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
-    sd = every.std() * np.log(10) * delta
+    sd = every.std() * np.log(10) * USUAL
     sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0) + data.wrong(state)
     return BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2)
 

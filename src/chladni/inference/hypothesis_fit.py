@@ -169,22 +169,13 @@ class UpdatingProblem:
         """Return the problem with errors of the model's form, linearised about this state."""
         if not isinstance(self.data, Responses):
             return self
-        data = self.data.allowing_errors(state, delta)
-        if data.identified is not None:
-            wide = replace(self.data, identified=None).allowing_errors(state, delta)
-            data = replace(data, wide=wide)
-        return replace(self, data=data)
+        return replace(self, data=self.data.allowing_errors(state, delta))
 
     def exactly(self) -> "UpdatingProblem":
         """Return the problem for a model without errors of form."""
         if not isinstance(self.data, Responses):
             return self
         return replace(self, data=self.data.exactly())
-
-    def begun_wide(self) -> "UpdatingProblem":
-        """Return the problem with the wider likelihood in which searches begin."""
-        wide = getattr(self.data, "wide", None)
-        return self if wide is None else replace(self, data=wide)
 
     def holding(self, found: Sequence[tuple[Effect, np.ndarray]]) -> "UpdatingProblem":
         """Return the problem with effects in its base, and their changes in its model."""
@@ -218,7 +209,6 @@ class UpdatingProblem:
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
         x0 = np.concatenate([base[inside.astype(bool)], start])
         effects, mass = [*kept, effect], self.mass_measurement
-        x0 = wide_start(model, effects, data, mass, x0)
         fit = fitted(model, effects, data, mass, x0, max_steps)
         return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
 
@@ -231,7 +221,7 @@ class UpdatingProblem:
         data, found = hypothesis.data, hypothesis.fit
         if not isinstance(data, Responses) or data.error is None:
             return hypothesis
-        data = data.allowing_errors(found.state, data.error.delta, data.curved)
+        data = data.allowing_errors(found.state, data.error.delta)
         mass = self.mass_measurement
         fit = fitted(hypothesis.model, found.effects, data, mass, found.x, max_steps)
         return hypothesis.refitted(fit)
@@ -256,15 +246,6 @@ def fitted(
     return found.kept()
 
 
-def wide_start(
-    model: Reduced, effects: Sequence[Effect], data: Data,
-    mass_measurement: MassMeasurement | None, x: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Return the start of a fit, found with the wide likelihood of independent samples."""
-    wide = data.wide if isinstance(data, Responses) else None
-    return x if wide is None else fitted(model, effects, wide, mass_measurement, x, ROUGH).x
-
-
 ROUNDS, CLOSE = 3, 0.15  # fits in turn with δ, until ln δ changes by no more
 
 
@@ -279,7 +260,7 @@ def _fit_responses(
         likely = there.model.learned(there.r, there.r0)
         change = abs(np.log(likely.delta / data.error.delta))
         data = replace(data, error=data.error.with_delta(likely.delta))
-        S = likely.neg2_log_evidence + constants(effects) + data.log_det
+        S = likely.neg2_log_evidence + constants(effects)
         found = replace(found, neg2_log_evidence=S, data=data)
         if max_steps <= ROUGH or change < CLOSE:
             break

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import TypeGuard
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..effects.effect import Effect
 from ..effects.model_families import FAR, JOINTS, ModelFamily
@@ -64,6 +63,8 @@ def _far_together(fit: Fit) -> list[str]:
     With z = (x - μ)/σ, |z|² is χ² where the deck is right.  Its degrees of freedom are the number
     of directions that the data determine: the prior's trace less that of the covariance of z.
     """
+    from scipy.stats import chi2
+
     own = [e for e in fit.effects if e.kind == "calibration" and e.parameters]
     if not own:
         return []

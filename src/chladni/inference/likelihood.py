@@ -13,17 +13,13 @@ import numpy as np
 from ..dynamics.modal_sum import modal_sum
 from ..ema.correlation import wrapped
 from ..ema.identification import DERIVATIVES
-from ..ema.recording_noise import EqualisedError
 from ..reduced.matrix_stack import EVERY, each_times
 from ..reduced.reduced_model import Reduced, State
-from .discrepancy import LARGEST, MEDIAN, USUAL, Discrepancy, curvature, discrepancy
-from .likely_sensor_errors import LikelyErrors, likely_errors
+from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
 from .sensor_errors import SensorErrors, columns, variance
-from .whitening import Span, Whitening, by_input, spanned, whitening
+from .whitening import Whitening, whitening
 
 LN10 = np.log(10.0)
-RESOLVED = 3e-4  # sd of log10 H below which no model of a structure is known to be right
-LOCAL = 0.1  # of the upper residual of a channel: the compliance round a point knows the mesh
 
 
 class Data(Protocol):
@@ -60,7 +56,6 @@ class Responses:
     noise : (n_f, n_out, n_in)             sd of log10 H of independent samples, spread included
     spread : (n_f, n_out, n_in)            sd of log10 H between repeats or articles
     level : (n_out, n_in)                  rms of |H_X| over fitted lines; None: over all lines
-    identified : EqualisedError            of H_X, whose columns span the data; replaces ``noise``
     """
 
     values: np.ndarray
@@ -74,18 +69,13 @@ class Responses:
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     noise: np.ndarray | None = None
     spread: np.ndarray | None = None
-    identified: EqualisedError | None = None
     level: np.ndarray | None = None
-    curved: float = USUAL  # δ of those errors
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
     about: State | None = None  # from which the errors of form spread
     direct: np.ndarray | float = 0.0
     sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
-    likely: LikelyErrors | None = None  # those errors about which log10 H is linearised
-    raw: np.ndarray | None = None  # values as measured, where ``values`` are linear in the errors
     known: Whitening | None = None  # of what those errors do to the lines and channels in use
-    wide: "Responses | None" = None  # the same with independent noise: fits begin there
 
     @property
     def power(self) -> int:
@@ -95,9 +85,8 @@ class Responses:
     def rebased(self, model: Reduced) -> Self:
         """Rows of sensors and shakers in the basis of this model."""
         sensors = None if self.sensors is None else self.sensors.rebased(model)
-        wide = None if self.wide is None else self.wide.rebased(model)
         a, b = model.rows(self.outputs), model.rows(self.inputs)  # type: ignore[arg-type]
-        return replace(self, a=a, b=b, sensors=sensors, wide=wide)
+        return replace(self, a=a, b=b, sensors=sensors)
 
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in).
@@ -142,61 +131,28 @@ class Responses:
 
     def std(self) -> np.ndarray:
         """Standard deviation of δ of each sample, without their dependence."""
-        if self.about is not None and self.identified is not None:
-            out, more = np.full(self.values.shape, RESOLVED**2), [self.spread, self.bent]
-        else:
-            rms = rms_over_lines(self.values) if self.level is None else self.level
-            out = self.sigma_model**2 * (1 + (0.6 * rms / np.abs(self.values)) ** 2)
-            more = [self.noise, self.bent]
+        rms = rms_over_lines(self.values) if self.level is None else self.level
+        out = self.sigma_model**2 * (1 + (0.6 * rms / np.abs(self.values)) ** 2)
+        more = [self.noise, self.bent]
         return np.sqrt(sum((z**2 for z in more if z is not None), out))
 
-    def allowing_errors(
-        self, state: State, delta: float = MEDIAN, curved: float | None = None
-    ) -> Self:
+    def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
         """Return these responses for a model with an error of form of size δ about a state.
 
-        Errors of the sensors are included. ``curved`` is the δ of second-order terms, if not δ.
-        Hypotheses whose evidence is compared share it: these terms count as independent, and a
-        smaller δ would gain on every sample.
+        Errors of the sensors are included. Terms of second order have one size in all hypotheses:
+        they count as independent, and a smaller δ would gain on every sample.
         """
         plain = self.exactly()
-        if curved is None:
-            curved = USUAL if plain.identified is None else min(delta, LARGEST)
-        bent = curvature(plain, state, curved)
-        data = replace(plain, bent=bent, about=state, curved=curved)
-        if plain.identified is not None and plain.sensors is not None:
-            slopes, _ = columns(plain.sensors, plain, state, np.ones(plain.values.shape))
-            sd = LN10 * replace(plain, identified=None).std()
-            errors = likely_errors(slopes, plain, 10 ** -plain.deviation(state), sd)
-            values = plain.values * 10**-errors.excess
-            data = replace(data, likely=errors, raw=plain.values, values=values)
+        data = replace(plain, bent=curvature(plain, state), about=state)
         return data._spread(state, delta)
 
     def _spread(self, about: State, delta: float) -> Self:
         """Covariance of the lines and channels in use."""
         data = replace(self, known=None, error=None)
-        own, common = data._errors(about)
-        if len(own) + len(common):
-            span, known = None, self.identified
-            if known is not None:
-                span = spanned(data, by_input(known.own), known.common, data.std())
-            data = replace(data, known=whitening(data, own, common, span))
-        return replace(data, error=discrepancy(data, about).with_delta(delta))
-
-    def _errors(self, about: State) -> tuple[np.ndarray, np.ndarray]:
-        """d log10 H over its spread per standard deviation: of each output, common to all."""
-        own, common, scale = [], [], LN10 * self.std()
         if self.sensors is not None:
-            outputs, inputs = columns(self.sensors, self, about, scale)
-            if self.likely is not None:
-                outputs = outputs / self.likely.factor
-            own, common = [outputs], [inputs]
-        if (known := self.identified) is not None:
-            every = np.concatenate([known.own, LOCAL * known.upper[None]])
-            own.append(by_input(every) / scale)
-            common.append(known.common / scale)
-        no = np.zeros((0, *self.values.shape))
-        return np.concatenate([no, *own]), np.concatenate([no, *common])
+            own, common = columns(self.sensors, data, about, LN10 * data.std())
+            data = replace(data, known=whitening(data, own, common))
+        return replace(data, error=discrepancy(data, about).with_delta(delta))
 
     def wrong(self, state: State) -> np.ndarray | float:
         """E|d ln H|² of the independent errors of sensors (n_f, n_out, n_in)."""
@@ -204,31 +160,14 @@ class Responses:
 
     def exactly(self) -> Self:
         """Return these responses for a model and a test without errors of form."""
-        values = self.values if self.raw is None else self.raw
-        return replace(
-            self, values=values, bent=None, error=None, about=None, likely=None, raw=None,
-            known=None, wide=None,
-        )  # fmt: skip
+        return replace(self, bent=None, error=None, about=None, known=None)
 
     def using(self, use: np.ndarray) -> Self:
         """Return other lines and channels, with the same errors of the model's form."""
         data = replace(self, use=use)
         if self.error is None or self.about is None:
             return data
-        if self.likely is not None:
-            again = data.allowing_errors(self.about, self.error.delta, self.curved)
-            return replace(again, wide=self.wide)
         return data._spread(self.about, self.error.delta)
-
-    @property
-    def span(self) -> Span | None:
-        """Space of the residuals, if it is smaller than that of the samples."""
-        return None if self.known is None else self.known.span
-
-    @property
-    def log_det(self) -> float:
-        """Ln det of the covariance with known errors, if the evidence counts it."""
-        return 0.0 if self.known is None or self.identified is None else self.known.log_det
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """:meth:`scaled` with the errors of the model's form whitened out."""

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
-from scipy.optimize import brentq, minimize
-from scipy.stats import chi2
 
 LARGEST = 3.0  # prior standard deviations: τ is not looked for beyond
 STARTS = (0.03, 0.3, 1.0)  # of τ, in prior standard deviations
 NOTHING = 1e-3  # prior standard deviations: no spread
-RISE = float(chi2.ppf(0.95, 1))  # of -2 ln likelihood at the ends of an interval
+RISE = 3.841458820694124  # of -2 ln likelihood at the ends of an interval: chi2.ppf(0.95, 1)
 KNOWN = -1  # group of parameters whose standard deviation is known
 
 
@@ -50,6 +48,8 @@ def unit_spread(J: np.ndarray, y: np.ndarray, group: np.ndarray, sd: np.ndarray)
     group : (p,)     number of the group of each parameter; ``KNOWN``: its spread is ``sd``
     sd : (p,)        prior standard deviation
     """
+    from scipy.optimize import brentq, minimize
+
     c = sl.helmert(len(y))
     F, g = J.T @ J, c @ (y @ J)
     count = int(group.max(initial=KNOWN)) + 1

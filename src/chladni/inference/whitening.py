@@ -1,9 +1,7 @@
-"""Whitening of residuals whose errors lie along known columns, in the space of the data.
+"""Whitening of residuals whose errors lie along known columns.
 
-An identified response has few parameters: its samples vary only in the span of the columns of its
-poles and of the linear unknowns of its channels. Residuals are projected on that span.
-With the covariance I + V Vᵀ and V in the span, the columns of one output are taken out first, then
-the columns that all outputs share.
+With the covariance I + V Vᵀ the columns of one output are taken out first, then the columns that
+all outputs share.
 """
 
 from dataclasses import dataclass
@@ -11,8 +9,6 @@ from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
-
-KNOWN = 1e-6  # of the largest singular value: directions below it are rounding
 
 
 class Stacks(Protocol):
@@ -31,42 +27,8 @@ class Stacks(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Span:
-    """Orthonormal columns of what an identification can say.
-
-    Attributes
-    ----------
-    own : (n, k) sparse      columns on one output each
-    common : (n, m)          columns of the poles beyond them
-    log_det : float          ln of the volume of an orthonormal basis of the span, over the spreads
-    """
-
-    own: sp.csc_array
-    common: np.ndarray
-    log_det: float = 0.0
-
-    def projected(self, r: np.ndarray) -> np.ndarray:
-        """Part of residuals or of columns of slopes (n, ...) within the span."""
-        return self.columns(self.coordinates(r))
-
-    def coordinates(self, r: np.ndarray) -> np.ndarray:
-        """Components of residuals or of columns of slopes along the span (k + m, ...)."""
-        return np.concatenate([self.own.T @ r, self.common.T @ r])
-
-    def columns(self, c: np.ndarray) -> np.ndarray:
-        """Residuals or columns of slopes (n, ...) with these components."""
-        k = self.own.shape[1]
-        return np.asarray(self.own @ c[:k] + self.common @ c[k:])
-
-    @property
-    def leverage(self) -> np.ndarray:
-        """Share of each sample within the span (n,); the sum is its dimension."""
-        return np.asarray(self.own.power(2).sum(axis=1)) + (self.common**2).sum(axis=1)
-
-
-@dataclass(frozen=True, eq=False)
 class Whitening:
-    """C^-½ of C = I + V Vᵀ on a span, or on all samples without one.
+    """C^-½ of C = I + V Vᵀ.
 
     Attributes
     ----------
@@ -74,64 +36,19 @@ class Whitening:
     own_less : (k,)                     1 - 1/√(1 + s)
     common : (n, m) orthonormal
     common_less : (m,)
-    span : Span or None
     """
 
     own: sp.csc_array
     own_less: np.ndarray
     common: np.ndarray
     common_less: np.ndarray
-    span: Span | None = None
-
-    @property
-    def log_det(self) -> float:
-        """Ln det C of data in units that do not depend on the spread of each sample."""
-        less = np.concatenate([self.own_less, self.common_less])
-        volume = 0.0 if self.span is None else self.span.log_det
-        return float(-2 * np.log1p(-less).sum() - 2 * volume)
 
     def whitened(self, r: np.ndarray) -> np.ndarray:
         """Residuals or columns of slopes (n, ...)."""
-        if self.span is not None:
-            r = self.span.projected(r)
         return _less(self.common, self.common_less, _less(self.own, self.own_less, r))
 
-    def transposed(self, z: np.ndarray) -> np.ndarray:
-        """Apply the transpose of the whitening, so that C⁻¹ r is that of C^-½ r (n, ...)."""
-        z = _less(self.own, self.own_less, _less(self.common, self.common_less, z))
-        return z if self.span is None else self.span.projected(z)
 
-
-def by_input(own: np.ndarray) -> np.ndarray:
-    """Columns (k, ..., n_in) of every channel as columns (n_in k, ..., n_in) of every input."""
-    return np.concatenate([own * each for each in np.eye(own.shape[-1])])
-
-
-def spanned(data: Stacks, own: np.ndarray, common: np.ndarray, sd: np.ndarray) -> Span:
-    """Span of complex columns over the spread of each sample.
-
-    Parameters
-    ----------
-    own : (k, n_f, n_out, n_in)      of one output each
-    common : (m, n_f, n_out, n_in)   of all outputs
-    sd : (n_f, n_out, n_in)
-    """
-    spread = np.tile(sd[data.use].ravel(), 2)
-    basis, within, log_det = [], [], 0.0
-    for at, V in _by_output(data, own):
-        basis.append((at, _basis(V)))
-        Q, size = _orthogonal(basis[-1][1] / spread[at, None])
-        within.append((at, Q))
-        log_det += size
-    of_outputs, scaled = _sparse(basis, data), _sparse(within, data)
-    rest = _basis(_beyond(of_outputs, data.stacked(common))) / spread[:, None]
-    Q, size = _orthogonal(rest - scaled @ (scaled.T @ rest))
-    return Span(scaled, Q, log_det + size)
-
-
-def whitening(
-    data: Stacks, own: np.ndarray, common: np.ndarray, span: Span | None = None
-) -> Whitening:
+def whitening(data: Stacks, own: np.ndarray, common: np.ndarray) -> Whitening:
     """Whitening of errors along complex columns over the spread of each sample.
 
     Parameters
@@ -141,15 +58,12 @@ def whitening(
     """
     columns, less = [], []
     for at, V in _by_output(data, own):
-        if span is not None:
-            V = (span.own @ (span.own.T @ _on_rows(at, V, data)))[at]
         U, share = _orthonormal(V)
         columns.append((at, U))
         less.append(share)
     U, own_less = _sparse(columns, data), np.concatenate([np.zeros(0), *less])
     shared = data.stacked(common)
-    shared = shared if span is None else span.projected(shared)
-    return Whitening(U, own_less, *_orthonormal(_less(U, own_less, shared)), span)
+    return Whitening(U, own_less, *_orthonormal(_less(U, own_less, shared)))
 
 
 def _by_output(data: Stacks, own: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -158,13 +72,6 @@ def _by_output(data: Stacks, own: np.ndarray) -> list[tuple[np.ndarray, np.ndarr
     output = np.tile(np.repeat(outputs, data.values.shape[2]), 2)
     V = data.stacked(own)
     return [(at, V[at]) for k in np.unique(output) if len(at := np.flatnonzero(output == k))]
-
-
-def _on_rows(at: np.ndarray, V: np.ndarray, data: Stacks) -> np.ndarray:
-    """A block on some rows of all (n, k)."""
-    out = np.zeros((2 * int(data.use.sum()) * data.values.shape[2], V.shape[1]))
-    out[at] = V
-    return out
 
 
 def _sparse(blocks: list[tuple[np.ndarray, np.ndarray]], data: Stacks) -> sp.csc_array:
@@ -181,26 +88,6 @@ def _less(U: np.ndarray | sp.csc_array, less: np.ndarray, r: np.ndarray) -> np.n
     """Remove from r its share along each column."""
     along = U.T @ r
     return r - U @ (less[:, None] * along if along.ndim > 1 else less * along)
-
-
-def _beyond(U: sp.csc_array, V: np.ndarray) -> np.ndarray:
-    """Columns of V less their share along orthonormal U; those with only rounding left are out."""
-    left = V - U @ (U.T @ V)
-    length, before = (np.sqrt((A**2).sum(axis=0)) for A in (left, V))
-    return np.asarray(left[:, length > KNOWN * before])
-
-
-def _basis(V: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of columns of any length."""
-    length = np.sqrt((V**2).sum(axis=0))
-    U, s, _ = np.linalg.svd(V / np.maximum(length, 1e-300), full_matrices=False)
-    return U[:, s > KNOWN * s.max(initial=0.0)]
-
-
-def _orthogonal(V: np.ndarray) -> tuple[np.ndarray, float]:
-    """Orthonormal basis of independent columns, and ln of the volume that they span."""
-    Q, R = np.linalg.qr(V)
-    return Q, float(np.log(np.abs(np.diag(R))).sum())
 
 
 def _orthonormal(V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

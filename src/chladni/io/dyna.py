@@ -18,7 +18,7 @@ from ..geometry.formed_mesh import FormedMesh
 from ..output import write_text
 from ..units import Units
 from ..units import units as units_named
-from .file_size import refuse_large
+from .file_size import refuse_large, refuse_outside
 
 _WIDTHS = {"": (8, 16), "%": (10, 16), "+": (20, 20)}  # integers and reals of each format
 
@@ -80,6 +80,7 @@ def _resolved(block: _Block, above: tuple[Path, ...]) -> Iterator[_Block]:
     for row, line in enumerate(block.lines):
         if line.strip():
             other = block.source.parent / line.strip()
+            refuse_outside(other, f"{block.source}, line {block.at[row]}: INCLUDE ")
             if not other.is_file():
                 raise block.fault(row, f"no file {line.strip()!r}")
             if other.resolve() in above:
@@ -103,7 +104,7 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
     words[words == ""] = "0"
     try:
         values: np.ndarray = words.astype(kind)
-        if np.isfinite(values).all():
+        if np.isfinite(values).all() and _plain("".join(words.ravel())):
             return values
     except (ValueError, OverflowError):
         pass
@@ -120,11 +121,16 @@ def _split(line: str, widths: Sequence[int]) -> list[str]:
     return [line[a:b].strip() for a, b in pairwise(edges)]
 
 
+def _plain(word: str) -> bool:
+    """False for digits with underscores or of other scripts, which Python takes for a number."""
+    return word.isascii() and "_" not in word
+
+
 def _first_bad(words: np.ndarray, kind: type) -> tuple[int, str]:
     for row, line in enumerate(words):
         for word in line:
             try:
-                bad = not np.isfinite(np.array([word]).astype(kind)[0])
+                bad = not (_plain(word) and np.isfinite(np.array([word]).astype(kind)[0]))
             except (ValueError, OverflowError):
                 bad = True
             if bad:

@@ -2,9 +2,10 @@
 
 import io
 from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..units import Units
 from ..units import units as units_named
 from .damage import DAMAGED
 from .dyna import read_keyword
-from .file_size import refuse_large
+from .file_size import refuse_large, refuse_outside
 from .tables.csv_table import read_table
 
 _NODE_IDS = ("node", "nid", "id", "grid")
@@ -90,6 +91,8 @@ def _meshio(path: Path) -> Any:
     from meshio._exceptions import CorruptionError  # no ReadError, and not exported
 
     said = io.StringIO()
+    if path.suffix.lower() == ".xdmf":
+        _refuse_data_outside(path)
     try:
         with redirect_stdout(said), redirect_stderr(said):
             return meshio.read(path)
@@ -99,6 +102,19 @@ def _meshio(path: Path) -> Any:
     except (*DAMAGED, meshio.ReadError, CorruptionError) as error:
         why = f"there is no {error}" if isinstance(error, KeyError) else str(error)
         raise FileError(f"{path} cannot be read as a mesh: {why}") from error
+
+
+def _refuse_data_outside(path: Path) -> None:
+    """Refuse the files of numbers of an XDMF that lie outside of the case.
+
+    HDF5 files are named from the folder of the XDMF; binary ones meshio opens from the current one.
+    """
+    with suppress(ElementTree.ParseError):  # meshio says so
+        for item in ElementTree.parse(path).iter("DataItem"):
+            name, form = (item.text or "").strip(), item.get("Format")
+            if form in ("HDF", "Binary"):
+                folder = path.parent if form == "HDF" else Path()
+                refuse_outside(folder / name.split(":")[0], f"{path}: ")
 
 
 def _formed_of(path: Path, mesh: Any, unit: Units) -> FormedMesh:

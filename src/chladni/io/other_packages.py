@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
+from ..arguments import checked
 from ..dofs import COMPONENTS, label, parse
 from ..dynamics.frf import FRF, UNIT, Quantity
 from ..dynamics.modes import ModalModel
 from ..dynamics.statespace import StateSpace
 from ..ema.setup import Role, Sensor
-from ..errors import LabelError, named
+from ..errors import ArgumentError, LabelError, named
 from ..extensions import optional_package
 from .tables.write_tables import write_csv as write_csv
 from .tables.write_tables import write_npz as write_npz
@@ -49,6 +50,7 @@ _GIVE = f"give quantity, one of {named(UNIT)}"
 _AXES = {name: [f"{name}_{k}" for k in (1, 2, 3)] for name in ("Position", "Direction")}  # pyFBS
 
 
+@checked
 def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
     """Convert responses or modes to a data set.
 
@@ -88,6 +90,7 @@ def to_xarray(data: FRF | ModalModel) -> "xarray.Dataset":
     )
 
 
+@checked
 def from_xarray(data: "xarray.Dataset", quantity: Quantity | None = None) -> FRF | ModalModel:
     """Convert a data set of :func:`to_xarray` back, its dimensions in any order.
 
@@ -105,6 +108,8 @@ def from_xarray(data: "xarray.Dataset", quantity: Quantity | None = None) -> FRF
     LabelError
         If a dimension or H is missing, or nothing says what the responses are.
     """
+    if not hasattr(data, "data_vars"):
+        raise ArgumentError(f"from_xarray() takes an xarray.Dataset, no {type(data).__name__}")
     names = [*map(str, data.data_vars), *map(str, data.coords)]
     if "shapes" in names:
         return _modes(data, names)
@@ -135,6 +140,7 @@ def _modes(data: "xarray.Dataset", names: Sequence[str]) -> ModalModel:
     return ModalModel(frequency, damping, rows[:, 2:] * shapes, rows[:, :2])
 
 
+@checked
 def to_sdynpy(data: FRF | ModalModel) -> Any:
     """Convert responses or modes to a SDynPy array.
 
@@ -164,6 +170,7 @@ def to_sdynpy(data: FRF | ModalModel) -> Any:
     return sdynpy.data_array(kind, data.frequency, ordinate, at, comment1=data.quantity)
 
 
+@checked
 def from_sdynpy(data: Any, quantity: Quantity | None = None) -> FRF | ModalModel:
     """Convert a SDynPy ``TransferFunctionArray`` or ``ShapeArray``; SDynPy itself is not needed.
 
@@ -230,6 +237,7 @@ def _sdynpy_shapes(flat: np.ndarray) -> ModalModel:
     )
 
 
+@checked
 def to_pyfbs(
     frf: FRF, sensors: Sequence[Sensor] = ()
 ) -> tuple[np.ndarray, np.ndarray, "pandas.DataFrame", "pandas.DataFrame"]:
@@ -281,6 +289,7 @@ def _pyfbs_row(text: str, quantity: str, sensor: Sensor | None) -> Mapping[str, 
     return {**head, **cells}
 
 
+@checked
 def from_pyfbs(
     Y: np.ndarray,
     frequency: np.ndarray,
@@ -347,6 +356,7 @@ def _pyfbs_quantity(channels: "pandas.DataFrame") -> Quantity:
     return kinds[said.pop()]
 
 
+@checked
 def to_control(system: StateSpace) -> Any:
     """Convert x' = A x + B u, y = C x + D u to a ``control.StateSpace`` with named signals.
 
@@ -361,6 +371,7 @@ def to_control(system: StateSpace) -> Any:
     return control.ss(*matrices, inputs=names[0], outputs=names[1])
 
 
+@checked
 def from_control(system: Any, quantity: Quantity = "receptance") -> StateSpace:
     """Convert a continuous ``control.StateSpace``; its signals are named 412 +Z, or as they are.
 

@@ -3,6 +3,7 @@
 import logging
 import re
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from struct import error
 
@@ -65,7 +66,8 @@ def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
     refuse_large(path)
     logging.getLogger("trimesh").addHandler(logging.NullHandler())  # it logs what it passes over
     try:
-        mesh = load_mesh(path, process=False)
+        data = BytesIO(path.read_bytes())  # of a path, the materials an OBJ names would be opened
+        mesh = load_mesh(data, file_type=path.suffix[1:].lower(), process=False)
     except UNREADABLE as broken:
         raise FileError(f"{path} cannot be read as a triangulated surface: {broken}") from broken
     held = len(mesh.faces) if isinstance(mesh, Trimesh) else 0

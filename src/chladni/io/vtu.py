@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import checked
 from ..model.assembly import Assembly
 from ..output import atomic
 
 _KINDS = {8: "hexahedron", 6: "wedge", 4: "tetra"}
 
 
+@checked
 def write_vtu(
     path: Path | str,
     assembly: Assembly,

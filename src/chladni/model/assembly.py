@@ -204,6 +204,7 @@ class Assembly:
     structural_damping : float  loss factor of the whole structure (PARAM,G)
     auto_spc : bool           hold dofs without stiffness (AUTOSPC)
     k6rot : float or None     Nastran's drilling stiffness (PARAM,K6ROT); None: 0.1 G t of the field
+                              (meshes made here)
     """
 
     ids: np.ndarray

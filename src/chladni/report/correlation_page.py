@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +13,10 @@ from ..workflows.case_model import cords, markers
 from ..workflows.correlate import Correlation
 from . import live_pages as live
 from .blocks import Block, Facts, PageParts, Picture, Section, Table, Text
-from .figures import Shown, curves, frequencies, mac_picture, setup
+from .figures import curves, frequencies, mac_picture, setup
 from .live_pages import Page
-from .screening_blocks import screening_section
+from .screening_blocks import screening_json, screening_section
+from .shown import Shown
 from .words import criterion, hertz, number, percent
 
 _SAME = 1e-6  # Q of responses that nobody could tell apart
@@ -242,3 +244,38 @@ def _scores(found: Correlation) -> list[Block]:
         Table(("band [Hz]", "Q"), bands),
         Table(("worst channels", "Q"), [(c, number(x, 3)) for c, x in worst], ("worst channels",)),
     ]
+
+
+def correlation_json(result: Correlation) -> dict[str, Any]:
+    """The result for ``correlation.json``."""
+    p, q, f, test = result.pairs, result.quality, result.f_model, result.f_test
+    held: dict[str, Any] = {
+        "modes": [
+            {
+                "test_hz": test[j],
+                "model_hz": f[i],
+                "model_mode": result.numbers[i],
+                "deviation": f[i] / test[j] - 1,
+                "mac": value,
+            }
+            for i, j, value in zip(p.model, p.test, p.mac, strict=True)
+        ],
+        "alone_test_hz": test[p.alone_test],
+        "alone_model_hz": f[p.alone_model],
+    }
+    for mode, worth in zip(held["modes"], result.likeness, strict=False):
+        mode["shape"] = vars(worth)
+    if result.screening is not None:
+        held["screening"] = screening_json(result.screening)
+    if result.comac is not None:
+        held["comac"] = dict(zip(result.sensors, result.comac, strict=True))
+    if q is not None:
+        held["Q"] = {
+            "mean": q.Q,
+            "total": q.total,
+            "magnitude": q.magnitude,
+            "phase": q.phase,
+            "channel": dict(zip(result.channels, q.channel.ravel(), strict=True)),
+            "band": [{"band_hz": b, "Q": x} for b, x in zip(q.bands, q.band, strict=True)],
+        }
+    return held

@@ -16,9 +16,10 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Code, Section, Text
 from .calibration_blocks import calibration_json
 from .diagnosis_json import diagnosis_json
-from .figures import Shown, figures
+from .figures import figures
 from .live_diagnosis import drawings, mac_of
 from .page import write_page
+from .shown import Shown
 from .states_table import state_folder
 
 _CHANGED = 80  # lines of the deck that the page shows

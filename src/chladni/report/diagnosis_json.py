@@ -6,6 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from ..arguments import checked
 from ..errors import FileError
 from ..output import plain
 from ..workflows.diagnosis_result import DiagnosisResult
@@ -103,6 +104,7 @@ def _agreement(fit: Json) -> Json:
     return {"fitted": fitted, "held_out": other, "what": held.get("what"), **gains}
 
 
+@checked
 def read_diagnosis(folder: Path | str) -> DiagnosisResult:
     """Read the result of a run from its ``diagnosis.json``.
 

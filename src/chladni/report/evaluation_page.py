@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from . import live_panels
 from .blocks import Block, PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
 from .live_pages import Page
-from .screening_blocks import lead_of, screening_section
+from .screening_blocks import lead_of, screening_json, screening_section
+from .typed_fields import as_data
 from .words import number
 
 _SHOWN = 12  # channels drawn
@@ -161,3 +163,32 @@ def _decays(decays: tuple[RingDown, ...]) -> Table:
     ]
     heads = ("output", "Hz", "damping [%]", "damping, loud to faint [%]", "Hz, loud to faint")
     return Table(heads, rows, ("output",), "Free decays, each followed until it reaches its noise.")
+
+
+def evaluation_json(result: Evaluation) -> dict[str, Any]:
+    """The result for ``test.json``."""
+    return {"recordings": [_evaluated(r) for r in result.recordings]}
+
+
+def _evaluated(r: RecordingEvaluation) -> dict[str, Any]:
+    e, frf = r.estimate, r.recording.frf
+    assert frf is not None
+    found: dict[str, Any] = {
+        "name": r.recording.name,
+        "quantity": frf.quantity,
+        "outputs": frf.outputs,
+        "inputs": frf.inputs,
+        "band_hz": frf.frequency[[0, -1]],
+        "screening": screening_json(r.screening),
+        "free_decays": [dict(vars(d)) for d in r.decays],
+        "levels": as_data(level_tables(r.levels)),
+    }
+    if e is not None:
+        found |= {
+            "excitation": e.excitation,
+            "method": e.method,
+            "averages": e.averages,
+            "added_damping_1_s": e.added_damping,
+            "how": e.notes,
+        }
+    return found

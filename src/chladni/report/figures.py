@@ -1,12 +1,11 @@
 """The pictures of a result: its place, the improvement, frequencies, responses."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ..dynamics.frf import FRF, UNIT
+from ..dynamics.frf import UNIT
 from ..effects.estimate import Location
 from ..ema.correlation import deviation
 from ..fem.energy import shell_energies
@@ -14,49 +13,15 @@ from ..geometry.cells import point_means
 from ..geometry.facets import cell_areas
 from ..inference.calibration_result import CalibrationStudy
 from ..inference.result import Alternative, NamedEffect, Scores
-from ..view import annotations, calibration_plots, plots, scene
-from ..view.surface import Surface
+from ..view import calibration_plots, plots, scene
 from ..workflows.diagnosis_result import DiagnosisResult
 from .level_blocks import draw_levels
+from .shown import CALM, Shown
 from .words import hertz
 
 _GRID = 8  # channels in the overview
 _SHAPES = 6
-CALM = 27.0  # gain up to which a map of the residual stays pale: less names nothing
 MOST_ENERGY = 0.98  # share of the shells whose colours are within the limits
-Bands = Sequence[tuple[float, float]]
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """Data for the pictures of a result that its numbers do not contain.
-
-    Attributes
-    ----------
-    seen : Surface                 of the model
-    parts : names, by the numbers in ``seen.part``; ids of the points of ``seen``
-    curves : {"test", "before", "after"} or {"test", "model"} to FRF, same channels and lines
-    held_out : labels of outputs that were not fitted
-    compared : False if frequencies were compared, so that responses are only shown
-    fitted, excluded : bands [Hz]
-    outputs, inputs, cords : sensors, shakers and hangers as markers
-    mac : (test modes, model modes) after, with their frequencies [Hz], or None
-    pairs : (test, model) positions of the paired modes in it
-    """
-
-    seen: Surface
-    parts: Sequence[str] = ()
-    ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    curves: Mapping[str, FRF] = field(default_factory=dict)
-    held_out: Sequence[str] = ()
-    compared: bool = True
-    fitted: Bands = ()
-    excluded: Bands = ()
-    outputs: Sequence[annotations.Marker] = ()
-    inputs: Sequence[annotations.Marker] = ()
-    cords: Sequence[annotations.Marker] = ()
-    mac: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-    pairs: Sequence[tuple[int, int]] = ()
 
 
 def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:

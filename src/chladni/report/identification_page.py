@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from . import live_pages as live
 from .blocks import Block, PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
 from .live_pages import Page
-from .screening_blocks import SEVERAL, screening_section
+from .screening_blocks import SEVERAL, screening_json, screening_section
+from .typed_fields import as_data
 from .words import hertz, number
 
 _SHOWN = 6  # channels drawn
@@ -231,3 +233,32 @@ def _span(f: np.ndarray) -> str:
     if len(f) < 2:
         return "".join(f" at {number(one)} Hz" for one in f)
     return f" from {number(f[0])} to {number(f[-1])} Hz"
+
+
+def identification_json(result: Identification) -> dict[str, Any]:
+    """The result for ``identified.json``."""
+    held: dict[str, Any] = {"recordings": [_recording(r) for r in result.recordings]}
+    if result.levels:
+        held["levels"] = [as_data(level_tables(study)) for study in result.levels]
+    return held
+
+
+def _recording(r: RecordingModes) -> dict[str, Any]:
+    m = r.modes
+    return {
+        "name": r.recording.name,
+        "band_hz": m.band,
+        "frequency_hz": m.frequency,
+        "frequency_sd_hz": m.frequency_sd,
+        "damping": m.damping,
+        "damping_sd": m.damping_sd,
+        "firm": r.firm,
+        "struck_out": r.struck,
+        "mpc": shapes(m).collinearity if m.order else [],
+        "shape_spread": shape_spread(m),
+        "share_of_orders": r.diagram.seen(m),
+        "chi": m.chi,
+        "outputs": m.outputs,
+        "inputs": m.inputs,
+        "screening": screening_json(r.screening),
+    }

@@ -1,16 +1,20 @@
 """Curves, matrices and bars with values under the pointer."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..dynamics.frf import FRF, UNIT
-from ..ema.correlation import deviation
-from ..inference.result import Alternative, FrequencyRow, NamedEffect, Scores
+from ..dynamics.frf import UNIT
 from .drawings import rounded
-from .figures import Shown
+
+if TYPE_CHECKING:
+    from ..dynamics.frf import FRF
+    from ..inference.result import Alternative, FrequencyRow, NamedEffect, Scores
+    from .shown import Shown
 
 _VALUES = 1_200_000  # complex numbers on a page: about 5 MB
 _LINES = 300  # at least, of every channel
@@ -76,6 +80,8 @@ def _coherence(test: FRF, lines: np.ndarray, i: int, j: int) -> list[Any] | None
 
 def _off(curve: FRF, test: FRF) -> np.ndarray:
     """Q of every channel (n_out, n_in); 0 where a response is exactly zero, as at a support."""
+    from ..ema.correlation import deviation
+
     out = np.zeros(test.values.shape[1:])
     alive = np.flatnonzero((test.values * curve.values).all(axis=(0, 2)))
     if len(alive):

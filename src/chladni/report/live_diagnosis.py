@@ -12,8 +12,9 @@ from ..inference.result import Agreement, LeftPlace
 from ..workflows.diagnosis_result import DiagnosisResult
 from . import live_curves, live_mesh, live_panels
 from .drawings import Drawing, Drawings
-from .figures import Shown, q_steps
+from .figures import q_steps
 from .level_blocks import moving
+from .shown import Shown
 
 MOST_MODES = 60  # of a matrix that can be read
 _FRF = (

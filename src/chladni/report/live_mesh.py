@@ -1,22 +1,27 @@
 """The rotatable mesh: places of effects, residual, mode shapes."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..effects.estimate import Location
-from ..fem.measured_dofs import MeasuredDofs
-from ..fem.modelled import Modelled
 from ..geometry.cells import directed_edges
-from ..inference.result import FrequencyRow, LeftPlace
-from ..search.measured_modes import MeasuredModes
-from ..view.annotations import Marker
 from ..view.camera import best_view
-from ..view.paired_shapes import PairedShapes
-from ..view.surface import Surface
 from .drawings import rounded
-from .figures import CALM, Shown
+from .shown import CALM
+
+if TYPE_CHECKING:
+    from ..effects.estimate import Location
+    from ..fem.measured_dofs import MeasuredDofs
+    from ..fem.modelled import Modelled
+    from ..inference.result import FrequencyRow, LeftPlace
+    from ..search.measured_modes import MeasuredModes
+    from ..view.annotations import Marker
+    from ..view.paired_shapes import PairedShapes
+    from ..view.surface import Surface
+    from .shown import Shown
 
 MOST_FACES = 150_000  # a browser still turns
 _ALL_EDGES = 5000  # faces up to which every edge is drawn
@@ -62,12 +67,14 @@ def _triangles(seen: Surface) -> tuple[np.ndarray, np.ndarray]:
 
 def spots(places: Sequence[tuple[str, Location | LeftPlace]], shown: Shown) -> list[dict[str, Any]]:
     """Named places: a point with its radius, else grids, else parts, else channels."""
+    from ..effects.estimate import Location as Place
+
     found = []
     for text, where in places:
         at, radius = np.zeros((0, 3)), 0.0
         if where.point_m is not None:
             at = np.array([where.point_m], dtype=float)
-        if isinstance(where, Location):
+        if isinstance(where, Place):
             radius = where.radius_m or 0.0
             if not len(at) and len(shown.ids):
                 at = shown.seen.points[np.isin(shown.ids, where.grids)]

@@ -1,21 +1,26 @@
 """Drawings of the pages of the other commands."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..dynamics.frf import FRF
-from ..ema.level_table import LevelTable
-from ..model.assembly import Assembly
-from ..view.paired_shapes import PairedShapes
 from ..view.surface import Surface
-from ..workflows.identify import RecordingModes
 from . import live_curves, live_mesh, live_panels
-from .blocks import Block, Live, Picture
+from .blocks import Live, Picture
 from .drawings import Drawing, Drawings
-from .figures import Shown
+from .shown import Shown
+
+if TYPE_CHECKING:
+    from ..dynamics.frf import FRF
+    from ..ema.level_table import LevelTable
+    from ..model.assembly import Assembly
+    from ..view.paired_shapes import PairedShapes
+    from ..workflows.identify import RecordingModes
+    from .blocks import Block
 
 _MOST_POLES = 5000
 _KINDS = {"o": "new", "f": "frequency", "d": "and damping", "v": "and shape", "s": "all steady"}

@@ -1,12 +1,16 @@
 """Curves one below the other over one axis: frequency, time, amplitude, level of excitation."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..ema.level_table import LevelTable
 from .live_curves import extremes
+
+if TYPE_CHECKING:
+    from ..ema.level_table import LevelTable
 
 _POINTS, _LEAST = 2000, 200  # of a curve; of one among many
 

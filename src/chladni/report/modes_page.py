@@ -1,14 +1,19 @@
 """Normal modes as a page: frequencies, mass, energy of each part, shapes."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..workflows.loaded_model import Model
-from ..workflows.modes import NormalModes
 from .blocks import Facts, PageParts, Picture, Section, Table
 from .live_pages import Page, mesh_of, mode_shapes
 from .words import hertz, number
+
+if TYPE_CHECKING:
+    from ..workflows.loaded_model import Model
+    from ..workflows.modes import NormalModes
 
 _SHOWN = 12  # modes in the picture
 LEFT = 1e-3  # of the strain energy; more of it that is in no part has a column
@@ -83,3 +88,21 @@ def _tables(found: NormalModes, kg: str) -> list[Facts | Table]:
 
 def _share(value: float) -> str:
     return "–" if not np.isfinite(value) else f"{100 * value:.1f} %"
+
+
+def modes_json(result: NormalModes) -> dict[str, Any]:
+    """``modes.json``; without a unit system mass and centre are under names that claim none."""
+    mass, centre = (
+        ("mass_kg", "centre_of_gravity_m") if result.in_si else ("mass", "centre_of_gravity")
+    )
+    return {
+        "frequency_hz": result.modal.frequency,
+        "generalized_mass": result.generalized_mass,
+        mass: result.mass,
+        centre: result.centre_of_gravity,
+        "rigid": result.rigid,
+        "parts": {
+            name: {"id": id, "strain_energy": share}
+            for (name, id), share in zip(result.parts, result.strain_energy, strict=True)
+        },
+    }

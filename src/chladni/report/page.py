@@ -3,21 +3,24 @@
 Jinja escapes all text from a deck or a recording.
 """
 
+from __future__ import annotations
+
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from ..output import own_version, write_text
-from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Block, Facts, Picture, Section
+from .blocks import Facts, Picture
 from .drawings import Drawings, library
 from .glossary import meaning
-from .next_steps import next_steps
-from .sentence import sentence
-from .verdict import HEADING, TONE, live, sections, three_numbers
+
+if TYPE_CHECKING:
+    from ..workflows.diagnosis_result import DiagnosisResult
+    from .blocks import Block, Section
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -58,6 +61,10 @@ def diagnosis_page(
     drawings: Drawings | None = None,
 ) -> str:
     """The page of a diagnosis as text, its parameters those of :func:`write_page`."""
+    from .next_steps import next_steps
+    from .sentence import sentence
+    from .verdict import HEADING, TONE, live, sections, three_numbers
+
     shown = {name: Path(path) for name, path in (figures or {}).items()}
     drawings = drawings or Drawings()
     hero: Block | None = Picture(shown["where"]) if "where" in shown else None

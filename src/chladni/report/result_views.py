@@ -5,21 +5,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..output import write_json
 from ..results import View, show_by
-from ..workflows.case_check import CaseCheck
-from ..workflows.correlate import Correlation
-from ..workflows.diagnosis_result import DiagnosisResult
-from ..workflows.evaluation import Evaluation
-from ..workflows.frf import FrequencyResponses
-from ..workflows.identify import Identification
-from ..workflows.joint_models import JointModels
-from ..workflows.map import MappedDeck
-from ..workflows.modes import NormalModes
-from ..workflows.other_modes import OtherModes
 from .blocks import Items, Live, PageParts, Picture, Section
+
+if TYPE_CHECKING:
+    from ..workflows.diagnosis_result import DiagnosisResult
+    from ..workflows.frf import FrequencyResponses
+    from ..workflows.map import MappedDeck
 
 
 @dataclass(frozen=True)
@@ -127,7 +122,7 @@ def _diagnosis() -> View:
     from .sentence import sentence
     from .verdict import sections, three_numbers
 
-    def summary(found: DiagnosisResult) -> str:
+    def summary(found: "DiagnosisResult") -> str:
         from .blocks import Facts
         from .next_steps import next_steps
 
@@ -136,23 +131,23 @@ def _diagnosis() -> View:
         parts = PageParts(sentence(found), [first, *sections(found, {}, (), (), "")], ())
         return "\n".join([_text(parts), *([""] if steps else []), *steps])
 
-    def pictures(found: DiagnosisResult) -> Mapping[str, bytes]:
+    def pictures(found: "DiagnosisResult") -> Mapping[str, bytes]:
         return _drawn(lambda folder: figures(folder, found, shown(found.origin, found)).values())
 
-    def save(found: DiagnosisResult, folder: Path, home: Path) -> None:
+    def save(found: "DiagnosisResult", folder: Path, home: Path) -> None:
         write_diagnosis(folder, found.origin, found, home=home)
 
     return View("diagnose", summary, diagnosis_page, pictures, save, _inputs)
 
 
-def _mapped(found: MappedDeck, folder: Path) -> Sequence[tuple[str, str]]:
+def _mapped(found: "MappedDeck", folder: Path) -> Sequence[tuple[str, str]]:
     from ..io.nastran import write_deck
 
     write_deck(found.origin.deck, folder / "mapped.bdf", found.changes)
     return [("mapped.bdf", "the deck with mapped thickness")]
 
 
-def _responses(module: ModuleType, folder: Path, found: FrequencyResponses) -> PageParts:
+def _responses(module: ModuleType, folder: Path, found: "FrequencyResponses") -> PageParts:
     """The pages of all sets of responses as one."""
     parts = [module.response_page(folder, one) for one in found.frfs]
     return replace(
@@ -163,7 +158,7 @@ def _responses(module: ModuleType, folder: Path, found: FrequencyResponses) -> P
     )
 
 
-def _arrays(found: FrequencyResponses, folder: Path) -> Sequence[tuple[str, str]]:
+def _arrays(found: "FrequencyResponses", folder: Path) -> Sequence[tuple[str, str]]:
     from ..io.tables.write_tables import write_csv, write_npz
 
     files = []
@@ -175,56 +170,54 @@ def _arrays(found: FrequencyResponses, folder: Path) -> Sequence[tuple[str, str]
     return files
 
 
-_PAGES: Mapping[type, Paged] = {
-    NormalModes: Paged(
+_PAGES: Mapping[str, Paged] = {
+    "chladni.workflows.modes.NormalModes": Paged(
         "modes", ".modes_page", lambda m, at, x: m.modes_page(at, x.origin, x), "modes.json"
     ),
-    Correlation: Paged(
+    "chladni.workflows.correlate.Correlation": Paged(
         "correlate",
         ".correlation_page",
         lambda m, at, x: m.correlation_page(at, x.origin, x),
         "correlation.json",
     ),
-    OtherModes: Paged(
+    "chladni.workflows.other_modes.OtherModes": Paged(
         "correlate",
         ".other_modes_page",
         lambda m, at, x: m.other_modes_page(at, x.origin, x),
         "correlation.json",
     ),
-    Identification: Paged(
+    "chladni.workflows.identify.Identification": Paged(
         "identify",
         ".identification_page",
         lambda m, at, x: m.identification_page(at, x),
         "identified.json",
         needs_origin=False,
     ),
-    Evaluation: Paged(
+    "chladni.workflows.evaluation.Evaluation": Paged(
         "test",
         ".evaluation_page",
         lambda m, at, x: m.evaluation_page(at, x),
         "test.json",
         needs_origin=False,
     ),
-    MappedDeck: Paged(
+    "chladni.workflows.map.MappedDeck": Paged(
         "map", ".map_page", lambda m, at, x: m.map_page(at, x), "mapping.json", _mapped
     ),
-    JointModels: Paged(
+    "chladni.workflows.joint_models.JointModels": Paged(
         "calibrate",
         ".joint_models_page",
         lambda m, at, x: m.joint_models_page(at, x),
         "variants.json",
     ),
-    CaseCheck: Paged(
+    "chladni.workflows.case_check.CaseCheck": Paged(
         "check", ".check_page", lambda m, at, x: m.check_page(at, x.origin, x), "check.json"
     ),
-    FrequencyResponses: Paged(
+    "chladni.workflows.frf.FrequencyResponses": Paged(
         "frf", ".response_page", _responses, files=_arrays, needs_origin=False
     ),
 }
 
 
-def show_results() -> None:
-    """Let every result be shown by this room."""
-    show_by(DiagnosisResult, _diagnosis)
-    for kind, paged in _PAGES.items():
-        show_by(kind, paged.view)
+show_by("chladni.workflows.diagnosis_result.DiagnosisResult", _diagnosis)
+for _kind, _paged in _PAGES.items():
+    show_by(_kind, _paged.view)

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm, t
 
 from ..effects.calibration_parameters import RandomField
 from ..effects.effect import Effect
@@ -52,7 +51,7 @@ def articles_together(
     plain = replace(plain, values=plain.values * np.exp(logs.mean(axis=0)), spread=None)
     mean = _mean_fit(prepared.problem, null, replace(plain, noise=noise / np.sqrt(len(logs))))
     effects = mean.fit.effects
-    J, y = _differences(mean, replace(plain, noise=noise, identified=None), apart)
+    J, y = _differences(mean, replace(plain, noise=noise), apart)
     own = _of_one_article(effects)
     group, sd = _groups(effects)[own], np.array([p.sd for p in unknowns(effects)])[own]
     found = unit_spread(J[:, own], y, group, sd)
@@ -92,7 +91,7 @@ def _mean_fit(whole: UpdatingProblem, null: HypothesisFit, plain: Responses) -> 
     """The fit of the mean of all tests, errors of form about the state of the first."""
     data, known = plain, null.data
     if isinstance(known, Responses) and known.error is not None:
-        data = plain.allowing_errors(null.fit.state, known.error.delta, known.curved)
+        data = plain.allowing_errors(null.fit.state, known.error.delta)
     found = fitted(null.model, null.fit.effects, data, whole.mass_measurement, null.fit.x)
     mean = replace(null, fit=found)
     return replace(mean, fit=with_frozen(whole, mean))
@@ -143,6 +142,8 @@ def _summary(
 
     The mean of A articles is off μ by τ/√A, where τ is known from A - 1 differences: Student's t.
     """
+    from scipy.stats import norm, t
+
     fit, (tau, low, high) = mean.fit, spread
     own, count = calibration_positions(fit.effects), len(names)
     z, form = norm.ppf(0.975), np.diag(fit.covariance)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from ..effects.effect import Effect
 from ..errors import ModelError
@@ -22,7 +21,7 @@ from ..inference.calibration_result import (
     LikelihoodProfile,
     PosteriorSample,
 )
-from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted, wide_start
+from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from ..inference.identifiability import calibration_positions, identifiability, parameter_names
 from ..inference.likelihood import Responses
 from ..inference.linear_model import Squares
@@ -149,6 +148,8 @@ def latin_hypercube(problem: UpdatingProblem, count: int) -> list[np.ndarray]:
 
     McKay, Beckman and Conover (1979), Technometrics 21, 239-245; a fixed seed.
     """
+    from scipy.stats import qmc
+
     own, every = calibration_positions(problem.base), unknowns(problem.base)
     if not len(own):
         return []
@@ -170,8 +171,7 @@ def _ends(
         try:
             if isinstance(data, Poles):
                 return fitted(model, problem.base, problem.data, mass, x)
-            begun = wide_start(model, problem.base, problem.data, mass, x)
-            return fit(model, problem.base, data, mass, begun).kept()
+            return fit(model, problem.base, data, mass, x).kept()
         except ModelError:
             return None
 

@@ -8,7 +8,6 @@ the scatter of damping among the modes of one structure.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import nnls
 
 from ..effects.identified_damping import SCATTER
 from ..fem.modelled import Modelled
@@ -55,6 +54,8 @@ def loss_factors(share: np.ndarray, zeta: np.ndarray) -> tuple[np.ndarray, np.nd
     share : (parts, r)   of strain energy
     zeta : (r,)          damping ratios
     """
+    from scipy.optimize import nnls
+
     J = (share / (2 * zeta)).T / SCATTER
     eta, _ = nnls(J, np.full(len(zeta), 1 / SCATTER))
     return eta, np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))

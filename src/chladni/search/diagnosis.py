@@ -28,7 +28,6 @@ from ..inference.hypothesis_fit import (
     HypothesisFit,
     UpdatingProblem,
     fitted,
-    wide_start,
 )
 from ..inference.implausible_values import implausible_values
 from ..inference.likelihood import Responses
@@ -43,7 +42,6 @@ from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
 
 SHIFTS = np.arange(-14, 15) / 20  # of ln E: 2.5 % of frequency apart
-PASSES = 4  # fits of the null, until the size of the error of form stays
 
 Progress = Callable[[str, float], None]
 
@@ -143,7 +141,7 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
     plain = fit_of_the_deck(problem, null)
     progress("scan of the catalogue", 0.2)
-    tried = proposals(problem.begun_wide(), null)
+    tried = proposals(problem, null)
     give_back_freed_memory()
     hypotheses = search_round(problem, null, tried.candidates, within(progress, 0.3, 0.8))
     notes = (*unasked(problem), *could_not_be_evaluated(tried, hypotheses))
@@ -255,8 +253,7 @@ def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, Hypothes
     model, delta = problem.reduced.model, MEDIAN
     state = evaluate(model, problem.base, problem.mean(), False)
     starts = _null_starts(problem)
-    identified = getattr(problem.data, "identified", None)
-    for k in range(2 if identified is None else PASSES):
+    for k in range(2):
         problem = problem.allowing_errors(state, delta)
         null = best_base_fit(problem, problem.base, starts)
         if not isinstance(null.data, Responses) or null.data.error is None:
@@ -288,8 +285,7 @@ def best_base_fit(
     for k, x in enumerate(starts):
         try:
             data, mass = problem.data, problem.mass_measurement
-            start = wide_start(model, effects, data, mass, x)
-            fits.append(fitted(model, effects, data, mass, start))
+            fits.append(fitted(model, effects, data, mass, x))
         except ModelError:
             if not fits and k == len(starts) - 1:
                 raise

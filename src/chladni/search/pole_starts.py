@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize
-from scipy.stats import norm, qmc
 
 from ..effects.effect import Effect
 from ..errors import ModelError
@@ -26,6 +24,8 @@ STEPS = 250  # evaluations of one simplex search
 
 def draws(effect: Effect, count: int) -> np.ndarray:
     """Sobol points of an effect's prior (count, n_p); count is a power of two."""
+    from scipy.stats import norm, qmc
+
     u = qmc.Sobol(len(effect.parameters), seed=1).random(count)
     mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
     return mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3))
@@ -75,6 +75,8 @@ def _valleys(
     cost: Callable[[np.ndarray], float], starts: np.ndarray, sd: np.ndarray, most: int
 ) -> list[np.ndarray]:
     """Distinct ends of the simplex searches, lowest cost first."""
+    from scipy.optimize import minimize
+
     options = {"maxfev": STEPS, "xatol": 1e-3, "fatol": 1e-2}
     ends = [minimize(cost, x, method="Nelder-Mead", options=options) for x in starts]
     where = np.array([end.x for end in ends]).reshape(len(ends), -1)

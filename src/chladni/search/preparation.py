@@ -22,7 +22,7 @@ from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
 from ..ema.level_words import level_notes
-from ..ema.recording_noise import equalised_error, equalised_noise, sample_noise
+from ..ema.recording_noise import equalised_noise, sample_noise
 from ..ema.response_variance import noise_source
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -52,12 +52,19 @@ SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis an
 FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
 
-def prepare(question: Question, progress: Progress = silent) -> Prepared:
-    """Identify, decide how to compare, choose the held-out data, build the reduced problem."""
+def prepare(
+    question: Question, progress: Progress = silent, lines: np.ndarray | None = None
+) -> Prepared:
+    """Identify, decide how to compare, choose the held-out data, build the reduced problem.
+
+    Parameters
+    ----------
+    lines : (n_f,) bool, of the recording from which its modes are identified, default all
+    """
     uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
         return _by_poles(question, uncertain, progress)
-    return _by_responses(question, progress)
+    return _by_responses(question, progress, lines)
 
 
 def _place_sd(question: Question) -> float:
@@ -66,7 +73,9 @@ def _place_sd(question: Question) -> float:
     return max(float(p.sd.max(initial=0.0)) for p in places)
 
 
-def _by_responses(question: Question, progress: Progress) -> Prepared:
+def _by_responses(
+    question: Question, progress: Progress, lines_used: np.ndarray | None
+) -> Prepared:
     frf = question.frf
     assert frf is not None
     low, high = band_of(question, frf)
@@ -74,6 +83,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
     use, seen_to = counted(frf, question.exclude), within(progress, 0.0, 0.3)
+    use = use if lines_used is None else use & lines_used
     found = identify(frf, widened(frf, reach), use=use, progress=seen_to)
     f_max = reach[1]
     if question.held_band is None and not _modes_seen(found, low, fit_max):
@@ -108,13 +118,11 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
         use = left_out.training(f)
         H = equalised(found, s)
         noise, spread = sample_noise(found, frf, s), measured_spread(H, others, s)
-        counts = counted(frf, question.exclude)
-        error = equalised_error(found, frf, s, counts) if question.identified_noise else None
         spreads.append(spread)
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
-            identified=error, level=rms_over_lines(H[use.any(axis=1)]),
+            level=rms_over_lines(H[use.any(axis=1)]),
             direct=question.outputs.moved_with_base(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.rebased(reduced.model))

@@ -72,7 +72,6 @@ class Question:
     article: str = ""  # of the recording that is fitted
     accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
     effects: tuple[str, ...] = ()  # names of the effects that are tried; empty: all
-    identified_noise: bool = False  # whiten with the covariance of the identification
 
     def tested(self, assembly: Assembly) -> Assembly:
         """The article with the sensors of known mass on it, as it was measured."""

@@ -24,7 +24,6 @@ from .candidates import UpdatingContext, already_there
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not; more where they are tied
 LATER = 2  # of them in later rounds
-PASSES = 4  # fits about its own state, until the evidence of a hypothesis stays
 WHOLE = 6  # that keep their model, 10 to 300 MB each on a tailgate
 
 Say = Callable[[str, float], None]
@@ -55,7 +54,7 @@ def search_round(
     progress("refining the place", 0.8)
     running = running if later else max(running, _in_the_running(hypotheses[:whole]))
     ahead, rest = hypotheses[:running], hypotheses[running:]
-    finished = list(in_parallel(lambda t: _settled(problem, _finished(problem, t, True)), ahead))
+    finished = list(in_parallel(lambda t: _finished(problem, t, True), ahead))
     rest = rest if later else [_finished(problem, t, False) for t in rest]
     hypotheses = by_family([*finished, *rest])
     give_back_freed_memory()
@@ -147,20 +146,6 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
     return hypothesis
 
 
-def _settled(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisFit:
-    """A hypothesis with errors that spread from where it rests, where data count them exactly."""
-    data = hypothesis.data
-    if not isinstance(data, Responses) or data.identified is None:
-        return hypothesis
-    for _ in range(PASSES):
-        before = hypothesis
-        with suppress(*FAILED):
-            hypothesis = problem.about_itself(hypothesis)
-        if abs(hypothesis.fit.neg2_log_evidence - before.fit.neg2_log_evidence) < 1:
-            break
-    return hypothesis
-
-
 def _closer(
     problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit
 ) -> list[HypothesisFit]:
@@ -172,7 +157,6 @@ def _closer(
             if again is None:
                 break
             hypothesis = problem.fitted_with(again.effect, again.start, again.base)
-            hypothesis = _settled(problem, hypothesis)
         except FAILED:
             break
         out.append(hypothesis)

@@ -220,7 +220,7 @@ def _grown(
 ) -> tuple[_More | None, str]:
     """The set with the best further effect if its gain is enough, and a sentence on the gain."""
     held, null = _standing(problem, current)
-    found = _round(held, null, candidates(held.begun_wide(), null, FITTED), WORTH * due)
+    found = _round(held, null, candidates(held, null, FITTED), WORTH * due)
     if not found:
         return None, ""
     gain = _gain(null, found[0])
@@ -272,7 +272,7 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
     held = _holding(problem, rest, rest.effects)
     null = _in_order(held, rest)
     itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("calibration", "nuisance")))
-    found = _round(held, null, [itself, *candidates(held.begun_wide(), null, FITTED)], 0.0)
+    found = _round(held, null, [itself, *candidates(held, null, FITTED)], 0.0)
     if not found:
         return more
     best = found[0]

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.effect import ChannelChange, of
-from ..fem.modelled import Modelled, node_points
+from ..fem.modelled import Modelled
 from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.likelihood import LN10, Responses
 from ..inference.pole_data import Poles
@@ -80,9 +80,7 @@ def seen(
     rows_o, rows_i = question.outputs.rows(built), question.inputs.loads(built)
     flexible = modes.frequency[modes.frequency > 0.02 * f_max]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * f_max
-    still = attachments(
-        shifted(built.system, hertz, node_points(built)), sp.csr_array(sp.vstack([rows_o, rows_i]))
-    )
+    still = attachments(shifted(built.system, hertz), sp.csr_array(sp.vstack([rows_o, rows_i])))
     basis = orthonormal(built.system.M, [basis, still], kept=basis.shape[1])
     K, M = (basis.T @ (A @ basis) for A in (built.system.elastic, built.system.M))
     lam, phi = sl.eigh((K + K.T) / 2, (M + M.T) / 2)

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from ..errors import AccuracyError, LabelError, ModelError
-from .dissection import Fronts
+from .elimination_fronts import Fronts
 from .multifrontal import Multifrontal, NotDefinite, counted
 
 Backend = Literal["multifrontal", "cholmod", "superlu"]
@@ -84,7 +84,6 @@ class CholmodFactor:
 
 def factorise(
     A: sp.sparray,
-    points: np.ndarray | None = None,
     *,
     nodes: np.ndarray | None = None,
     definite: bool = True,
@@ -98,7 +97,6 @@ def factorise(
 
     Parameters
     ----------
-    points : (n, 3), optional  place of each row, the same for all dofs of a node: a better order
     nodes : (n,) int, optional rows that belong together (``dofs[:, 0]``)
     definite : bool            False: real or complex symmetric, not positive definite
     fronts : Fronts, optional  the order, known from a matrix of the same pattern
@@ -113,9 +111,9 @@ def factorise(
     if backend not in get_args(Backend):
         raise LabelError(f"no back-end {backend!r}; there are {', '.join(get_args(Backend))}")
     if not definite:
-        return SuperLUFactor(A) if backend == "superlu" else _indefinite(A, points, nodes, fronts)
+        return SuperLUFactor(A) if backend == "superlu" else _indefinite(A, nodes, fronts)
     if backend == "multifrontal":
-        return Multifrontal(A, points, nodes, fronts=fronts)
+        return Multifrontal(A, nodes, fronts=fronts)
     return _cholmod(A) if backend == "cholmod" else _superlu(A)
 
 
@@ -133,11 +131,9 @@ def _superlu(A: sp.sparray) -> SuperLUFactor:
     return factor
 
 
-def _indefinite(
-    A: sp.sparray, points: np.ndarray | None, nodes: np.ndarray | None, fronts: Fronts | None
-) -> Factor:
+def _indefinite(A: sp.sparray, nodes: np.ndarray | None, fronts: Fronts | None) -> Factor:
     """Fronts with pivoting inside them; if that is not accurate enough, global pivoting."""
-    factor = Multifrontal(A, points, nodes, definite=False, fronts=fronts)
+    factor = Multifrontal(A, nodes, definite=False, fronts=fronts)
     return factor if backward_error(A, factor) < _BACKWARD else SuperLUFactor(A, threshold=0.1)
 
 
@@ -152,7 +148,6 @@ def backward_error(A: sp.sparray, factor: Factor) -> float:
 
 def inertia(
     A: sp.sparray,
-    points: np.ndarray | None = None,
     *,
     nodes: np.ndarray | None = None,
     fronts: Fronts | None = None,
@@ -164,7 +159,7 @@ def inertia(
     AccuracyError
         If A is so close to singular that the signs of its pivots are not reliable.
     """
-    negative, error = counted(A, points, nodes, fronts)
+    negative, error = counted(A, nodes, fronts)
     if error > _BACKWARD:
         raise AccuracyError(f"pivots prove no inertia: backward error {error:.1e}")
     return negative, A.shape[0] - negative

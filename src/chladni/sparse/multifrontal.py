@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from scipy.linalg import blas, lapack, ldl, lu_factor, lu_solve
 
 from ..errors import ModelError
-from .dissection import Fronts, analyse, runs
+from .elimination_fronts import Fronts, analyse, runs
 
 _FEW_RUNS = 40  # number of runs up to which slices are faster than index arrays
 
@@ -120,7 +120,6 @@ class Multifrontal:
     def __init__(
         self,
         A: sp.sparray,
-        points: np.ndarray | None = None,
         nodes: np.ndarray | None = None,
         *,
         definite: bool = True,
@@ -128,7 +127,7 @@ class Multifrontal:
     ) -> None:
         A = sp.csr_array(A)
         self.definite = definite
-        self.fronts = analyse(A, points, nodes) if fronts is None else fronts
+        self.fronts = analyse(A, nodes) if fronts is None else fronts
         self._in_order = _in_order(self.fronts)
         self._parts = list(_eliminated(A, self.fronts, definite))
 
@@ -161,7 +160,6 @@ class Multifrontal:
 
 def counted(
     A: sp.sparray,
-    points: np.ndarray | None = None,
     nodes: np.ndarray | None = None,
     fronts: Fronts | None = None,
 ) -> tuple[int, float]:
@@ -170,7 +168,7 @@ def counted(
     Fronts are discarded after their elimination, because a count of eigenvalues does not need them.
     """
     A = sp.csr_array(A)
-    fronts = analyse(A, points, nodes) if fronts is None else fronts
+    fronts = analyse(A, nodes) if fronts is None else fronts
     v = np.random.default_rng(0).standard_normal((A.shape[0], 1))
     size = np.abs(A).sum(axis=1).max() * np.abs(v).max()
     negative, rest = 0, A[fronts.order] @ v
@@ -239,23 +237,27 @@ def _extend_add(F: _Blocks, to: np.ndarray, update: np.ndarray) -> None:
     F11, F21, F22 = F
     a = len(F11)
     k = int(np.searchsorted(to, a))
-    _add(F11, to[:k], to[:k], update[:k, :k])
+    _add(F11, to[:k], to[:k], update[:k, :k], lower=True)
     _add(F21, to[k:] - a, to[:k], update[k:, :k])
-    _add(F22, to[k:] - a, to[k:] - a, update[k:, k:])
+    _add(F22, to[k:] - a, to[k:] - a, update[k:, k:], lower=True)
 
 
-def _add(F: np.ndarray, i: np.ndarray, j: np.ndarray, values: np.ndarray) -> None:
+def _add(
+    F: np.ndarray, i: np.ndarray, j: np.ndarray, values: np.ndarray, *, lower: bool = False
+) -> None:
+    """Add values at rows i and columns j; of a symmetric block what lies below its columns."""
     if not values.size:
         return
     rows, columns = runs(i), runs(j)
-    if len(rows) > _FEW_RUNS:
-        for c in columns:
-            F[i, j[c.start] : j[c.stop - 1] + 1] += values[:, c]
-        return
-    for c in columns:
-        block = F[:, j[c.start] : j[c.stop - 1] + 1]
-        for r in rows:
-            block[i[r.start] : i[r.stop - 1] + 1] += values[r, c]
+    few = len(rows) <= _FEW_RUNS
+    for n, c in enumerate(columns):
+        block, first = F[:, j[c.start] : j[c.stop - 1] + 1], n if lower else 0
+        if few:
+            for r in rows[first:]:
+                block[i[r.start] : i[r.stop - 1] + 1] += values[r, c]
+        else:
+            below = slice(rows[first].start, None)
+            block[i[below]] += values[below, c]
 
 
 def _cholesky(L11: np.ndarray, F: _Blocks) -> _Cholesky:

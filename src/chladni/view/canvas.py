@@ -33,6 +33,7 @@ class Paint:
     cmap : str
     edges : bool                                     True to draw element edges
     ghost : (k, 2, 3) or None                        segments of an undeformed outline [m]
+    tiles : int or None                              of the painter; None: VTK where it works
     """
 
     values: np.ndarray | None = None
@@ -40,6 +41,7 @@ class Paint:
     cmap: str = "viridis"
     edges: bool = True
     ghost: np.ndarray | None = None
+    tiles: int | None = None
 
 
 def draw(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
@@ -47,7 +49,7 @@ def draw(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
     u0, u1, v0, v1 = camera.window
     ax.set(xlim=(u0, u1), ylim=(v0, v1), aspect="equal")
     ax.set_axis_off()
-    if prepare():
+    if paint.tiles is None and prepare():
         width = ax.get_window_extent().width
         ax.imshow(_photo(seen, camera, paint, int(2 * width)), extent=camera.window, zorder=1)
     else:
@@ -195,7 +197,7 @@ def _cuts(seen: Surface, paint: Paint) -> int:
     """Number of tiles along a side of a face; one unless values are at points."""
     if paint.values is None or len(paint.values) != len(seen.points):
         return 1
-    return int(np.clip(np.sqrt(_TILES / len(seen.faces)), 1, 5))
+    return int(np.clip(np.sqrt((paint.tiles or _TILES) / len(seen.faces)), 1, 5))
 
 
 def _bilinear(corners: np.ndarray, k: int) -> np.ndarray:

@@ -1,13 +1,16 @@
 """Style and saving of figures: colours that survive grey print, no global state, no display."""
 
 import io
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
 import matplotlib
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -33,10 +36,20 @@ def save(figure: Figure, path: Path | str, dpi: int = 180) -> Path:
 
 def _no_formulas(figure: Figure) -> None:
     """Show dollar signs in names as text; numbers of axes may still be formulas."""
-    for text in figure.findobj(Text):
+    for text in _texts(figure):
         said = text.get_text()
         if "$" in said and r"\$" not in said and r"\mathdefault" not in said:
             text.set_parse_math(False)
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """Texts within an artist; axes that are switched off make no ticks for it."""
+    if isinstance(artist, Text):
+        yield artist
+    off = isinstance(artist, Axes) and not artist.axison
+    for child in artist.get_children():
+        if not (off and isinstance(child, Axis)):
+            yield from _texts(child)
 
 
 def pixels(figure: Figure, dpi: int = 100) -> np.ndarray:

@@ -26,6 +26,7 @@ _GHOST = 70.0  # [degree] smallest fold that the undeformed outline shows
 _CORD = "#009e73"
 _LABEL = 1.5  # lengths of an arrow to the far end of its label
 _LONG = 0.35  # least length of a line of that outline, as a part of the structure's size
+_PAINTED = 20_000  # polygons that are painted sooner than VTK starts
 _CLUTTER = 1500  # faces above which a small picture is clearer without element edges
 _MANY = 6000  # faces above which element edges would only blacken the picture
 
@@ -70,12 +71,13 @@ def montage(
     front = framed(seen, both_views(seen)[0])
     height = rows * (tile / max(front.aspect, 0.7) + 0.32) + 0.5
     figure = Figure(figsize=(12.0, height))
+    few = _PAINTED // r if len(seen.faces) * r <= _PAINTED else None
     for k, (camera, phi) in enumerate(chosen):
         ax = figure.add_axes(cell(k, rows, columns, 0.5 / height))
-        swung(ax, seen, phi, camera, edges=len(seen.faces) < _CLUTTER)
+        swung(ax, seen, phi, camera, edges=len(seen.faces) < _CLUTTER, tiles=few)
         ax.set_anchor("N")
         behind = "" if camera.toward @ front.toward > 0 else "  (from behind)"
-        ax.set_title(f"{names[k]}    {hertz(frequency[k])}{behind}", fontsize=10)
+        ax.set_title(f"{names[k]}    {hertz(frequency[k])}{behind}", fontsize=10, y=1.0)
         triad(ax, camera, small=True)
     paper.motion_bar(figure, 0.42, 0.2 / height, 0.16, _MOTION)
     return paper.save(figure, path, dpi=140)
@@ -289,6 +291,7 @@ def swung(
     camera: Camera,
     peak: float | None = None,
     edges: bool = True,
+    tiles: int | None = None,
 ) -> None:
     """Draw a surface displaced by a shape, scaled to a fixed part of the structure's size."""
     peak = _peak(shape) if peak is None else peak
@@ -299,6 +302,7 @@ def swung(
         _MOTION,
         edges and len(seen.faces) < _MANY,
         seen.points[seen.outline(_GHOST, _LONG)],
+        tiles,
     )
     draw(ax, moved, camera, colours)
 

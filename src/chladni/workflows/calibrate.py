@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from ..arguments import checked
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..effects.joints import solid_parts
@@ -19,6 +20,7 @@ from .given_case import Source, given_case
 from .states import diagnose_states
 
 
+@checked
 def calibrate(
     source: Source,
     recording: Measured | Sequence[Measured] = (),

@@ -6,9 +6,11 @@ from typing import Unpack
 
 import numpy as np
 
+from ..arguments import checked
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..case.recordings import DEAD
+from ..ema.finding import Screening
 from ..errors import ChladniError, FileError, LabelError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
@@ -17,11 +19,14 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
 from ..results import Result
 from .case_draft import said_of
-from .correlate import correlate
 from .given_case import Source, given_case
 from .loaded_model import as_model
 from .modes import loose_parts
-from .screening_of_case import POUND, in_pounds, screened_unprepared
+from .output_only import with_natural_frequencies
+from .ready_case import ready, refuse_without_effects
+from .screening_of_case import POUND, RecordingAtFault, in_pounds
+from .sign_of_gain import with_sign_of_gain
+from .states import each_state
 from .unit_check import FAR, refuse_other_units
 from .unit_guess import SIZE, guessed_units
 
@@ -80,6 +85,7 @@ class CaseCheck(Result):
         return tuple(f for f in self.findings if f.fault)
 
 
+@checked
 @one_blas_thread()
 def check(
     source: Source,
@@ -111,16 +117,18 @@ def check(
         *_units(case), *_mass(case), *_size(case), *_places(case, dofs), *_band(case, elastic),
         *_dead(case), *(CaseFinding(said, HANGS) for said in loose_parts(model, modal)),
     ]  # fmt: skip
-    if not any(f.fault for f in findings):
-        progress("the recording and the model", 0.8)
-        more = _correlated(case, within(progress, 0.8, 1.0))
+    if not case.recordings:
+        findings.append(CaseFinding("there is no recording yet", NO_RECORDING))
+    elif not any(f.fault for f in findings):
+        more = _asked(case, within(progress, 0.8, 1.0))
         sure = {f.remedy for f in more if f.fault}  # is not a guess any more
         findings = [f for f in findings if f.remedy.partition(", if ")[0] not in sure] + more
     unused = {c: tuple(case.said(c)) for c in COMMANDS}
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused, origin=case)
 
 
-_NO_RECORDING = "none yet: all commands need one except modes, frf, plan, bench, render and study"
+NO_RECORDING = "all commands need one except modes, frf, plan, bench, render and study"
+BLOCKS = "nothing can be fitted until this is corrected"
 
 
 def _facts(case: Case) -> list[tuple[str, str]]:
@@ -138,7 +146,7 @@ def _facts(case: Case) -> list[tuple[str, str]]:
         ("size", f"{size} m"),
         ("mass", f"{mass:.5g} kg in the deck, {weighed}"),
         *(("recording", said_of(r)) for r in case.recordings),
-        *([] if case.recordings else [("recording", _NO_RECORDING)]),
+        *([] if case.recordings else [("recording", f"none yet: {NO_RECORDING}")]),
         ("sensors", f"{_several(case.outputs, 'output')}, {_several(case.inputs, 'input')}"),
     ]
     band = "the whole recording" if case.band is None else "{:g} to {:g} Hz".format(*case.band)
@@ -175,11 +183,7 @@ def _units(case: Case) -> list[CaseFinding]:
     try:
         refuse_other_units(case)
     except FileError as error:
-        return [
-            CaseFinding(
-                str(error).partition(": ")[2], "nothing can be fitted until this is corrected", True
-            )
-        ]
+        return [CaseFinding(str(error).partition(": ")[2], BLOCKS, True)]
     try:
         guessed_units(case.assembly, case.deck.path.name, case.units)
     except FileError as error:
@@ -248,24 +252,42 @@ def _same(a: CheckedDof, b: CheckedDof) -> bool:
     return near and abs(float(np.dot(a.direction, b.direction))) > 1 - 1e-6
 
 
-def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
-    """Report the faults that only a comparison of recording and model reveals."""
-    if not case.frfs:
-        return []
+def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
+    """Report what diagnose would refuse before its fit, and what its screening finds."""
+    out, diagnosing = [], True
     try:
-        screening = correlate(case, progress=progress, every_line=False).screening
+        refuse_without_effects(case)
+    except FileError as error:
+        text, _, remedy = _without_path(case, error).partition("; ")
+        out.append(CaseFinding(text, remedy, True))
+        diagnosing = False
+    try:
+        every = each_state(with_natural_frequencies(case))
+        for k, state in enumerate(every):
+            stage = within(progress, k / len(every), (k + 1) / len(every))
+            screening = _screened(state, diagnosing, stage)
+            for f in () if screening is None else screening.findings:
+                text, remedy = f.text.rstrip("."), f.repair + _ITSELF * bool(f.mend)
+                out.append(CaseFinding(text, remedy, f.severity == "fault"))
     except LabelError:  # a drive or sensor at which the model does not respond
         raise
     except ChladniError as error:
-        screening = screened_unprepared(case)
-        if screening is None or not screening.faults:
-            said = str(error).removeprefix(f"{case.path}: ")
-            return [CaseFinding(said, "nothing can be fitted until this is corrected", True)]
-    if screening is None:
-        return []
-    return [
-        CaseFinding(f.text.rstrip("."), f.repair, f.severity == "fault") for f in screening.findings
-    ]
+        out.append(CaseFinding(_without_path(case, error), BLOCKS, True))
+    return list(dict.fromkeys(out))
+
+
+def _screened(state: Case, diagnosing: bool, progress: Progress) -> Screening | None:
+    try:
+        return ready(with_sign_of_gain(state), diagnosing, progress, every_line=False).screening
+    except RecordingAtFault as fault:
+        return fault.screening
+
+
+def _without_path(case: Case, error: ChladniError) -> str:
+    return str(error).removeprefix(f"{case.path}: ")
+
+
+_ITSELF = " (calibrate and diagnose undo it themselves)"
 
 
 def _band(case: Case, elastic: np.ndarray) -> list[CaseFinding]:

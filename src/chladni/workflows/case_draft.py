@@ -9,12 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from ..case.files_of_source import files_of
 from ..case.free_parameters import fields_of
+from ..case.mended_recordings import with_frf
 from ..ema.response_correlations import responses
 from ..ema.setup import Recording
 from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..io.nastran import assembly
+from ..io.tables.csv_table import csv_text
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
@@ -78,6 +81,11 @@ class CaseDraft:
         count: Counter[str] = Counter(d.matched_by for d in self.dofs)
         return ", ".join(f"{count[kind]} {text}" for kind, text in WAYS.items() if count[kind])
 
+    @property
+    def nowhere(self) -> bool:
+        """True if there are dofs and no place of any is known."""
+        return bool(self.dofs) and all(d.matched_by == "missing" for d in self.dofs)
+
 
 def draft(
     deck: Path,
@@ -137,7 +145,7 @@ def _recordings(path: Path, quantity: str | None) -> tuple[Recording, ...]:
     if not path.is_file():
         raise FileError(f"no file {path}{similar_names(path)}")
     try:
-        return read_recordings(path, quantity)
+        return tuple(with_frf(r)[0] for r in read_recordings(path, quantity))
     except FileError as error:
         if quantity is None and "quantity" in str(error):
             raise FileError(f"{error} (--quantity)") from error
@@ -181,8 +189,7 @@ def _missing(
 
 def sensors_text(made: CaseDraft) -> str:
     """Return the text of ``sensors.csv``; a missing sensor has no row."""
-    rows = [_row(d) for d in made.dofs if d.matched_by != "missing"]
-    return "\n".join([",".join(COLUMNS), *(",".join(row) for row in rows), ""])
+    return csv_text([COLUMNS, *(_row(d) for d in made.dofs if d.matched_by != "missing")])
 
 
 def _row(d: MatchedDof) -> list[str]:
@@ -234,7 +241,8 @@ def case_text(made: CaseDraft, folder: Path) -> str:
 
 def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
     """Return the line that permits files outside the folder, if there are any."""
-    ways = (Path(_seen_from(path, folder)) for path in (made.deck, *made.recordings))
+    files = (*files_of(made.deck), *made.recordings)
+    ways = (Path(_seen_from(path, folder)) for path in files)
     if not any(axis_text.is_absolute() or ".." in axis_text.parts for axis_text in ways):
         return []
     return ["outside = true  # files outside this folder: not part of the case"]

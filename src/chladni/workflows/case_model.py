@@ -9,7 +9,7 @@ from ..case import Case
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift
 from ..fem.measured_dofs import MeasuredDofs
-from ..fem.modelled import Modelled, node_points
+from ..fem.modelled import Modelled
 
 if TYPE_CHECKING:
     from ..view.annotations import Marker
@@ -29,7 +29,7 @@ def model_frf(case: Case, model: Modelled, damping: float | np.ndarray, test: FR
     pick = case.outputs.rows(s).T.toarray()
     load, with_base = case.inputs.loads(s).T.toarray(), case.outputs.moved_with_base(case.inputs)
     shift = residual_shift(modal, f[-1])
-    rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s), shift=shift)
+    rest = residual_flexibility(s.system, modal, pick, load, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, f, V=s.system.V, loss=loss, residual=rest)

@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from ..arguments import checked
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..dynamics.frf import FRF
@@ -16,7 +17,6 @@ from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.mac_significance import CLOSE, Likeness, likeness
 from ..ema.mode_pairing import ModePairs, pair
-from ..ema.screening_lines import screening_lines
 from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
 from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
@@ -32,6 +32,7 @@ from .identify import firm
 from .output_only import with_natural_frequencies
 from .question_of_case import nothing_measured
 from .screening_of_case import screened_by_model
+from .sign_of_gain import with_sign_of_gain
 from .unit_check import refuse_other_units
 
 BANDS = 6
@@ -76,12 +77,12 @@ class Correlation(Result):
     likeness: tuple[Likeness, ...] = ()
 
 
+@checked
 def correlate(
     source: Source,
     recording: Measured | Sequence[Measured] = (),
     *,
     progress: Progress = silent,
-    every_line: bool = True,
     **words: Unpack[CaseWords],
 ) -> Correlation:
     """Identify the first recording, pair its modes with the model's, score the responses.
@@ -89,8 +90,6 @@ def correlate(
     Parameters
     ----------
     source, recording, progress, words : as in :func:`chladni.diagnose` (SI, Hz)
-    every_line : False if only its screening is needed: the modes of a long recording are then
-        identified from the lines that screening needs
 
     Raises
     ------
@@ -100,15 +99,17 @@ def correlate(
     case = given_case(source, recording, words)
     refuse_other_units(case)
     with one_blas_thread():
-        found = _correlated(with_natural_frequencies(case), progress, every_line)
+        found = _correlated(with_natural_frequencies(case), progress)
     return replace(found, origin=case)
 
 
-def _correlated(case: Case, progress: Progress, every_line: bool) -> Correlation:
+def _correlated(case: Case, progress: Progress) -> Correlation:
     test = case.frfs[0] if case.frfs else None
     f_max = _f_max(case, test)
     progress("modes of the model", 0.1)
     model = modelled(case.tested(case.assembly), REACH * f_max)
+    case = with_sign_of_gain(case, model)
+    test = case.frfs[0] if case.frfs else None
     f = model.modes.frequency
     inside = ~rigid_modes(model.modes) & (f > RIGID * f_max) & (f <= 1.3 * f_max)
     near = model.modes.sel(np.flatnonzero(inside))
@@ -117,7 +118,6 @@ def _correlated(case: Case, progress: Progress, every_line: bool) -> Correlation
         return replace(_by_poles(case, near), numbers=numbers)
     refuse_silent(model, case.outputs, case.inputs)
     use = case.lines(test.frequency)
-    use &= True if every_line else screening_lines(test)
     progress(_identifying(len(test.outputs) * len(test.inputs), int(use.sum())), 0.4)
     found = identified(test, case.band, use=use)
     screening = screened_by_model(case, found, model, use)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Unpack
 
+from ..arguments import checked
 from ..case.make_case import CaseWords, Measured
 from ..progress import Progress, silent
 from .diagnosis_result import DiagnosisResult
@@ -11,6 +12,7 @@ from .given_case import Source, given_case
 from .states import diagnose_states
 
 
+@checked
 def diagnose(
     source: Source,
     recording: Measured | Sequence[Measured] = (),

@@ -16,7 +16,7 @@ from ..case import Case
 from ..decision.decide import RULES
 from ..decision.decision_rules import odds_of_something_else
 from ..dynamics.frf import FRF
-from ..ema.finding import Screening
+from ..ema.finding import Finding, Screening
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
@@ -28,7 +28,6 @@ from ..inference.likelihood import Responses
 from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
 from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
-from ..io.nastran.edit.changes import Add
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -45,7 +44,7 @@ from ..search.diagnosis import diagnose as compared
 from ..search.frequency_table import frequency_error, frequency_rows
 from ..search.measured_modes import MeasuredModes, measured_modes
 from ..search.other_recordings import scored_others
-from ..search.preparation import NOT_WEIGHED, prepare
+from ..search.preparation import NOT_WEIGHED
 from ..search.question import Prepared, Question
 from ..search.regions_to_free import regions_to_free
 from ..search.result_parts import (
@@ -61,18 +60,14 @@ from ..search.result_parts import (
 from ..search.verdict_models import fitted_scores, models, of_channels, real_poles, with_deck
 from ..search.written_scores import noise_Q, written_Q
 from ..sparse.freed_memory import give_back_freed_memory
-from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
+from .deck_comments import with_mended, with_remarks
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
+from .mended_case import mending, with_undone
 from .over_levels import over_levels
-from .question_of_case import question_of
-from .screening_of_case import (
-    RecordingAtFault,
-    instead_of_effects,
-    screened_prepared,
-    screened_unprepared,
-    unmendable,
-)
+from .ready_case import ready
+from .screening_of_case import instead_of_effects, unlike
+from .sign_of_gain import with_sign_of_gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +93,8 @@ def searched(
 ) -> Explained:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
+    A fault of the recording that is beyond doubt and that a map undoes is undone first.
+
     Parameters
     ----------
     known : posterior of the shared parameters from other states
@@ -106,27 +103,24 @@ def searched(
     Raises
     ------
     RecordingAtFault
-        If the recording shows a fault that a fit cannot compensate.
+        If the recording shows a fault that neither a map nor a fit can compensate.
     """
+    made, faults = mending(
+        with_sign_of_gain(case),
+        lambda case, faults: _searched(case, diagnosing, progress, known, settings, faults),
+    )
+    return replace(made, screening=with_undone(made.screening, faults))
+
+
+def _searched(
+    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None,
+    settings: CalibrationSettings, faults: tuple[Finding, ...],
+) -> Explained:  # fmt: skip
+    """Fit the recording as it is; ``faults`` were undone already."""
     progress("identifying the recording", 0.0)
-    if diagnosing and not len(case.assembly.shells) + len(case.assembly.beams):
-        raise FileError(
-            f"{case.path}: the deck has neither shells nor beams, but the effects of diagnose act "
-            "on these; calibrate and correlate accept any deck"
-        )
-    question = question_of(case)
-    try:
-        prepared = prepare(question, within(progress, 0.0, 0.1))
-    except FileError:  # a recording at fault may hold nothing to fit, and says so itself
-        alone = screened_unprepared(case)
-        if alone is None or not alone.faults:
-            raise
-        raise RecordingAtFault(alone) from None
-    if prepared.identified is not None:
-        refuse_turned_axes(case, prepared.identified, prepared.nominal)
-    screening = screened_prepared(case, prepared)
-    if diagnosing and screening is not None and unmendable(screening):
-        raise RecordingAtFault(screening)
+    made_ready = ready(case, diagnosing, within(progress, 0.0, 0.1), undone=faults)
+    question, prepared = made_ready.question, made_ready.prepared
+    screening = made_ready.screening
     if known:
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
@@ -160,7 +154,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     found = with_deck(prepared, known.found)
     give_back_freed_memory()
     progress("the updated deck", 0.85)
-    stages, lost = _updated(case, question, prepared, found)
+    mended = () if known.screening is None else known.screening.mended
+    stages, lost = _updated(case, question, prepared, found, mended)
     progress("scores", 0.95)
     result = _result(question, prepared, found, stages)
     result = over_levels(question, prepared, stages, result, diagnosing)
@@ -180,7 +175,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
-        distrust = (*distrust, *instead_of_effects(result.verdict, seen))
+        doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
+        distrust = (*distrust, *doubts)
     said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     return replace(
@@ -220,15 +216,19 @@ def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple
 
 
 def _updated(
-    case: Case, question: Question, prepared: Prepared, found: Diagnosis
+    case: Case, question: Question, prepared: Prepared, found: Diagnosis, mended: tuple[str, ...]
 ) -> tuple[UpdatedModels, list[str]]:
-    """Return the structures before and after, each solved once, as their decks describe them."""
+    """Return the structures before and after, each solved once, as their decks describe them.
+
+    Comments of a changed deck say what of the recording was ``mended``.
+    """
     stages, nominal = models(question, found), as_it_is(question, prepared.nominal)
     calibrated, lost = _deck(case, question, nominal, stages.calibrated)
     final = calibrated
     if stages.final is not stages.calibrated:
         final, lost = _deck(case, question, nominal, stages.final)
-        final = _commented(final, found.as_deck)
+        final = with_remarks(final, found.as_deck)
+    final = with_mended(final, mended)
     test = measured_modes(prepared)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared), test=test)
     return replace(made, curves=_curves(case, made, test)), lost
@@ -258,15 +258,6 @@ def _deck(
         known = modelled(question.tested(changed), nominal.band)
         return ChangedDeck(known, None), [f"no updated deck was written: {error}"]
     return ChangedDeck(modelled(question.tested(written), nominal.band), edits), []
-
-
-def _commented(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
-    """Add to the deck, as comments, the parts of named effects that cards cannot hold."""
-    if named is None or deck.changes is None:
-        return deck
-    said = [e.remarks(named.fit.of(e)).comment for e in named.effects]
-    comments = tuple(Add((), text) for text in said if text)
-    return replace(deck, changes=(*deck.changes, *comments))
 
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:

@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..arguments import checked
 from ..case import Case
 from ..case.mended_recordings import with_frf
+from ..dynamics.frf import FRF
 from ..ema.finding import Check, Finding, Screening, notes_of_all
 from ..ema.frf_estimate import EstimateSettings, FrfEstimate, refuse_unknown
 from ..ema.identification import Identified, identify
@@ -57,8 +59,9 @@ class Evaluation(Result):
     notes: tuple[str, ...] = ()
 
 
+@checked
 def evaluate_recordings(
-    source: Case | str | Path | Sequence[Recording],
+    source: Case | str | Path | FRF | Recording | Sequence[FRF | Recording],
     settings: EstimateSettings | None = None,
     *,
     progress: Progress = silent,

@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from ..case import Case, load_case
+from ..arguments import checked
+from ..case import Case
 from ..case.sensor_places import ROLES, placed, sensor_masses, weight_of_sensors
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift, transfer
-from ..errors import FileError
+from ..errors import FileError, LabelError, ShapeError
 from ..fem.measured_dofs import MeasuredDofs
-from ..fem.modelled import Modelled, modelled, node_points
+from ..fem.modelled import Modelled, modelled
 from ..fem.solve import base_response, inertia_load
 from ..io.tables.sensor_table import exciter, read_layout
 from ..model.analysis import Analysis, Subcase
@@ -24,7 +25,8 @@ from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
 from .case_model import REACH, model_frf
-from .loaded_model import DeckModels, Model, as_model, is_case, load_deck, similar_names
+from .given_case import Source
+from .loaded_model import DeckModels, Model, as_model, opened, similar_names
 
 Side = Sequence[str] | MeasuredDofs  # outputs, or inputs
 MOST_DOFS, MOST_NAMED = (
@@ -41,11 +43,12 @@ class FrequencyResponses(Result):
     notes: tuple[str, ...] = ()
 
 
+@checked
 @one_blas_thread()
 def frf(
-    source: Case | Model | DeckModels | str | Path,
-    outputs: Side = (),
-    inputs: Side = (),
+    source: Source,
+    outputs: str | Side = (),
+    inputs: str | Side = (),
     frequency: np.ndarray | None = None,
     damping: float = 0.01,
     *,
@@ -56,8 +59,8 @@ def frf(
 
     Parameters
     ----------
-    source : a case (lines and places of its recording), a deck (its own loads), a model, or the
-        path of a case or deck
+    source : a case (lines and places of its recording), a deck (its own loads), a model, an
+        Assembly, or the path of a case or deck
     outputs, inputs : labels as 55:+Z, 12:n or base:+Z, or places as ``placed_layout`` makes them;
         without inputs those of the source
     frequency : (n_f,) [Hz]     with inputs
@@ -69,10 +72,25 @@ def frf(
     FileError
         If the places of excitation or response are missing.
     """
-    if isinstance(source, str | Path):
-        source = load_case(source) if is_case(Path(source)) else load_deck(Path(source), units)
-    found = _responses(source, outputs, inputs, frequency, damping, progress)
-    return replace(found, origin=source)
+    to: Side = (outputs,) if isinstance(outputs, str) else outputs
+    by: Side = (inputs,) if isinstance(inputs, str) else inputs
+    if damping < 0:
+        raise LabelError(f"damping = {damping:g}; a ratio is 0 or more")
+    if frequency is not None:
+        frequency = _lines(frequency)
+    found_in = opened(source, units)
+    found = _responses(found_in, to, by, frequency, damping, progress)
+    return replace(found, origin=found_in)
+
+
+def _lines(frequency: np.ndarray) -> np.ndarray:
+    """Return frequencies [Hz] as a list of at least one; ShapeError for others."""
+    lines = np.asarray(frequency, float)
+    if lines.ndim != 1 or not len(lines) or not (np.isfinite(lines) & (lines >= 0)).all():
+        raise ShapeError(
+            "argument frequency takes a list of one or more frequencies [Hz], 0 or more"
+        )
+    return lines
 
 
 def _responses(
@@ -83,7 +101,7 @@ def _responses(
         if frequency is None or not _labels(outputs):
             raise FileError("--input needs at least one --output, as --output 55:+Z")
         model = as_model(source)
-        found = _between(model, outputs, inputs, np.asarray(frequency, float), damping, progress)
+        found = _between(model, outputs, inputs, frequency, damping, progress)
         return replace(found, notes=(*model.notes, *found.notes))
     if isinstance(source, Case):
         return _of_recording(source, damping, progress)
@@ -199,7 +217,7 @@ def superposed(
         for side in (outputs, inputs)
     )
     shift = residual_shift(modal, frequency[-1])
-    rest = residual_flexibility(s.system, modal, pick, load, points=model.places, shift=shift)
+    rest = residual_flexibility(s.system, modal, pick, load, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
@@ -216,7 +234,7 @@ def _from_base(
     dofs, s = np.array([(point, c) for point, c, _ in ends]), made.structure
     load = s.T.T @ inertia_load(made.assembly, -np.eye(3)[:, axis - 1 : axis])
     modal, pick = made.modes.with_damping(damping), s.rows(dofs).T.toarray()
-    rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s))
+    rest = residual_flexibility(s.system, modal, pick, load)
     found = base_response(s, modal, axis, frequency, dofs, residual=rest)
     signs = sign * np.array([c for _, _, c in ends])
     return replace(
@@ -234,7 +252,7 @@ def _places_from_base(
     """Compute the transmissibility at places off the grids, along their own directions."""
     built, modal = made.structure, made.modes.with_damping(damping)
     pick, load = outputs.rows(built).T.toarray(), inputs.loads(built).T.toarray()
-    rest = residual_flexibility(built.system, modal, pick, load, points=node_points(built))
+    rest = residual_flexibility(built.system, modal, pick, load)
     s = 2j * np.pi * frequency
     H = transfer(modal, pick.T @ modal.shapes, load.T @ modal.shapes, s, residual=rest)
     values = outputs.moved_with_base(inputs) + (s**2)[:, None, None] * H

@@ -1,19 +1,21 @@
 """The case of a call: one that was loaded, one in a folder, or a deck with its recordings."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import cast
 
 from ..case import Case, load_case
 from ..case.make_case import CaseWords, Measured, make_case
 from ..errors import FileError
-from ..io.nastran import assembly
+from ..io.nastran import Deck, assembly, read_deck, write_assembly
 from ..io.nastran.edit.model_changes import changes
 from ..model.assembly import Assembly
-from .loaded_model import DeckModels, Model, is_case, similar_names
+from .loaded_model import DeckModels, Model, is_case, opened, similar_names
 
-Source = Case | Model | DeckModels | str | Path
-"""A case (or its folder), a deck (or its path), or a model that was loaded from a deck."""
+Source = Case | Model | DeckModels | Assembly | Deck | str | Path
+"""A case (or its folder), a deck (or its path), a model that was loaded, or a structure in SI."""
 
 
 def given_case(
@@ -42,13 +44,27 @@ def given_case(
                 "deck in place of the case"
             )
         return source
-    if source.deck is None:
-        raise FileError("this model was not read from a deck, so a diagnosis can change none")
-    if source.units is not None:
-        if words.get("units", source.units.name) != source.units.name:
-            raise FileError(f"argument units: the model was loaded in {source.units.name}")
-        words = cast(CaseWords, {**words, "units": source.units.name})
-    return make_case(source.deck, recording, _changed(source), words)
+    if isinstance(source, Deck):
+        return make_case(source, recording, words=words)
+    model = opened(source)
+    assert isinstance(model, Model | DeckModels)
+    if model.units is not None:
+        if words.get("units", model.units.name) != model.units.name:
+            raise FileError(f"argument units: the model was loaded in {model.units.name}")
+        words = cast(CaseWords, {**words, "units": model.units.name})
+    deck = model.deck
+    if deck is None:
+        assert isinstance(model, Model)
+        deck = exported_deck(model.assembly)
+    return make_case(deck, recording, _changed(model), words)
+
+
+def exported_deck(made: Assembly) -> Deck:
+    """The deck that would be written of a structure in SI."""
+    name = Path("assembly.bdf")
+    with TemporaryDirectory(prefix="chladni-") as folder:
+        deck = read_deck(write_assembly(made, Path(folder) / name))
+    return replace(deck, path=name, sources=tuple(replace(s, path=name) for s in deck.sources))
 
 
 def _changed(source: Model | DeckModels) -> Assembly | None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import checked, refuse_band, refuse_fields
 from ..case import Case
 from ..case.mended_recordings import with_frf
 from ..dynamics.frf import FRF, Quantity
@@ -25,7 +26,7 @@ from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
 from ..ema.shapes import modal_model
 from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
-from ..errors import AccuracyError, FileError
+from ..errors import AccuracyError, FileError, LabelError
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
 from ..results import Result
@@ -111,6 +112,9 @@ class PoleChoice:
     drop: tuple[float, ...] = ()
     pick: tuple[float, ...] = ()
 
+    def __post_init__(self) -> None:
+        refuse_fields(self)
+
     @property
     def notes(self) -> list[str]:
         """The choice, in sentences."""
@@ -148,8 +152,9 @@ class Identification(Result):
         return self
 
 
+@checked
 def identify(
-    source: Case | str | Path | FRF | Recording | Sequence[Recording],
+    source: Case | str | Path | FRF | Recording | Sequence[FRF | Recording],
     band: tuple[float, float] | None = None,
     averages: int = 1,
     choice: PoleChoice = PoleChoice(),
@@ -172,6 +177,9 @@ def identify(
     FileError
         If no recording holds either.
     """
+    refuse_band(band)
+    if averages < 1:
+        raise LabelError(f"averages = {averages}; an estimate has 1 or more")
     source = read_source(source, quantity)
     if isinstance(source, Case):
         recordings = source.recordings

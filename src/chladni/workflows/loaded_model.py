@@ -1,7 +1,7 @@
 """Load a model for any command: from a path to its assembly, its modes, its pictures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
@@ -12,25 +12,26 @@ import scipy.sparse as sp
 
 from ..dofs import parse
 from ..dynamics.modes import ModalModel
-from ..errors import FileError
+from ..errors import ArgumentError, FileError
 from ..fem.assemble import Structure, structure
 from ..fem.modelled import Modelled, node_points, solved
 from ..geometry.grid_normals import normals_at
+from ..io.nastran.text.deck import Deck
 from ..model.analysis import Analysis
 from ..model.assembly import Assembly
-from ..units import Units
+from ..units import UNITS, Units
 from ..units import units as unit_system
 from ..view.surface import Surface, surface
-from .unit_guess import doubt_of_units
+from .unit_guess import doubt_of_units, guessed_units
 
 if TYPE_CHECKING:
     from ..case import Case
-    from ..io.nastran import Deck
 
 
 LEAST_MODES = (
     7  # modes; they separate six rigid motions of a free structure from the first elastic mode
 )
+SOURCES = "the path of a deck or case, what chladni.load or load_case returned, or an Assembly"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ class Model:
     notes: tuple[str, ...] = ()  # what of the deck was left out
     length: float = 1.0  # the deck's own unit of length [m]
     units: Units | None = None  # the deck's own
-    deck: "Deck | None" = None  # it was read from
+    deck: Deck | None = None  # it was read from
 
     @cached_property
     def structure(self) -> Structure:
@@ -69,7 +70,7 @@ class Model:
         from ..dynamics.eigen import normal_modes
 
         count = min(count, len(self.structure.system.dofs))
-        return normal_modes(self.structure.system, count, points=self.places)
+        return normal_modes(self.structure.system, count)
 
     def directions(self, labels: Sequence[str]) -> sp.csr_array:
         """Motion at labels as 12:+Z or 12:n (the surface normal): (k, n_free)."""
@@ -103,15 +104,8 @@ def load_model(
     FileError
         If there is no such file, or it is neither a deck nor a case.
     """
-    source = Path(source)
-    if not source.exists():
-        raise FileError(f"no file or folder {source}{similar_names(source)}")
-    if is_case(source):
-        from ..case import load_case
-
-        case = load_case(source)
-        return as_model(case, command)
-    return load_deck(source, units, allow).model(subcase)
+    found = opened(source, units, allow)
+    return found.model(subcase) if isinstance(found, DeckModels) else as_model(found, command)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +113,7 @@ class DeckModels:
     """A bare deck, its analysis requests, and its model under each subcase."""
 
     source: Path
-    deck: "Deck"
+    deck: Deck
     units: Units | None
 
     @cached_property
@@ -149,23 +143,100 @@ class DeckModels:
         return Model(self.source, made, "m", notes, self.units.length, self.units, self.deck)
 
 
+def opened(
+    source: "Case | Model | DeckModels | Assembly | Deck | str | Path",
+    units: str | Units | None = None,
+    allow: Sequence[str] = (),
+) -> "Case | Model | DeckModels":
+    """Read what a path names; take a deck that was read, or a structure in SI, as a model.
+
+    Parameters
+    ----------
+    units : of a deck; everything else has its own, and no others may be named
+    allow : cards of the deck at a path to leave out although they carry stiffness
+
+    Raises
+    ------
+    ArgumentError
+        If it is something else.
+    FileError
+        If there is no such file, it is neither a deck nor a case, or has other units.
+    """
+    found: Case | Model | DeckModels
+    if isinstance(source, str | Path):
+        path = Path(source)
+        if not path.exists():
+            raise FileError(f"no file or folder {path}{similar_names(path)}")
+        if not is_case(path):
+            return load_deck(path, units, allow)
+        from ..case import load_case
+
+        found = load_case(path)
+    elif isinstance(source, Deck):
+        return DeckModels(source.path, source, None if units is None else unit_system(units))
+    elif isinstance(source, Assembly):
+        found = Model(Path("assembly"), source, units=UNITS["SI"])
+    elif isinstance(source, Model | DeckModels):
+        found = source
+    else:
+        found = _loaded_case(source)
+    if units is not None and (found.units is None or found.units != unit_system(units)):
+        path = found.source if isinstance(found, Model | DeckModels) else found.path
+        known = "none" if found.units is None else found.units.name
+        raise FileError(f"argument units: {path} was loaded before, with units {known}")
+    return found
+
+
+def _loaded_case(source: object) -> "Case":
+    from ..case import Case
+
+    if not isinstance(source, Case):
+        raise ArgumentError(f"a model is no {type(source).__name__}; give {SOURCES}")
+    return source
+
+
 def as_model(
-    source: "Case | Model | DeckModels | str | Path",
+    source: "Case | Model | DeckModels | Assembly | Deck | str | Path",
     command: str = "modes",
     units: str | Units | None = None,
+    allow: Sequence[str] = (),
 ) -> Model:
-    """Convert a case or a deck, or the path of either, to a model; return a model unchanged."""
-    if isinstance(source, str | Path):
-        return load_model(source, units, command=command)
-    if units is not None:
-        raise FileError("argument units is of the path of a deck; this model was loaded before")
-    if isinstance(source, Model):
-        return source
-    if isinstance(source, DeckModels):
-        return source.model()
-    notes = tuple(source.said(command))
-    units = source.units
-    return Model(source.path, source.assembly, "m", notes, units.length, units, source.deck)
+    """Convert whatever holds a structure to a model; return a model unchanged."""
+    found = opened(source, units, allow)
+    if isinstance(found, Model):
+        return found
+    if isinstance(found, DeckModels):
+        return found.model()
+    notes, own = tuple(found.said(command)), found.units
+    return Model(found.path, found.assembly, "m", notes, own.length, own, found.deck)
+
+
+def model_in_si(
+    source: "Case | Model | DeckModels | Assembly | Deck | str | Path",
+    command: str,
+    units: str | Units | None = None,
+    allow: Sequence[str] = (),
+) -> tuple[Model, str]:
+    """Convert to a model in SI, with a sentence where the unit system of a deck was guessed.
+
+    Raises
+    ------
+    FileError
+        If several unit systems fit the materials of the deck, or none does.
+    """
+    found = opened(source, units, allow)
+    if not isinstance(found, Model | DeckModels) or found.units is not None:
+        return as_model(found, command), ""
+    bare = as_model(found)
+    guess = guessed_units(bare.assembly, bare.source.name)
+    known = guess.units.name
+    if not guess.sure:
+        raise FileError(f"{bare.source}: {guess.why}; state it by --units")
+    if isinstance(found, DeckModels):
+        return replace(found, units=guess.units).model(), f"units = {known}: {guess.why}"
+    if known != "SI":
+        raise FileError(f"{bare.source}: load it with units = {known}: {guess.why}")
+    return replace(bare, unit="m", units=guess.units), f"units = {known}: {guess.why}"
 
 
 def load_deck(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import checked
 from ..case.mapped_thickness import FormedThickness, formed_thickness
 from ..errors import FileError
 from ..geometry.thickness_mapping import shell_mass
@@ -16,7 +17,9 @@ from ..model.assembly import Assembly
 from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
-from .loaded_model import Model
+from ..units import units as unit_system
+from .given_case import Source, exported_deck
+from .loaded_model import as_model
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,44 +50,52 @@ class MappedDeck(Result):
         return before, after
 
 
+@checked
 def map_formed(
-    model: Model,
+    source: Source,
     formed: Path | str,
-    units: Units | None = None,
+    formed_units: str | Units | None = None,
     place: str = "as it lies",
     pairs: Mapping[str, int] | None = None,
     guess: bool = False,
     *,
+    units: str | Units | None = None,
     progress: Progress = silent,
 ) -> MappedDeck:
     """Map thickness onto a deck's shells, corner by corner.
 
     Parameters
     ----------
-    model : of a deck with units, as ``chladni.load(deck, "mm-t-s")`` returns it
+    source : a model or case with units, an Assembly, or the path of a deck or case
     formed : LS-DYNA keyword file, VTU, CSV, or a scan of both faces (STL, PLY, OBJ)
-    units : of the formed file, the deck's unless given
+    formed_units : of the formed file, the deck's unless given
     place : "as it lies", "aligned" or "mirrored"
     pairs : part of the deck -> part id of the formed mesh
     guess : parts missing in the file get the thinning expected from their curvature, as learned
         from the parts in the file
+    units : of a deck given by its path
 
     Raises
     ------
     FileError, ModelError, AccuracyError
         If the deck has no units, or the file lies elsewhere or fits no part.
     """
-    if model.units is None or model.deck is None:
+    model = as_model(source, "map", units)
+    own = model.units
+    if own is None:
         raise FileError(f"{model.source}: a thickness needs the deck's unit system (--units)")
+    deck = model.deck or exported_deck(model.assembly)
+    model = replace(model, deck=deck)
     before = model.assembly
     progress("mapping", 0.2)
-    found = formed_thickness(before, Path(formed), units or model.units, place, pairs)
+    of_file = own if formed_units is None else unit_system(formed_units)
+    found = formed_thickness(before, Path(formed), of_file, place, pairs)
     after, thinning, guessed = found.mapped.assembly, None, None
     if guess:
         progress("thinning by curvature", 0.6)
         after, thinning, guessed = _with_guess(after, {p.part for p in found.mapped.parts})
     progress("cards", 0.8)
-    edits = tuple(changes(model.deck, before, after, model.units))
+    edits = tuple(changes(deck, before, after, model.units))
     notes = (*model.notes, *found.said(), *_not_mapped(after, found, guessed))
     return MappedDeck(before, after, found, edits, thinning, guessed, notes, origin=model)
 

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ..case.node_numbers import (
+    OFF,
     number_channels,
     numbers_agree,
     off_its_grid,
@@ -49,6 +50,24 @@ class MatchedDof:
     mass: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class NodesOnDeck:
+    """Nodes of a recording on a deck.
+
+    Attributes
+    ----------
+    row : (n,) int     of the grid, -1 where none is at the node
+    place : (n, 3)     of the recording [m], nan where it has none
+    unit : in which the places fit the deck
+    by_place : number of nodes that were found at a grid of another number
+    """
+
+    row: np.ndarray
+    place: np.ndarray
+    unit: str
+    by_place: int
+
+
 def matched(
     made: Assembly, recording: Recording | None, table: Sequence[Sensor] = ()
 ) -> tuple[list[MatchedDof], list[str]]:
@@ -82,7 +101,7 @@ def matched(
         ("output", recording.frf.outputs), ("input", recording.frf.inputs),
     )  # fmt: skip
     rest = [label for role, labels in sides for label in labels if (label, role) not in own]
-    counted = number_channels(recording.frf.outputs, recording.frf.inputs)
+    counted = number_channels(recording.frf.outputs, recording.frf.inputs, made.ids.tolist())
     channels = bool(rest) and counted and not on_structure(made, nodes)
     if channels:
         notes.append(
@@ -98,7 +117,9 @@ def matched(
         for role, labels in sides
         for label in labels
     ]
-    unproved = [d.label for d in found if d.matched_by == "grid" and np.isnan(d.distance)]
+    unproved = dict.fromkeys(
+        d.label for d in found if d.matched_by == "grid" and np.isnan(d.distance)
+    )
     if unproved:
         notes.append(
             f"labels {named(unproved, 3)} of {recording.name} are taken as grid numbers of the "
@@ -110,6 +131,34 @@ def matched(
     if idle:
         notes.append(f"rows of the given table that are not in {recording.name}: {named(idle)}")
     return found, notes
+
+
+def matched_nodes(made: Assembly, recording: Recording, ids: np.ndarray) -> NodesOnDeck:
+    """Nodes of a recording on the deck as its dofs are: by number, by place, else at their place.
+
+    Numbers count where no place contradicts them.
+
+    Parameters
+    ----------
+    ids : (n,) int, of the nodes
+    """
+    size, (unit, nodes) = size_of(made), scaled(made, recording.nodes)
+    by_number = numbers_agree(made, nodes)
+    place = np.array([nodes.get(n, _NOWHERE) for n in ids.tolist()]).reshape(-1, 3)
+    placed = np.isfinite(place).all(axis=1)
+    at = np.minimum(np.searchsorted(made.ids, ids), len(made.ids) - 1)
+    away = np.linalg.norm(made.points[at] - place, axis=1)
+    row = np.where((made.ids[at] == ids) & by_number & ~(away > OFF * size), at, -1)
+    rest = np.flatnonzero((row < 0) & placed)
+    if len(rest):
+        from scipy.spatial import cKDTree
+
+        away, near = cKDTree(made.points).query(place[rest])
+        row[rest] = np.where(away <= SAME_PLACE * size, near, -1)
+    return NodesOnDeck(row, place, unit, int((row[rest] >= 0).sum()))
+
+
+_NOWHERE = np.full(3, np.nan)
 
 
 def _of_table(s: Sensor) -> MatchedDof:

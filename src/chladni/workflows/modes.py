@@ -1,19 +1,23 @@
 """Normal modes of a model: frequencies, shapes, mass, the energy of each part."""
 
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..case import Case
+from ..arguments import checked
 from ..dynamics.modes import ModalModel, rigid_modes
+from ..errors import LabelError
 from ..fem.energy import mass_properties, part_energies
 from ..fem.loose_parts import loose_grids
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
-from .loaded_model import LEAST_MODES, DeckModels, Model, as_model
+from .loaded_model import LEAST_MODES, Model, as_model
+
+if TYPE_CHECKING:
+    from .given_case import Source
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,9 +60,10 @@ class NormalModes(Result):
         return self.modal.shapes
 
 
+@checked
 @one_blas_thread()
 def modes(
-    source: Case | Model | DeckModels | str | Path,
+    source: "Source",
     count: int = 20,
     *,
     units: str | Units | None = None,
@@ -68,15 +73,16 @@ def modes(
 
     Parameters
     ----------
-    source : a model, a case, or the path of a deck or case
+    source : a model, a case, an Assembly, or the path of a deck or case
     units : of a deck given by its path; without it numbers stay in the deck's own units, and
         frequencies are Hz in any
 
     Raises
     ------
-    FileError, ModelError
-        If there is no such file, or the deck is wrong.
+    FileError, LabelError, ModelError
+        If there is no such file, the deck is wrong, or the count is below 1.
     """
+    at_least_one(count)
     model = as_model(source, units=units)
     progress("matrices", 0.1)
     structure = model.structure
@@ -99,6 +105,13 @@ def modes(
         (*model.notes, *_notes(model, modal, count, int(still.sum())), *loose_parts(model, whole)),
         origin=model,
     )
+
+
+def at_least_one(count: int) -> int:
+    """Return the number of modes, 1 or more; LabelError for others."""
+    if count < 1:
+        raise LabelError(f"{count} modes were requested; request 1 or more")
+    return count
 
 
 def loose_parts(model: Model, modal: ModalModel) -> list[str]:

@@ -2,15 +2,20 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..case import Case
+from ..arguments import checked
+from ..case.sensor_places import placed
 from ..dofs import parse
 from ..dynamics.modes import rigid_modes
 from ..ema.correlation import mac, subspace_mac
 from ..ema.mode_pairing import ModePairs, pair
+from ..ema.setup import Recording, Sensor
+from ..ema.shapes import turned
 from ..errors import FileError, LabelError
+from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import read_op2_modes, read_punch_modes
 from ..io.nastran.results.punch import PunchModes
 from ..io.uff.read_uff import read_uff
@@ -19,7 +24,11 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
-from .loaded_model import DeckModels, Model, as_model, similar_names
+from .loaded_model import Model, as_model, similar_names
+from .matched_dofs import matched_nodes
+
+if TYPE_CHECKING:
+    from .given_case import Source
 
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both
 CLOSE = 0.01  # relative distance of frequencies within which shapes may mix
@@ -42,7 +51,8 @@ class OtherModes(Result):
     in_span : (r_other,)      share of each shape of the file in the span of the model's modes
                               within 1 % of its frequency: the MAC if modes could not mix
     grids, translations : how many were compared
-    shapes : (n_points, 3, r_other)   motion of the file's modes, basic frame; 0 where it has none
+    shapes : (n_points, 3, r_other)   motion of the file's modes, basic frame; 0 where it has none;
+                              of complex modes the real part, turned to be as large as it can be
     whole : the file moves every grid that shells, solids or beams hang on
     """
 
@@ -61,8 +71,12 @@ class OtherModes(Result):
     notes: tuple[str, ...] = ()
 
 
-def read_modes(path: Path) -> PunchModes:
+def read_modes(path: Path) -> tuple[PunchModes, Recording | None]:
     """Read normal modes of an OP2, punch or universal file, components 1-6 of every point.
+
+    Returns
+    -------
+    Modes, and the recording of a universal file with the places and axes of its nodes.
 
     Raises
     ------
@@ -75,13 +89,17 @@ def read_modes(path: Path) -> PunchModes:
     if suffix not in READERS:
         raise FileError(f"{path}: modes are read from {', '.join(READERS)}, not {suffix or '?'}")
     if suffix == ".op2":
-        return read_op2_modes(path)
-    return read_punch_modes(path) if suffix in (".pch", ".punch") else _universal(path)
+        return read_op2_modes(path), None
+    return (read_punch_modes(path), None) if suffix in (".pch", ".punch") else _universal(path)
 
 
-def _universal(path: Path) -> PunchModes:
-    """Read dataset 55 of a universal file."""
-    shapes = read_uff(path).shapes
+def _universal(path: Path) -> tuple[PunchModes, Recording]:
+    """Read dataset 55 of a universal file; a component that is zero in all modes is not measured.
+
+    Test systems fill in zeros for the directions that they did not measure.
+    """
+    recording = read_uff(path)
+    shapes = recording.shapes
     if shapes is None:
         raise FileError(f"{path} has no mode shapes (dataset 55)")
     try:
@@ -89,15 +107,17 @@ def _universal(path: Path) -> PunchModes:
     except LabelError as error:
         raise FileError(f"{path}: {error}") from error
     ids, row = np.unique([point for point, *_ in dofs], return_inverse=True)
-    values = np.full((len(ids), 6, shapes.values.shape[1]), np.nan)
+    values = np.full((len(ids), 6, shapes.values.shape[1]), np.nan, shapes.values.dtype)
     for k, (_, component, sign), value in zip(row, dofs, shapes.values, strict=True):
-        values[k, component - 1] = sign * np.real(value)
-    return PunchModes(np.asarray(shapes.frequency), ids, values)
+        if value.any():
+            values[k, component - 1] = sign * value
+    return PunchModes(np.asarray(shapes.frequency), ids, values), recording
 
 
+@checked
 @one_blas_thread()
 def other_modes(
-    source: Case | Model | DeckModels | str | Path,
+    source: "Source",
     path: Path | str,
     *,
     units: str | Units | None = None,
@@ -107,7 +127,7 @@ def other_modes(
 
     Parameters
     ----------
-    source : a model, a case, or the path of a deck or case
+    source : a model, a case, an Assembly, or the path of a deck or case
     path : OP2, punch or universal file (dataset 55)
     units : of a deck given by its path
 
@@ -118,8 +138,8 @@ def other_modes(
     """
     model, path = as_model(source, "correlate", units), Path(path)
     progress("reading the modes", 0.0)
-    read = read_modes(path)
-    rows, values = _on_model(model.assembly, read, path)
+    read, recording = read_modes(path)
+    at = _on_model(model, read, recording, path)
     progress("modes of the model", 0.2)
     modal = model.normal_modes(int(MORE * len(read.frequency)) + 6)
     flexible = modal.frequency[~rigid_modes(modal)]
@@ -129,37 +149,100 @@ def other_modes(
         raise FileError(f"{path}: none of its {len(read.frequency)} modes is elastic")
     top = float(read.frequency.max())
     near = (modal.frequency > least) & (modal.frequency <= 1.3 * top)
-    own = model.motion(modal.shapes[:, near])[rows]
-    held = np.isfinite(values[:, :, elastic]).all(axis=2)
+    values = at.values[:, :, elastic]
+    held = np.isfinite(values).all(axis=2)
     if held.sum() < LEAST_GRIDS:
         raise FileError(f"{path} has {held.sum()} translations of the model; shapes need more")
-    phi, psi = own[held], values[:, :, elastic][held]
+    phi, psi = at.own(model, modal.shapes[:, near])[held], values[held]
     f_model, f_other = modal.frequency[near], read.frequency[elastic]
     M = mac(phi, psi)
-    shapes = np.zeros((len(model.assembly.points), 3, int(elastic.sum())))
-    shapes[rows] = np.nan_to_num(values[:, :, elastic])
     return OtherModes(
         path, f_other, f_model,
         tuple((np.flatnonzero(elastic) + 1).tolist()), tuple((np.flatnonzero(near) + 1).tolist()),
         M, pair(f_model, f_other, M), _in_span(phi, psi, f_model, f_other),
-        len(rows), int(held.sum()), shapes, _whole(model.assembly, rows),
-        (*model.notes, *_notes(model, read, rows, elastic)), origin=model,
+        len(at.values), int(held.sum()), at.drawn(model.assembly, values),
+        _whole(model.assembly, at.row[at.row >= 0]),
+        (*model.notes, *_notes(model, read, at, elastic)), origin=model,
     )  # fmt: skip
 
 
-def _on_model(made: Assembly, read: PunchModes, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows of the model's points in the file, and translations there (basic frame)."""
-    known = np.isin(read.ids, made.ids)
-    if known.sum() < LEAST_GRIDS:
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Points of a file that the model has.
+
+    Attributes
+    ----------
+    row : (n,) int         grid of the model, -1 for a place away from grids
+    free : MeasuredDofs    directions X, Y, Z of the places away from grids, in this order
+    axes : (n, 3, 3)       local axes of the file by row, basic frame
+    values : (n, 3, r)     translations of the file along them, nan where it has none
+    said : notes on how they were matched
+    """
+
+    row: np.ndarray
+    free: MeasuredDofs
+    axes: np.ndarray
+    values: np.ndarray
+    said: tuple[str, ...]
+
+    def own(self, model: Model, shapes: np.ndarray) -> np.ndarray:
+        """Translations of the model's modes (n_free_dofs, k) along the file's axes (n, 3, k)."""
+        u = model.motion(shapes)[self.row]
+        if len(self.free.labels):
+            moved = self.free.rows(model.structure) @ shapes
+            u[self.row < 0] = moved.reshape(-1, 3, shapes.shape[1])
+        return np.asarray(np.einsum("nij,njr->nir", self.axes, u))
+
+    def drawn(self, made: Assembly, values: np.ndarray) -> np.ndarray:
+        """Shapes of the file (n_points, 3, r), basic frame, as real as they can be turned."""
+        psi = np.nan_to_num(values)
+        if np.iscomplexobj(psi):
+            psi = turned(psi.reshape(-1, psi.shape[2]).T).T.real.reshape(psi.shape)
+        out, at = np.zeros((len(made.points), 3, values.shape[2])), self.row >= 0
+        out[self.row[at]] = np.einsum("nij,nir->njr", self.axes[at], psi[at])
+        return out
+
+
+def _on_model(model: Model, read: PunchModes, recording: Recording | None, path: Path) -> _Points:
+    """Find the points of the file on the model: grids by number or place, else the place itself."""
+    made = model.assembly
+    found = matched_nodes(made, recording or Recording(path.name), read.ids)
+    sensors, missing = [], found.row < 0
+    for k in np.flatnonzero(missing & np.isfinite(found.place).all(axis=1)):
+        three = [Sensor(f"{read.ids[k]}:+{c}", None, found.place[k], w) for c, w in _AXES]
+        try:
+            placed(made, three, path.name)
+        except LabelError:  # far from the structure
+            continue
+        sensors += three
+        missing[k] = False
+    kept = np.flatnonzero(~missing)
+    if len(kept) < LEAST_GRIDS:
         raise FileError(
-            f"{path} has {known.sum()} grids of the model (its {len(read.ids)} run from "
+            f"{path} has {len(kept)} grids of the model (its {len(read.ids)} run from "
             f"{read.ids.min()} to {read.ids.max()}, the deck's from {made.ids[0]} to "
-            f"{made.ids[-1]}): check that it belongs to this deck"
+            f"{made.ids[-1]}), and no places on it: check that it belongs to this deck"
         )
-    rows, values = made.rows(read.ids[known]), read.shapes[known, :3]
-    if made.axes is None:
-        return rows, values
-    return rows, np.einsum("nij,nir->njr", made.axes[rows], values)
+    said = [f"Places of {path.name} were read in {found.unit}."] * (found.unit != "m")
+    if found.by_place:
+        said.append(f"{found.by_place} points were found at grids of other numbers, by place.")
+    if sensors:
+        said.append(f"{len(sensors) // 3} points are away from grids, on the nearest of the mesh.")
+    row = found.row[kept]
+    axes = np.array([_axes(made, recording, int(n), int(k))
+                     for n, k in zip(read.ids[kept], row, strict=True)])  # fmt: skip
+    free = placed(made, sensors, path.name)
+    return _Points(row, free, axes, read.shapes[kept, :3], tuple(said))
+
+
+_AXES = tuple(zip("XYZ", np.eye(3), strict=True))
+
+
+def _axes(made: Assembly, recording: Recording | None, node: int, row: int) -> np.ndarray:
+    """Local axes of a point: the file's where it knows the point, else those of the grid."""
+    if recording is not None and node in recording.nodes:
+        return np.asarray(recording.axes.get(node, np.eye(3)))
+    return np.eye(3) if made.axes is None else made.axes[row]
 
 
 def _in_span(
@@ -179,12 +262,15 @@ def _whole(made: Assembly, rows: np.ndarray) -> bool:
     return bool(np.isin(drawn, rows).all())
 
 
-def _notes(model: Model, read: PunchModes, rows: np.ndarray, elastic: np.ndarray) -> list[str]:
-    out = [f"Shapes are compared at the translations of {len(rows)} grids."]
-    if left := len(read.ids) - len(rows):
+def _notes(model: Model, read: PunchModes, at: _Points, elastic: np.ndarray) -> list[str]:
+    where = "grids" if (at.row >= 0).all() else "points"
+    out = [f"Shapes are compared at the translations of {len(at.row)} {where}.", *at.said]
+    if left := len(read.ids) - len(at.row):
         out.append(f"{left} points of the file are not in the deck and were left out.")
     if rigid := int((~elastic).sum()):
         out.append(f"{rigid} modes of the file are rigid motions and are not compared.")
+    if np.iscomplexobj(at.values):
+        out.append("The shapes of the file are complex: the MAC is that of complex shapes.")
     if not model.unit:
         out.append("Frequencies are in Hz in any unit system with seconds.")
     return out

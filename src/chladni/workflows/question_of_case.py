@@ -52,7 +52,6 @@ def question_of(case: Case) -> Question:
         sensor_masses=case.sensor_masses,
         accuracy=case.setup.accuracy,
         effects=case.effects,
-        identified_noise=case.identified_noise,
     )
     if frfs:
         first = case.recordings[0]

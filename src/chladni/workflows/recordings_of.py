@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from ..arguments import checked
 from ..dynamics.frf import FRF
 from ..ema.setup import Recording
 from ..errors import FileError
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def read_source(
-    source: "Case | str | Path | FRF | Recording | Sequence[Recording]",
+    source: "Case | str | Path | FRF | Recording | Sequence[FRF | Recording]",
     quantity: str | None = None,
 ) -> "Case | Sequence[Recording]":
     """Read a case or recordings where a path is given; return what is in memory as it is."""
@@ -24,11 +25,19 @@ def read_source(
         path = Path(source)
         at_case = path.exists() and is_case(path)
         return load_case(path) if at_case else load_recordings(path, quantity)
-    if isinstance(source, FRF):
-        return (Recording("recording", frf=source),)
-    return (source,) if isinstance(source, Recording) else source
+    if isinstance(source, FRF | Recording):
+        source = (source,)
+    if not isinstance(source, Sequence):
+        return source
+    each = cast("Sequence[FRF | Recording]", source)
+    names = ["recording", *(f"recording {k + 1}" for k in range(1, len(each)))]
+    return [
+        Recording(name, frf=one) if isinstance(one, FRF) else one
+        for name, one in zip(names, each, strict=False)
+    ]
 
 
+@checked
 def load_recordings(source: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
     """Read the recordings of a file, or all of a case.
 

@@ -11,13 +11,15 @@ from ..ema.recording_screening import screened
 from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
-from ..inference.chain_hypotheses import explains, smoothed
+from ..inference.chain_hypotheses import NOTHING_FITS, explains
 from ..inference.channel_screening import against_model
 from ..inference.result import NamedEffect
+from ..inference.smoothed_responses import smoothed
 from ..model.point_masses import with_mass_pairs
 from ..search.question import Prepared
 from .case_model import REACH
 from .diagnosis_result import DiagnosisResult
+from .sign_of_gain import with_sign_of_gain
 
 HEAVY = 0.1  # of the structure: sensors seldom weigh more
 POUND, NEAR_POUND = 0.45359237, 0.1  # [kg], ln: what no scatter of sheets reaches
@@ -45,7 +47,9 @@ def screened_by_model(
     """
     frf = case.frfs[0]
     lines = case.lines(frf.frequency) if use is None else use
-    alone = screened(case.recordings[0], found, case.recordings[1:], _places(case), use)
+    alone = screened(
+        case.recordings[0], found, case.recordings[1:], _places(case), use, alone=False
+    )
     if masses := _masses(case, frf, lines, model):
         return alone.with_more(masses, [Check("given masses", "check them", False)])
     return against_model(
@@ -95,17 +99,25 @@ def _places(case: Case) -> dict[str, np.ndarray]:
     return dict(zip(case.outputs.labels, case.outputs.points, strict=True))
 
 
-def screened_prepared(case: Case, prepared: Prepared) -> Screening | None:
-    """Screen with the poles and modes prepared for a diagnosis; None without an FRF."""
+def screened_prepared(
+    case: Case, prepared: Prepared, use: np.ndarray | None = None
+) -> Screening | None:
+    """Screen with the poles and modes prepared for a diagnosis; None without an FRF.
+
+    Parameters
+    ----------
+    use : (n_f,) bool, lines they were identified from, default all
+    """
     if not case.frfs or prepared.identified is None:
         return None
-    return screened_by_model(case, prepared.identified, prepared.nominal)
+    return screened_by_model(case, prepared.identified, prepared.nominal, use)
 
 
 def screened_unprepared(case: Case) -> Screening | None:
     """Screen the first recording when its preparation failed; None without an FRF."""
     if not case.frfs:
         return None
+    case = with_sign_of_gain(case)
     frf = case.frfs[0]
     try:
         found = identify(frf, case.band, use=case.lines(frf.frequency))
@@ -116,9 +128,23 @@ def screened_unprepared(case: Case) -> Screening | None:
 
 
 def unmendable(screening: Screening) -> bool:
-    """Return True if a fault was found that a fit cannot compensate."""
+    """Return True if a fault was found that a fit alone cannot compensate."""
     faults = screening.faults
     return len(faults) > 1 or any(f.kind not in FITTED for f in faults)
+
+
+def unlike(result: DiagnosisResult, screening: Screening | None) -> tuple[str, ...]:
+    """Return a doubt where the recording fits nothing, and the result explains less than half."""
+    fits_nothing = screening is not None and any(f.kind == NOTHING_FITS for f in screening.findings)
+    fit = None if result.agreement is None else result.agreement.fitted
+    if not fits_nothing or fit is None or fit.nominal is None or fit.after is None:
+        return ()
+    if explains(fit.after, fit.nominal):
+        return ()
+    return (
+        f"recording and model are unlike and stay so (Q {fit.nominal:.2g} before, {fit.after:.2g} "
+        "after): places, supports or the recording may be wrong",
+    )
 
 
 def instead_of_effects(verdict: str, screening: Screening | None) -> tuple[str, ...]:

@@ -38,15 +38,27 @@ def diagnose_states(
     """
     with one_blas_thread():
         case = with_natural_frequencies(case)
-        names = states(case.recordings)
+        names = states_compared(case)
         try:
-            if len(names) < 2 or ("test", "use") in case.given:
+            if len(names) < 2:
                 known = explained(case, diagnosing, progress, settings=settings)
                 return build_result(known, diagnosing, progress)
             shared = replace(settings, freeze=False)
             return _in_states(case, names, diagnosing, progress, shared)
         except RecordingAtFault as fault:
             return at_fault(case, fault.screening, diagnosing)
+
+
+def states_compared(case: Case) -> tuple[str, ...]:
+    """States that are explained: all, or the one that ``[test] use`` names."""
+    names = states(case.recordings)
+    return names[:1] if ("test", "use") in case.given else names
+
+
+def each_state(case: Case) -> tuple[Case, ...]:
+    """The case as each of its states is explained; as it is where there is one."""
+    names = states_compared(case)
+    return (case,) if len(names) < 2 else tuple(_one_state(case, names, n) for n in names)
 
 
 def _in_states(

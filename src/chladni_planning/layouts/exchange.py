@@ -1,17 +1,15 @@
-"""Improving a layout by exchange: one or two sensors leave, as many join, as long as it helps.
+"""Improving a layout by exchange: a sensor leaves, another joins, as long as it helps.
 
 Fedorov (1972), Theory of Optimal Experiments; Mitchell (1974), Technometrics 16(2), 203-210.
 """
 
-from itertools import combinations
+from collections.abc import Iterator
 
 import numpy as np
 
-from chladni.errors import ShapeError
-
 from .deletion import deletion, faint
 from .information import Candidates, Criterion, candidates, changed, positions_of, value
-from .layout_rules import Rules
+from .layout_rules import Rules, keyed
 
 BETTER = 1e-9  # least improvement that counts, so that the search ends
 
@@ -21,17 +19,14 @@ def exchange(
     layout: np.ndarray,
     *,
     criterion: Criterion = "D",
-    pairs: bool = False,
     noise: np.ndarray | None = None,
     prior: np.ndarray | None = None,
     rules: Rules | None = None,
     max_swaps: int = 1000,
 ) -> np.ndarray:
-    """A layout (increasing positions) that no single exchange improves; with ``pairs`` no double.
+    """A layout (increasing positions) that no exchange of one sensor improves.
 
-    Each round makes the best of all swaps. Double exchange is for the D criterion and one reading a
-    candidate.  It starts where single exchange stops and skips every pair that cannot win by its
-    bound det ≤ Π (1 + E_j), so it is exact.
+    Each round makes the best of all swaps.
 
     Parameters
     ----------
@@ -45,15 +40,11 @@ def exchange(
     array([0, 2])
     """
     c = candidates(phi, noise, prior)
-    if pairs and (criterion != "D" or c.rows.shape[2] > 1):
-        raise ShapeError("double exchange needs the D criterion and one reading a candidate")
     kept = np.sort(positions_of(layout, len(c)))
     checked = (rules or Rules()).checked(len(c), len(kept))
     checked.obeyed(kept)
     for _ in range(max_swaps):
-        swap = _best_single(c, kept, checked, criterion)
-        if swap is None and pairs:
-            swap = _best_double(c, kept, checked)
+        swap = _best_swap(c, kept, checked, criterion)
         if swap is None:
             break
         kept = np.sort(np.r_[np.setdiff1d(kept, swap[0]), swap[1]])
@@ -64,15 +55,24 @@ def best_layout(
     phi: np.ndarray | Candidates,
     n_sensors: int,
     *,
-    pairs: bool = False,
+    starts: int = 0,
+    seed: int = 0,
     noise: np.ndarray | None = None,
     prior: np.ndarray | None = None,
     rules: Rules | None = None,
 ) -> np.ndarray:
-    """Effective independence, then exchange: positions (increasing) of ``n_sensors``."""
+    """Effective independence, then exchange: positions (increasing) of ``n_sensors``.
+
+    With ``starts``, exchange begins as often from a random layout too, and the layout of the
+    highest log det is the result.
+    """
     c = candidates(phi, noise, prior)
     first = deletion(c, n_sensors, rules=rules).ranked
-    return exchange(c, first, pairs=pairs, rules=rules)
+    checked, rng = (rules or Rules()).checked(len(c), n_sensors), np.random.default_rng(seed)
+    drawn = (keyed(rng.random(len(c)), n_sensors, checked) for _ in range(starts))
+    begun = [first, *(k for k in drawn if len(k) == n_sensors)]
+    ended = [exchange(c, kept, rules=rules) for kept in begun]
+    return max(ended, key=lambda kept: value("D", c.fisher(kept)))
 
 
 Swap = tuple[np.ndarray, np.ndarray]  # who leaves, who joins
@@ -84,24 +84,49 @@ def _regular(c: Candidates, kept: np.ndarray) -> np.ndarray:
     return F if np.isfinite(value("D", F)) and len(kept) >= c.fewest else F + faint(c)
 
 
-def _best_single(
-    c: Candidates, kept: np.ndarray, rules: Rules, criterion: Criterion
-) -> Swap | None:
+def _best_swap(c: Candidates, kept: np.ndarray, rules: Rules, criterion: Criterion) -> Swap | None:
     """The best swap of one sensor, if it is better than none."""
     F = _regular(c, kept)
     now, best, swap = value(criterion, F), BETTER, None
-    G = c.leaving(kept)
-    mask = np.zeros(len(c), bool)
-    mask[kept] = True
-    for k in np.flatnonzero(~rules.fixed[kept]):
-        others = np.flatnonzero(_joinable(rules, mask, kept[k]))
-        if len(others) == 0:
-            continue
-        gain = _swapped(c, F, np.delete(kept, k), others, G[:, k], criterion) - now
+    for k, others, gains in _swaps(c, F, kept, rules, criterion):
+        gain = gains - now
         if gain.max() > best + BETTER:
             j = int(np.argmax(gain >= gain.max() - BETTER))
             best, swap = float(gain[j]), (kept[[k]], others[[j]])
     return swap
+
+
+def _swaps(
+    c: Candidates, F: np.ndarray, kept: np.ndarray, rules: Rules, criterion: Criterion
+) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """(k, others, criterion of each after it joined) for every k-th sensor that may leave."""
+    G = c.leaving(kept)
+    mask = np.zeros(len(c), bool)
+    mask[kept] = True
+    together = criterion == "D" and c.noise is None and c.rows.shape[2] == 1
+    every = value("D", F) + _log_ratio(F, G[:, :, 0], c.rows[:, :, 0]) if together else None
+    for k in np.flatnonzero(~rules.fixed[kept]):
+        others = np.flatnonzero(_joinable(rules, mask, kept[k]))
+        if len(others) == 0:
+            continue
+        if every is not None:
+            yield int(k), others, every[k, others]
+        else:
+            rest = np.delete(kept, k)
+            yield int(k), others, _swapped(c, F, rest, others, G[:, k], criterion)
+
+
+def _log_ratio(F: np.ndarray, leave: np.ndarray, join: np.ndarray) -> np.ndarray:
+    """ln((1 - d_i)(1 + d_j) + d_ij²), d = G F⁻¹ Gᵀ, mean over draws (m, n).
+
+    Fedorov (1972): log det F changes so where row i (d, m, p) leaves and row j (d, n, p) joins.
+    """
+    left = np.linalg.solve(F, leave.mT).mT
+    d_i = (left * leave).sum(axis=-1)
+    d_j = (np.linalg.solve(F, join.mT).mT * join).sum(axis=-1)
+    ratio = (1 - d_i)[:, :, None] * (1 + d_j)[:, None] + (left @ join.mT) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(ratio > 0, np.log(ratio), -np.inf).mean(axis=0)
 
 
 def _joinable(rules: Rules, mask: np.ndarray, i: int) -> np.ndarray:
@@ -125,83 +150,6 @@ def _swapped(
     join = c.joining(rest, others)
     d, m, k, p = join.shape
     if criterion == "D" and k == 1:
-        C = np.linalg.inv(F)
-        Cg = C @ leaving.mT  # (d, p, 1)
-        d_i = (leaving @ Cg)[:, 0]  # (d, 1)
-        d_ij, d_j = (
-            (join[:, :, 0] @ Cg)[..., 0],
-            np.einsum("dmkp,dmkp->dm", join @ C[:, None], join),
-        )
-        ratio = (1 - d_i) * (1 + d_j) + d_ij**2  # Fedorov's determinant ratio
-        with np.errstate(divide="ignore", invalid="ignore"):
-            log_ratio = np.where(ratio > 0, np.log(ratio), -np.inf).mean(axis=0)
-        return value("D", F) + log_ratio
+        return value("D", F) + _log_ratio(F, leaving, join[:, :, 0])[0]
     U = np.concatenate([np.broadcast_to(leaving[:, None], (d, m, k, p)), join], axis=2)
     return changed(criterion, F, U, np.r_[-np.ones(k), np.ones(k)])
-
-
-def _best_double(c: Candidates, kept: np.ndarray, rules: Rules) -> Swap | None:
-    """The best swap of two sensors, if it is better than none."""
-    now, best, swap = value("D", _regular(c, kept)), BETTER, None
-    for pair in combinations(range(len(kept)), 2):
-        out, rest = kept[list(pair)], np.delete(kept, pair)
-        if rules.fixed[out].any():
-            continue
-        found = _best_pair(c, rest, rules, out, now + best)
-        if found is not None:
-            best, swap = found[0] - now, (out, found[1])
-    return swap
-
-
-def _best_pair(
-    c: Candidates, rest: np.ndarray, rules: Rules, out: np.ndarray, to_beat: float
-) -> tuple[float, np.ndarray] | None:
-    """The best two candidates to complete a layout, if they beat a value of log det."""
-    others = _pair_candidates(rules, rest, out, len(c))
-    F = _regular(c, rest)
-    C, base = np.linalg.inv(F), value("D", F)
-    R, gamma = _given(c, rest, others)
-    alone = np.log1p(np.einsum("dip,dpq,diq->di", R, C, R, optimize=True) / np.diag(gamma))
-    bound = alone.mean(axis=0)
-    if c.noise is None:  # joint gain ≤ sum of single gains; correlated noise knows no such bound
-        good = bound + bound.max(initial=-np.inf) + base > to_beat
-        others, R, gamma = others[good], R[:, good], gamma[np.ix_(good, good)]
-    if len(others) < 2:
-        return None
-    E = R @ C @ R.mT
-    gain = _pair_gain(gamma, E)
-    gain[~rules.pairs(rest, others)] = -np.inf
-    a, b = divmod(int(gain.argmax()), len(others))
-    if base + gain[a, b] <= to_beat + BETTER:
-        return None
-    exact = value("D", c.fisher(np.sort(np.r_[rest, others[[a, b]]])))
-    return (exact, others[[a, b]]) if exact > to_beat + BETTER else None
-
-
-def _pair_candidates(rules: Rules, rest: np.ndarray, out: np.ndarray, n: int) -> np.ndarray:
-    """Candidates that may be one of two that join the rest."""
-    may = ~rules.forbidden
-    may[rest] = may[out] = False
-    if rules.near is not None:
-        may &= ~rules.near[rest].any(axis=0)
-    return np.flatnonzero(may)
-
-
-def _given(c: Candidates, rest: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Readings of the others (d, m, p) and their noise (m, m), given the rest."""
-    if c.noise is None:
-        return c.rows[:, others, 0], np.eye(len(others))
-    return c.innovations(rest, others)
-
-
-def _pair_gain(gamma: np.ndarray, E: np.ndarray) -> np.ndarray:
-    """log det(Γ_JJ + E_JJ) - log det Γ_JJ of every pair J, mean over draws (m, m)."""
-
-    def det(A: np.ndarray) -> np.ndarray:
-        diagonal = np.diagonal(A, axis1=-2, axis2=-1)
-        return diagonal[..., :, None] * diagonal[..., None, :] - A**2
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gain = np.log(det(gamma + E)) - np.log(det(gamma))
-    gain[:, np.arange(len(gamma)), np.arange(len(gamma))] = -np.inf
-    return gain.mean(axis=0)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chladni.errors import LabelError, ShapeError, named
 
@@ -20,6 +19,8 @@ def too_near(points: np.ndarray, distance: float) -> np.ndarray:
     points : (n, 2) or (n, 3)   places of the candidates [m]
     distance : least distance between two sensors [m]
     """
+    from scipy.spatial import cKDTree
+
     near = np.zeros((len(points), len(points)), bool)
     pairs = cKDTree(points).query_pairs(np.nextafter(distance, 0.0), output_type="ndarray")
     near[pairs[:, 0], pairs[:, 1]] = near[pairs[:, 1], pairs[:, 0]] = True
@@ -183,18 +184,18 @@ class Rules:
             may &= np.isin(self.region, list(lack))
         return may
 
-    def pairs(self, kept: np.ndarray, joining: np.ndarray) -> np.ndarray:
-        """Mask of pairs of ``joining`` that may together complete a layout (m, m) bool."""
-        n = len(joining)
-        may = np.ones((n, n), bool) if self.near is None else ~self.near[np.ix_(joining, joining)]
-        np.fill_diagonal(may, False)
-        if self.region is None:
-            return may
-        region, count = self.region[joining], self._count(kept)
-        for r in np.unique(self.region).tolist():
-            total = count[r] + (region == r)[:, None].astype(int) + (region == r)
-            may &= (total >= self.least.get(r, 0)) & (total <= self.most.get(r, len(kept)))
-        return may
+
+def keyed(keys: np.ndarray, n_sensors: int, rules: Rules) -> np.ndarray:
+    """The layout (increasing) of the highest keys that the rules allow, one after the other."""
+    if rules.free:
+        return np.sort(np.argpartition(-keys, n_sensors - 1)[:n_sensors])
+    kept = np.zeros(len(keys), bool)
+    while kept.sum() < n_sensors:
+        may = rules.addable(kept, n_sensors)
+        if not may.any():
+            break
+        kept[int(np.argmax(np.where(may, keys, -np.inf)))] = True
+    return np.flatnonzero(kept)
 
 
 def thinned(rules: Rules, worth: np.ndarray, n_sensors: int) -> np.ndarray:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial import Delaunay, cKDTree
 
 from chladni.errors import ModelError
 
@@ -60,6 +59,8 @@ def _feature_points(
     borders: Sequence[np.ndarray], lines: Sequence[np.ndarray], size: float, gap: float
 ) -> tuple[np.ndarray, set[tuple[int, int]]]:
     """Border and feature points, and the pairs of rows that follow a feature line."""
+    from scipy.spatial import cKDTree
+
     points = np.vstack(borders)
     border = cKDTree(np.vstack([resampled(b, size / 8) for b in borders]))
     before = np.full((1, 2), np.inf)
@@ -76,6 +77,8 @@ def _feature_points(
 
 def _away(line: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Distance of the points of a line from the nearest of some places (n,)."""
+    from scipy.spatial import cKDTree
+
     finite = places[np.isfinite(places[:, 0])]
     return cKDTree(finite).query(line)[0] if len(finite) else np.full(len(line), np.inf)
 
@@ -98,6 +101,8 @@ def _clear(
     clearance: float,
 ) -> np.ndarray:
     """The places inside the region, clear of its border, of the points and of each other."""
+    from scipy.spatial import cKDTree
+
     outer, *holes = borders
     dense = cKDTree(np.vstack([resampled(b, size / 8) for b in borders]))
     ok = inside(outer, places) & (dense.query(places)[0] > clearance * size)
@@ -125,6 +130,8 @@ def _with_ring(
 
 def _triangles(points: np.ndarray, borders: Sequence[np.ndarray], size: float) -> np.ndarray:
     """Delaunay triangles (n, 3) of the region, counter-clockwise."""
+    from scipy.spatial import Delaunay
+
     T = Delaunay(points).simplices
     outer, *holes = borders
     middle = points[T].mean(axis=1)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
 
 from chladni.geometry.formed_mesh import FormedMesh
 
@@ -41,12 +40,16 @@ class Field:
 
     def at(self, plan: np.ndarray) -> np.ndarray:
         """Bilinear interpolation at planform points (k, 2); the value at the rim beyond it."""
+        from scipy.ndimage import map_coordinates
+
         at = (plan[:, :2] - self.low).T / STEP
         return map_coordinates(self.values, at, order=1, mode="nearest")
 
 
 def pressed(places: Places, depth: Depth, low: np.ndarray, high: np.ndarray) -> tuple[Field, Field]:
     """Curvature κ = √(|n,y|²/|P,y|² + |n,s|²/|P,s|²) [1/m] and stretch 1 - A₀/A over a box."""
+    from scipy.ndimage import gaussian_filter
+
     y, s = (np.arange(a, b + STEP, STEP) for a, b in zip(low, high, strict=True))
     plan = np.stack(np.meshgrid(y, s, indexing="ij"), axis=-1).reshape(-1, 2)
     shape = (len(y), len(s), 3)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.spatial import Delaunay, cKDTree
 
 from chladni.errors import ModelError
 
@@ -69,6 +68,8 @@ def graded(
     borders: Sequence[np.ndarray], size: SizeField, coarse: float, fine: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) and triangles (m, 3) within the first border and outside the others."""
+    from scipy.spatial import Delaunay, cKDTree
+
     outer, *holes = (counterclockwise(resampled(b, 1.5 * fine)) for b in borders)
     centre, side = quadtree(outer.min(axis=0), outer.max(axis=0), size, coarse, fine)
     edge = np.vstack([outer, *holes])

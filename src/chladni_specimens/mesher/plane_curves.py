@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chladni.arrays import readonly
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 
 FAR = 0.12  # largest distance from a loop that is computed [m]
 
@@ -108,11 +111,13 @@ class Loop:
     """
 
     points: np.ndarray
-    tree: cKDTree = field(repr=False)
+    tree: "cKDTree" = field(repr=False)
 
     @classmethod
     def through(cls, line: np.ndarray, spacing: float) -> Self:
         """The loop through these points, resampled at `spacing`."""
+        from scipy.spatial import cKDTree
+
         points = counterclockwise(resampled(line, spacing))
         return cls(readonly(points), cKDTree(points))
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chladni.errors import ModelError
 from chladni.geometry.cells import components
@@ -101,6 +100,8 @@ def fold(out: Patches, edge: np.ndarray, back: np.ndarray, gap: float, *, closed
 
 def _joined(points: np.ndarray, tolerance: float) -> np.ndarray:
     """The first coincident point for each point."""
+    from scipy.spatial import cKDTree
+
     row = np.arange(len(points))
     for i, j in sorted(cKDTree(points).query_pairs(tolerance)):
         row[j] = min(row[j], row[i])

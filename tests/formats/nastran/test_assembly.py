@@ -1,13 +1,18 @@
 """Deck to Assembly: geometry in closed form, units, and one sentence for every mistake."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from chladni.dynamics.eigen import normal_modes
 from chladni.errors import ChladniError, ModelError
-from chladni.io.nastran import assembly, components
+from chladni.fem.assemble import structure
+from chladni.io.nastran import assembly, components, read_deck, write_assembly
 from chladni.io.nastran.read.analysis_requests import analysis
 from chladni.model.properties import Anisotropic, Isotropic, Orthotropic
 from chladni.units import UNITS
+from chladni_specimens.plates import plate
 
 from .conftest import ANCHORS, PLATE, real_decks
 
@@ -166,13 +171,64 @@ def test_parameters_above_bulk_data(bulk):
 
 
 def test_k6rot(bulk):
-    """Carried where it is given; CQUADR have a drilling stiffness of their own in Nastran."""
-    assert assembly(bulk(PLATE)).k6rot is None
+    """100 where a deck is silent, as in MSC; CQUADR have a drilling stiffness of their own."""
+    assert assembly(bulk(PLATE)).k6rot == 100
     assert assembly(bulk(PLATE + "PARAM,K6ROT,AUTO\n")).k6rot is None
     assert assembly(bulk(PLATE + "PARAM,K6ROT,100.\n")).k6rot == 100
     told = bulk(PLATE.replace("CQUAD4", "CQUADR") + "PARAM,K6ROT,100.\n")
     assert assembly(told).k6rot is None
     assert "K6ROT" in analysis(told).notes[0]
+
+
+def test_k6rot_of_what_was_written_here(tmp_path):
+    """The mesh keeps the drilling field it was made with, whatever is added to its deck."""
+    made = read_deck(write_assembly(plate(0.3, 0.2, 3, 2, 1e-3), tmp_path / "own.bdf"))
+    assert assembly(made).k6rot is None
+    text = made.path.read_text()
+    for change, due in (
+        ("BEGIN BULK\nPARAM,K6ROT,1.", 1),
+        ("SPC = 1\nBEGIN BULK\nSPC1,1,3,1", None),
+    ):
+        made.path.write_text(text.replace("BEGIN BULK", change))
+        assert assembly(read_deck(made.path)).k6rot == due
+    made.path.write_text(text.replace("$ units: SI", "$ by hand"))
+    assert assembly(read_deck(made.path)).k6rot == 100
+
+
+STRINGER = """SOL 103
+CEND
+BEGIN BULK
+PSHELL,1,1,2.,1,,1
+PBAR,2,1,60.,500.,500.,50.
+MAT1,1,70000.,,.33,2.7-9
+{grids}
+{cells}
+{bars}
+ENDDATA
+"""
+
+
+@pytest.mark.parametrize("said", ["", "PARAM,K6ROT,100.\n"])
+def test_a_stringer_is_as_soft_as_in_nastran(tmp_path, said):
+    """Offset bars hang on the rotation about the sheet's normal: the field would stiffen them."""
+    grid = [(i, j) for j in range(5) for i in range(7)]
+    grids = [f"GRID,{k},,{50 * i}.,{50 * j}.,0." for k, (i, j) in enumerate(grid, 1)]
+    corner = [7 * j + i + 1 for j in range(4) for i in range(6)]
+    cells = [f"CQUAD4,{k},1,{c},{c + 1},{c + 8},{c + 7}" for k, c in enumerate(corner, 1)]
+    bars = [
+        f"CBAR,{90 + k},2,{15 + k},{16 + k},0.,0.,1.\n,,,0.,3.,12.,0.,-3.,12." for k in range(6)
+    ]
+    lines = {"grids": grids, "cells": cells, "bars": bars}
+    path = tmp_path / "stringer.bdf"
+    text = STRINGER.format(**{k: "\n".join(v) for k, v in lines.items()})
+    path.write_text(text.replace("PSHELL", said + "PSHELL", 1))
+    made = assembly(read_deck(path), "mm-t-s")
+    first, field = (
+        normal_modes(structure(replace(made, k6rot=k)).system, 9).frequency[6]
+        for k in (100.0, None)
+    )
+    assert normal_modes(structure(made).system, 9).frequency[6] == pytest.approx(first, rel=1e-9)
+    assert field > first
 
 
 def test_material_axis_falls_back_to_y(bulk):

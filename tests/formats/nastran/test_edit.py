@@ -157,6 +157,16 @@ def test_includes_are_written_only_where_they_change(nested, tmp_path):
     assert before == {p: p.read_bytes() for p in before}
 
 
+def test_an_include_is_not_written_through_a_link(nested, tmp_path):
+    """Where its folder is a link to another, nothing is written there."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "parts").symlink_to(tmp_path / "mine")
+    with pytest.raises(FileError, match="is a link or no folder"):
+        write_deck(read_deck(nested), tmp_path / "out/x.bdf", [SetField("PSHELL", 101, "T", 3.0)])
+    assert not list((tmp_path / "mine").rglob("*"))
+
+
 def test_main_alone_changes(nested, tmp_path):
     out = tmp_path / "out" / "main.bdf"
     write_deck(read_deck(nested), out, [SetField("EIGRL", 1, "ND", 20)])

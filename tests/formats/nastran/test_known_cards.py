@@ -1,11 +1,16 @@
 """What is not known to leave the structure as it is is refused by name, unless it is allowed."""
 
+import re
+from time import process_time
+
 import pytest
 
 from chladni.errors import ChladniError, FileError
 from chladni.io.nastran import assembly, read_deck
-from chladni.io.nastran.read.analysis_requests import _LEFT_OUT, STRUCTURAL, remarks
+from chladni.io.nastran.read.analysis_requests import LEFT_OUT, STRUCTURAL, remarks
+from chladni.io.nastran.text.card_layout import tables
 from chladni.io.nastran.text.known_cards import refusal
+from chladni.io.nastran.text.source_files import sources
 
 from .conftest import PLATE
 
@@ -32,7 +37,7 @@ def test_a_misspelt_card_is_told_what_is_meant(name, meant):
 
 
 def test_what_is_left_out_with_a_note_is_known():
-    assert not [name for name in _LEFT_OUT if refusal(name, 1)]
+    assert not [name for name in LEFT_OUT if refusal(name, 1)]
 
 
 @pytest.mark.parametrize(
@@ -47,6 +52,79 @@ def test_a_command_not_known_is_refused_unless_allowed(bulk, line, name):
     with pytest.raises(FileError, match=rf"deck.bdf:\d+: the command {name} .*--allow {name}$"):
         bulk(PLATE, before=f"SOL 103\nCEND\n{line}\n")
     assert bulk(PLATE, before=f"SOL 103\nCEND\n{line}\n", allow=(name,)).case.sol == 103
+
+
+@pytest.mark.parametrize(
+    "line",
+    """OTEMP AEROF APRES MONITOR CMSENERGY PFMODE ERP INTENSITY HARMONICS HDF5OUT MODTRAK MPFACTOR
+    ELDATA NLOPRM STITLE RCROSS ELSDCON OPRES""".split(),
+)
+def test_a_request_for_output_is_passed_over(bulk, line):
+    """Whatever it asks for, it changes no structure (Quick Reference Guide, section 4)."""
+    assert bulk(PLATE, before=f"SOL 103\nCEND\n{line}(PRINT) = ALL\n").case.sol == 103
+
+
+@pytest.mark.parametrize(
+    "card",
+    ["BSURF,1,2", "BCPARA,1", "PARVEC,1", "ACMODL,IDENT", "MONSUM,A", "RCROSS,1", "AECOMPL,A"],
+)
+def test_a_card_for_output_or_other_analyses_is_passed_over(bulk, card):
+    assert assembly(bulk(f"{PLATE}{card}\n")).parts == assembly(bulk(PLATE)).parts
+
+
+def test_all_that_is_not_known_is_said_at_once(bulk):
+    """With count, meaning and line of each, and the words that allow all of them."""
+    cards = "CWELD,1,2\nCWELD,2,2\nXYZ,1\nCGAP,9,1\n"
+    with pytest.raises(FileError) as caught:
+        bulk(PLATE + cards, before="SOL 103\nCEND\nSTATSUB = 2\nNOSUCH = 1\n")
+    said = str(caught.value)
+    for part in (
+        "5 kinds of cards and commands",
+        "CWELD (2 cards: spot welds, fasteners and seams, line 13)",
+        "XYZ (1 card, line 15)", "CGAP (1 card: gaps, line 16)",
+        "the command STATSUB (stiffness of a loaded state, line 3)", "command NOSUCH (line 4)",
+    ):  # fmt: skip
+        assert part in said
+    allow = re.findall(r"--allow (\w+)", said)
+    text, before = PLATE + cards, "SOL 103\nCEND\nSTATSUB = 2\nNOSUCH = 1\n"
+    assert assembly(bulk(text, before=before, allow=allow)).parts
+
+
+@pytest.mark.parametrize(
+    ("card", "command"),
+    [("NSM1,5,PSHELL,NSM,1.", "NSM"), ("BGSET,1,1", "BGSET"), ("TF,1,1,1", "TFL"),
+     ("MFLUID,1", "MFLUID")],
+)  # fmt: skip
+def test_what_the_case_control_would_have_to_select_acts_where_it_does(bulk, card, command):
+    """QRG, NSM1: it is used where NSM of the case control names its set."""
+    text, name = f"{PLATE}{card}\n", card.partition(",")[0]
+    assert assembly(bulk(text, before="SOL 103\nCEND\n")).parts == assembly(bulk(PLATE)).parts
+    with pytest.raises(
+        FileError, match=rf"the command {command} .*{name}: 1 card.* not understood"
+    ):
+        bulk(text, before=f"SOL 103\nCEND\n{command} = 5\n")
+    with pytest.raises(FileError, match="and no case control says whether it acts"):
+        bulk(text)
+
+
+def test_text_in_cards_is_no_list_of_fields(bulk):
+    """DEQATN with commas beyond its name, and signs that repeat fields elsewhere."""
+    text = "DEQATN  10      F(A,B,C) = MAX(A,B)*\n+       SQRT(C,   =       )\n        A, B\n"
+    assert len(bulk(PLATE + text, fold=False)["DEQATN"]) == 1
+
+
+def test_work_grows_as_the_names_do(tmp_path):
+    """Sixteen times as many names took a hundred times as long when each searched all lines."""
+
+    def spent(n):
+        path = tmp_path / f"{n}.csv"
+        path.write_text("x,y\n" + "".join(f"A{k},1\n" for k in range(n)))
+        source = sources(path).sources[0]
+        begun = process_time()
+        assert len(tables(source, 0, (path,))) == n + 1
+        return process_time() - begun
+
+    assert min(spent(16000) for _ in range(2)) < 40 * max(spent(1000) for _ in range(3))
 
 
 TABLE = "TEMP,4,1,80.\nTABLEM1,7\n,0.,1.,100.,.5,ENDT\n"

@@ -5,7 +5,10 @@ import re
 import numpy as np
 import pytest
 
+from chladni.dynamics.eigen import normal_modes
 from chladni.errors import ChladniError
+from chladni.fem.assemble import structure
+from chladni.geometry.solid_shapes import jacobians
 from chladni.io.nastran import assembly
 from chladni.io.nastran.read.analysis_requests import remarks
 from chladni.io.nastran.read.beam_profiles import SHAPES
@@ -28,6 +31,13 @@ MISTAKES = {
     "lighter than nothing": (("5,,5\n", "5,,5,,-2.-8\n"), "its NSM is negative, and more"),
     "duplicate grid": (("GRID,2,,", "GRID,1,,"), r":2: GRID 1: .*already taken at .*:1"),
     "duplicate element": (("MAT1", "CQUAD4,7,101,1,2,4,3\nMAT1"), "CQUAD4 7: .*already taken"),
+    "range backwards": (("MAT1", "SPC1,7,3,3,THRU,1\nMAT1"), "SPC1 7: 3 THRU 1 runs backwards"),
+    "second GRDSET": (("MAT1", "GRDSET,,,,,,,12\nGRDSET,,,,,,,3\nMAT1"), r":8: a second GR.*:7"),
+    "second BAROR": (("MAT1", "CBAR,8,1,1,2\nPBAR,1,5,1.\nBAROR,,,,,0.,0.,1.\nBAROR\nMAT1"),
+                     r":10: a second BAROR"),
+    "BAROR's vector": (("MAT1", "CBAR,8,1,1,2\nPBAR,1,5,1.\nBAROR,,,,,0.,x,1.\nMAT1"),
+                       "BAROR.*X2 is 'X', not a number"),
+    "THETA as a system": (("3,4\n", "3,4,-45\n"), "THETA is the integer -45, .* angle is -45[.]"),
     "duplicate across kinds": (("MAT1", "CELAS2,7,1.,1,1\nMAT1"), "id is already taken by CQUAD4"),
     "duplicate property": (("MAT1", "PCOMP,101\n,5,1.\nMAT1"), "PCOMP 101: .*already taken"),
     "duplicate material": (("MAT1", "MAT8,5,1.,1.,.3,1.\nMAT1"), r"id is already taken by MAT1"),
@@ -94,7 +104,7 @@ def test_every_mistake_is_one_sentence(bulk, change, match):
 
 def test_missing_selected_set(bulk):
     with pytest.raises(ChladniError, match="SPC set 9 is selected but there is no such set"):
-        assembly(bulk(PLATE, before="CEND\nSPC = 9\n"))
+        assembly(bulk(PLATE + SETS, before="CEND\nSPC = 9\n"))
     with pytest.raises(ChladniError, match="there is no subcase 5; there are 1"):
         assembly(bulk(PLATE, before="CEND\nSUBCASE 1\n"), subcase=5)
     with pytest.raises(ChladniError, match="there is no GRID"):
@@ -133,6 +143,69 @@ def test_a_selection_names_one_set(bulk, kind, value):
         bulk(PLATE + SETS, before=f"CEND\n{kind} = {value}\n")
     with pytest.raises(ChladniError, match=r"deck.bdf:2: 'SPC 1' selects no set.* there are 1$"):
         bulk(PLATE + SETS, before="CEND\nSPC 1\n")
+
+
+def test_sets_of_which_there_is_no_card_select_nothing(bulk):
+    """Nothing is to select in a deck without such a card; one of other numbers is a mistake."""
+    deck = bulk(PLATE, before="CEND\nSPC = 9\nMPC = 2\n")
+    assert not len(assembly(deck).supports)
+    notes = list(remarks(deck, ()))
+    assert [n for n in notes if "SPC = 9 selects nothing" in n]
+    assert [n for n in notes if "MPC = 2 selects nothing" in n]
+
+
+def test_a_set_that_joins_itself_is_the_cards_of_its_number(bulk):
+    deck = bulk(PLATE + SETS + "SPCADD,1,1\n", before="CEND\nSPC = 1\n")
+    assert len(assembly(deck).supports) == 6
+
+
+TWO = "SPC1,1,123456,1\nSPC1,2,123456,1,2\n"
+
+
+@pytest.mark.parametrize(
+    ("control", "held", "said"),
+    [
+        ("METHOD = 1\nSUBCASE 1\nSPC = 2\nSUBCASE 2\nSPC = 1\n", 12, "subcases 1, 2 select SPC"),
+        ("SUBCASE 1\nSPC = 1\nSUBCASE 2\nSPC = 2\nMETHOD = 1\n", 12, ""),
+        ("SUBCASE 1\nSPC = 1\nSUBCASE 2\nSPC = 2\n", 6, "subcase 1 is taken"),
+        ("SUBCASE 1\nSTEP 1\nSPC = 1\nSTEP 2\nSPC = 2\n", 6, "subcases 1, 1 select SPC sets 1, 2"),
+        ("SPC = 2\nSUBC 1\nMETH = 1\nSUBC 2\nMETH = 1\n", 12, ""),
+    ],
+)  # fmt: skip
+def test_subcases_with_other_supports_are_noted(bulk, control, held, said):
+    """The first that looks for modes is taken, as before, and the others are named."""
+    deck = bulk(PLATE + TWO, before=f"SOL 103\nCEND\n{control}")
+    assert len(assembly(deck).supports) == held
+    notes = [note for note in remarks(deck, ()) if "select SPC sets" in note]
+    assert len(notes) == bool(said)
+    assert all(said in note for note in notes)
+
+
+@pytest.mark.parametrize("word", ["12 456", "1 2456", "124 56", " 12456"])
+def test_components_may_stand_apart(bulk, word):
+    deck = bulk(f"{PLATE}SPC1    7       {word:8}1\n", before="CEND\nSPC = 7\n", fold=False)
+    assert assembly(deck).supports.tolist() == [[0, c] for c in (1, 2, 4, 5, 6)]
+
+
+@pytest.mark.parametrize("vector", ["0.,0.,1.-3", "0,0,1", "0,0.,1.+0"])
+def test_the_usual_vector_of_bars_is_written_as_any_other(bulk, vector):
+    """Short exponents; an integer X1 is a grid only where X2 and X3 are blank."""
+    bar = "CBAR,8,1,1,2\nPBAR,1,5,1.,1.,1.,1.\n"
+    up = assembly(bulk(f"{PLATE}{bar}BAROR,,,,,{vector}\n")).beams.up[0]
+    assert np.allclose(up / np.linalg.norm(up), [0, 0, 1])
+
+
+def test_a_damper_may_have_the_id_of_a_spring(bulk):
+    cards = "CELAS2,8,5.,1,3\nCVISC,8,,1,2\nPVISC,8,1.,1.\nCMASS2,8,1.,1,1\n"
+    made = assembly(bulk(PLATE + cards))
+    assert len(made.springs.value) == 1
+
+
+def test_a_shell_without_a_property_number_has_its_own(bulk):
+    made = assembly(
+        bulk(PLATE.replace("CQUAD4,7,101", "CQUAD4,7,").replace("PSHELL,101", "PSHELL,7"))
+    )
+    assert made.parts[0].id == 7
 
 
 def test_commands_of_an_included_case_control_are_held_to_the_same(bulk, tmp_path):
@@ -232,14 +305,49 @@ SHEAR = np.array([[1.0, 0.2, 0.0], [0.0, 0.05, 0.0], [3.0, 1.0, 0.3]])
 
 @pytest.mark.parametrize(("name", "m"), [("CHEXA", 4), ("CPENTA", 3)])
 @pytest.mark.parametrize("shape", [np.eye(3), SHEAR], ids=["straight", "sheared and flat"])
-def test_a_face_turned_against_its_opposite_is_refused(bulk, name, m, shape):
-    """Whatever linear map the element went through; |J| has one sign all over it."""
+def test_a_face_turned_against_its_opposite_is_refused_if_det_j_vanishes(bulk, name, m, shape):
+    """Det J is cos² of half the turn at the centre, whatever linear map the element went through.
+
+    A solver computes what has volume at every point of integration. A note names what is warped.
+    """
     straight = prism(m)
     for k in range(1, m):
         turned = np.concatenate([straight[:m], np.roll(straight[m:], k, axis=0)])
-        said = rf"{name} 1: its face .* is turned .*; in order|1: it has no volume at its centre"
-        with pytest.raises(ChladniError, match=said):
-            assembly(bulk(solid(turned @ shape, name)))
+        deck = bulk(solid(turned @ shape, name))
+        if 2 * k == m:
+            with pytest.raises(
+                ChladniError, match=rf"{name} 1: it turns inside out: det J vanishes"
+            ):
+                assembly(deck)
+            continue
+        modes = normal_modes(structure(assembly(deck, "mm-t-s")).system, 12).frequency
+        assert np.all(modes[6:] > 1e3 * modes[:6].max())
+        assert any(re.search(f"{name} 1 has a face warped", n) for n in remarks(deck, ())) or (
+            shape is SHEAR
+        )
+
+
+@pytest.mark.parametrize("hand", [1, -1])
+def test_a_slim_bead_of_a_hem_is_a_body(bulk, hand):
+    """Its faces are turned by 40 degrees; det J has one sign, and a mirror image has the other."""
+    corners = [(7.4, 1.6, 2.4), (6.7, 6.5, 1.5), (5.0, 7.3, 7.4), (3.4, 1.6, 5.1),
+               (7.9, 1.8, 3.2), (10.1, 7.8, 6.4), (8.7, 8.8, 12.8), (3.9, 1.8, 5.9)]  # fmt: skip
+    deck = bulk(solid(np.array(corners) * [hand, 1, 1], "CHEXA"))
+    made = assembly(deck, "mm-t-s")
+    assert len({*np.sign(jacobians(made.points[made.solids[0].nodes])).ravel()}) == 1
+    assert np.sum(normal_modes(structure(made).system, 12).frequency < 1) == 6
+    assert [n for n in remarks(deck, ()) if "warped by more than 45 degrees" in n]
+
+
+@pytest.mark.parametrize(
+    ("moved", "said"),
+    [((0.3, 0.3), "inner angle at grid 3 is 180"), ((0.5, 0.5), "inner angle at grid 3 is 180")],
+)
+def test_a_quadrilateral_folded_in_is_named_with_its_line(bulk, moved, said):
+    """Nastran stops at an inner angle of 180 degrees or more (Quick Reference, CQUAD4)."""
+    x, y = (10 * m for m in moved)
+    with pytest.raises(ChladniError, match=rf"deck.bdf:5: CQUAD4 7: its {said}"):
+        assembly(bulk(PLATE.replace("3,,10.,10.", f"3,,{x},{y}")))
 
 
 @pytest.mark.parametrize(("name", "m"), [("CHEXA", 4), ("CPENTA", 3)])

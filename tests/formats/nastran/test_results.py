@@ -148,6 +148,27 @@ def test_op2_eigenvectors_are_normalised_to_the_mass():
     assert np.all(np.isfinite(found.shapes))
 
 
+def test_op2_eigenvectors_need_no_table_of_grids(monkeypatch):
+    """Tables of grids differ between MSC and NX; shapes carry their grids themselves."""
+    op2 = pytest.importorskip("pyyeti.nastran.op2")
+    path = yeti_file("nastran_op2_data/rdop2gpwg_1.op2")
+    due = read_op2_modes(path)
+    for name in ("_rdop2bgpdt68", "_rdop2eqexin", "_rdop2uset", "_rdop2geom1cord2"):
+        monkeypatch.setattr(op2.OP2, name, lambda self: 1 / 0)
+    found = read_op2_modes(path)
+    np.testing.assert_array_equal(found.shapes, due.shapes)
+    np.testing.assert_array_equal(found.ids, due.ids)
+
+
+@pytest.mark.parametrize(
+    "name", ["nas2cam_extseout/nas2cam_notall6_nx2021.op2", "nastran_op2_data/tugd_2020_64bit.op2"]
+)
+def test_op2_without_eigenvectors_names_other_ways(name):
+    said = r"has no real eigenvectors .*give the modes as a punch file .* universal file"
+    with pytest.raises(FileError, match=said):
+        read_op2_modes(yeti_file(name))
+
+
 def test_op4_matrices():
     matrices = read_op4(yeti_file("nas2cam/with_se_nas2cam.op4"))
     assert matrices
@@ -158,7 +179,7 @@ def test_files_pyyeti_cannot_read(tmp_path):
     pytest.importorskip("pyyeti")
     path = tmp_path / "x.op2"
     path.write_bytes(b"not an op2 file at all, whatever its name says" * 4)
-    with pytest.raises(FileError, match="cannot be read by pyYeti as OP2"):
+    with pytest.raises(FileError, match=r"cannot be read by pyYeti as OP2: .*; give the modes as"):
         read_op2_modes(path)
     with pytest.raises(FileError, match="does not exist"):
         read_op4(tmp_path / "none.op4")

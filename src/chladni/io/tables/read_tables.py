@@ -1,4 +1,4 @@
-"""Recordings as tables in: FRF in CSV and NPZ, poles in CSV (SI, UTF-8)."""
+"""Recordings as tables in: FRF in CSV and NPZ, poles in CSV (SI)."""
 
 import zipfile
 from collections.abc import Iterable, Sequence
@@ -16,9 +16,16 @@ from ...ema.time_record import TimeRecord
 from ...errors import ChladniError, FileError, named
 from ..damage import DAMAGED
 from ..file_size import refuse_large
-from ..time.read_time import named_arrays, read_mat, read_time_csv, read_wav
+from ..time.read_time import (
+    mat_arrays,
+    mat_variables,
+    named_arrays,
+    read_time_csv,
+    read_wav,
+    time_of_mat,
+)
 from ..time.time_channels import is_time, only_known
-from .csv_table import CsvTable, files_next_to, read_table
+from .csv_table import CsvTable, files_next_to, names_of, read_table
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
 ENDINGS = (".npz", ".csv", ".wav", ".mat", *_UNIVERSAL)
@@ -34,9 +41,9 @@ _NPZ_OPTIONAL = ("coherence", "variance", "quantity", "level", "article")
 
 
 def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
-    """What a file holds, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat.
+    """Contents of a file, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat.
 
-    A CSV or NPZ holds FRFs, poles (CSV) or time data; WAV and MAT hold time data.
+    A CSV, NPZ or MAT holds FRFs, poles (CSV) or time data; WAV holds time data.
 
     Raises
     ------
@@ -49,7 +56,9 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
         refuse_large(path)
     elif ending in ENDINGS and ending not in _UNIVERSAL:
         raise FileError(f"no file {path}; the folder has {named(files_next_to(path))}")
-    if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
+    if ending == ".mat":
+        return (_read_mat(path, quantity),)
+    if ending == ".wav" or (ending == ".csv" and "time_s" in names_of(path)):
         return (_timed(path, _TIMED[ending](path), quantity),)
     if ending == ".npz":
         return (read_npz(path, quantity),)
@@ -65,7 +74,28 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     )
 
 
-_TIMED = {".wav": read_wav, ".mat": read_mat, ".csv": read_time_csv}
+_TIMED = {".wav": read_wav, ".csv": read_time_csv}
+
+
+def _read_mat(path: Path, quantity: str | None) -> Recording:
+    """FRFs by the names of NPZ, else time data; axes of length one, which it loses, come back."""
+    held = mat_variables(path)
+    arrays = mat_arrays(held)
+    if not {"frequency_hz", "values"} & set(arrays):
+        return _timed(path, time_of_mat(path, held), quantity)
+    _only_known(path, list(arrays))
+    words = {k: np.char.strip(np.atleast_1d(arrays[k]).astype(str)) for k in _TEXTS if k in arrays}
+    arrays |= words
+    due = [np.size(arrays[k]) for k in ("frequency_hz", "outputs", "inputs") if k in arrays]
+    for name in ("values", "coherence", "variance"):
+        if name in arrays and arrays[name].shape == tuple(n for n in due if n != 1):
+            arrays[name] = arrays[name].reshape(due)
+    if "frequency_hz" in arrays:
+        arrays["frequency_hz"] = np.atleast_1d(arrays["frequency_hz"])
+    return _of_arrays(path, arrays, quantity)
+
+
+_TEXTS = ("outputs", "inputs", "quantity", "article")
 
 
 def _timed(path: Path, read: tuple[TimeRecord, list[str]], quantity: str | None) -> Recording:
@@ -89,9 +119,9 @@ def _as_quantity(r: Recording, quantity: str | None) -> Recording:
 
 
 def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
-    """FRFs (one recording per article and level) or poles, told apart by the header."""
+    """FRFs (one recording per article and level) or poles; the header decides."""
     path = Path(path)
-    head = _first_line(path) - {""} if path.is_file() else set()
+    head = set(names_of(path)) - {""} if path.is_file() else set()
     if head and head.isdisjoint({*_CARTESIAN, "output", "input", "magnitude"}):
         if "mode" not in head:
             raise FileError(
@@ -144,11 +174,6 @@ def _responses(table: CsvTable, parts: tuple[str, str]) -> np.ndarray:
 
 def _quantities() -> str:
     return ", ".join(get_args(Quantity))
-
-
-def _first_line(path: Path) -> set[str]:
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return {name.strip().lower() for name in file.readline().split(",")}
 
 
 def _recording(
@@ -266,6 +291,11 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
         raise FileError(f"{path.name} cannot be read as NPZ: {why}") from error
     if timed:
         return _timed(path, named_arrays(path, arrays), quantity)
+    return _of_arrays(path, arrays, quantity)
+
+
+def _of_arrays(path: Path, arrays: dict[str, np.ndarray], quantity: str | None) -> Recording:
+    """FRF of named arrays."""
     if missing := [name for name in _NPZ if name not in arrays]:
         raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {named(arrays)}")
     quantity = quantity or (_word(path, arrays, "quantity") if "quantity" in arrays else None)

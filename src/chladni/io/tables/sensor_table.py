@@ -1,9 +1,7 @@
 """The table of sensors and exciters: where each sits, which way it points, what it weighs (SI)."""
 
-import csv
 import json
 from collections.abc import Sequence
-from io import StringIO
 from pathlib import Path
 from typing import Any, get_args
 
@@ -12,7 +10,7 @@ import numpy as np
 from ...dofs import COMPONENTS
 from ...ema.setup import Role, Sensor
 from ...errors import FileError, named
-from .csv_table import CsvTable, read_table
+from .csv_table import CsvTable, csv_text, read_table
 
 _OPTIONAL = (
     *("grid", "x", "y", "z", "direction", "nx", "ny", "nz"),
@@ -89,12 +87,9 @@ def with_input(path: Path, label: str) -> str:
         )
     held = read_table(path, ("label",), _OPTIONAL).columns
     columns = list(dict.fromkeys([*held, "role"]))
-    text = StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(dict(zip(held, row, strict=True)) for row in zip(*held.values(), strict=True))
-    writer.writerow({"label": label, "role": "input"})
-    return text.getvalue()
+    rows = [dict(zip(held, row, strict=True)) for row in zip(*held.values(), strict=True)]
+    rows.append({"label": label, "role": "input"})
+    return csv_text([columns, *([row.get(name, "") for name in columns] for row in rows)])
 
 
 def _planned(path: Path) -> tuple[Sensor, ...]:

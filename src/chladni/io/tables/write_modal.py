@@ -1,6 +1,5 @@
 """Identified modes for other programs: shapes as a table, the state space as NPZ or MAT."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from ...ema.realisation import realised
 from ...ema.shapes import shape_sd, shapes
 from ...errors import LabelError
 from ...output import atomic, write_npz
+from .csv_table import write_rows
 
 
 def write_shape_table(path: str | Path, modes: Identified) -> Path:
@@ -22,13 +22,13 @@ def write_shape_table(path: str | Path, modes: Identified) -> Path:
 
     def write(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["label", "mode", "frequency_hz", "real", "imag", "real_sd", "imag_sd"])
+            columns = ("mode", "frequency_hz", "real", "imag", "real_sd", "imag_sd")
+            write_rows(file, [("label", *columns)])
             for k, f in enumerate(modes.frequency):
                 rows = zip(found.outputs, found.values[:, k], sd[:, k], strict=True)
                 for label, value, s in rows:
-                    row = tuple(map(float, (f, value.real, value.imag, s.real, s.imag)))
-                    writer.writerow([label, k + 1, *map(repr, row)])
+                    row = map(float, (f, value.real, value.imag, s.real, s.imag))
+                    write_rows(file, [(label, k + 1, *row)])
 
     return atomic(path, write)
 

@@ -1,18 +1,20 @@
 """Recordings as tables out: what `tables` reads, every digit kept."""
 
-import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
+from ...arguments import checked
 from ...dynamics.frf import FRF
 from ...ema.level_table import LevelTable
 from ...ema.setup import PoleTable
 from ...output import atomic
+from .csv_table import write_rows
 
 
+@checked
 def write_npz(path: str | Path, frf: FRF) -> None:
     """Write responses as NPZ, every digit kept.
 
@@ -35,6 +37,7 @@ def write_npz(path: str | Path, frf: FRF) -> None:
     _replace(path, "wb", lambda file: np.savez_compressed(file, **arrays))
 
 
+@checked
 def write_csv(path: str | Path, frf: FRF) -> None:
     """Write responses as CSV, one row per line and channel, every digit kept.
 
@@ -47,14 +50,13 @@ def write_csv(path: str | Path, frf: FRF) -> None:
     extra = [name for name in ("coherence", "variance") if getattr(frf, name) is not None]
 
     def rows(file: IO) -> None:
-        writer = csv.writer(file)
-        writer.writerow(["frequency_hz", "output", "input", "real", "imag", *extra])
+        write_rows(file, [["frequency_hz", "output", "input", "real", "imag", *extra]])
         for j, input in enumerate(frf.inputs):
             for i, output in enumerate(frf.outputs):
                 columns = [frf.values[:, i, j].real, frf.values[:, i, j].imag]
                 columns += [getattr(frf, name)[:, i, j] for name in extra]
-                for f, *row in zip(frf.frequency, *columns, strict=True):
-                    writer.writerow([repr(float(f)), output, input, *(repr(float(v)) for v in row)])
+                each = zip(frf.frequency.tolist(), *(c.tolist() for c in columns), strict=True)
+                write_rows(file, ([f, output, input, *row] for f, *row in each))
 
     _replace(path, "w", rows)
 
@@ -63,12 +65,11 @@ def write_poles(path: str | Path, poles: PoleTable) -> None:
     """Poles as CSV; what is unknown stays an empty cell."""
 
     def rows(file: IO) -> None:
-        writer = csv.writer(file)
-        writer.writerow(["mode", "frequency_hz", "frequency_sd_hz", "damping", "state"])
-        text = lambda v: "" if np.isnan(v) else repr(float(v))  # noqa: E731
+        write_rows(file, [["mode", "frequency_hz", "frequency_sd_hz", "damping", "state"]])
+        known = lambda v: "" if np.isnan(v) else float(v)  # noqa: E731
         table = (poles.mode, poles.frequency, poles.frequency_sd, poles.damping, poles.state)
         for mode, f, sd, zeta, state in zip(*table, strict=True):
-            writer.writerow([int(mode), repr(float(f)), text(sd), text(zeta), state])
+            write_rows(file, [[int(mode), float(f), known(sd), known(zeta), state]])
 
     _replace(path, "w", rows)
 
@@ -81,12 +82,11 @@ def write_levels(path: str | Path, tables: Sequence[LevelTable]) -> None:
     )  # fmt: skip
 
     def rows(file: IO) -> None:
-        writer = csv.writer(file)
-        writer.writerow(["mode", "output", *columns, "signature"])
+        write_rows(file, [["mode", "output", *columns, "signature"]])
         for k, table in enumerate(tables, 1):
             for row in table.rows:
                 values = (repr(getattr(row, name)) for name in columns)
-                writer.writerow([k, table.output, *values, table.signature])
+                write_rows(file, [[k, table.output, *values, table.signature]])
 
     _replace(path, "w", rows)
 

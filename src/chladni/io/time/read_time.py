@@ -13,10 +13,11 @@ from typing import Any, Literal
 import numpy as np
 
 from ...ema.time_record import TimeRecord
-from ...errors import FileError, named, not_text
+from ...errors import FileError, named
 from ..damage import DAMAGED
+from ..encoded_text import encoding_of
 from ..file_size import refuse_large
-from ..tables.csv_table import read_table
+from ..tables.csv_table import delimiter, first_line, read_table
 from .time_channels import TimeChannel, assembled, from_arrays, rate_of
 
 _UNSTATED = 0xFFFFFFFF  # length of a chunk that is not known yet
@@ -78,13 +79,13 @@ def _refuse_cut(path: Path) -> None:
             return
 
 
-def read_mat(path: Path) -> Read:
-    """A MAT of MATLAB 4 to 7: named arrays, or records with x_values and y_values (Testlab).
+def mat_variables(path: Path) -> dict[str, Any]:
+    """Variables of a MAT of MATLAB 4 to 7, axes of length one left out.
 
     Raises
     ------
     FileError
-        If it is of version 7.3, is damaged, or does not say rate and channels.
+        If it is of version 7.3, or is damaged.
     """
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import MatReadError
@@ -101,18 +102,31 @@ def read_mat(path: Path) -> Read:
         held = loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except (*DAMAGED, MatReadError) as error:
         raise FileError(f"{path.name} cannot be read as MAT: {error}") from error
-    held = {k: v for k, v in held.items() if not k.startswith("__")}
+    return {k: v for k, v in held.items() if not k.startswith("__")}
+
+
+def time_of_mat(path: Path, held: dict[str, Any]) -> Read:
+    """Time data of a MAT: named arrays, or records with x_values and y_values (Testlab).
+
+    Raises
+    ------
+    FileError
+        If the variables do not say rate and channels.
+    """
     records = [r for v in held.values() for r in np.ravel(np.array(v, dtype=object))
                if hasattr(r, "x_values") and hasattr(r, "y_values")]  # fmt: skip
     if records:
         return _assembled(path, *_testlab(path.name, records))
-    arrays = {}
-    for name, value in held.items():
-        array = np.asarray(value)
-        if array.dtype.kind == "O":
-            array = np.array([str(x) for x in array.ravel()])
-        arrays[name] = array
-    return named_arrays(path, arrays)
+    return named_arrays(path, mat_arrays(held))
+
+
+def mat_arrays(held: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Variables as arrays, a cell of texts as a row of them."""
+    arrays = {name: np.asarray(value) for name, value in held.items()}
+    return {
+        name: np.array([str(x) for x in array.ravel()]) if array.dtype.kind == "O" else array
+        for name, array in arrays.items()
+    }
 
 
 def named_arrays(path: Path, arrays: dict[str, np.ndarray]) -> Read:
@@ -135,6 +149,11 @@ def _testlab(name: str, records: list[Any]) -> tuple[float, list[TimeChannel]]:
     channels, rates = [], []
     for k, record in enumerate(records):
         x, y = record.x_values, record.y_values
+        if np.asarray(getattr(y, "values", 0.0)).dtype.kind == "c":
+            raise FileError(
+                f"{name}: record {k + 1} is complex, a function of frequency; export FRFs as a "
+                "universal file"
+            )
         try:
             rates.append(1 / float(x.increment))
             values = np.asarray(y.values, float)
@@ -169,12 +188,12 @@ def read_time_csv(path: Path) -> Read:
     FileError
         With the line of what is no number, or the head that says no unit.
     """
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        head = [cell.strip() for cell in file.readline().strip().split(",")]
+    cut = delimiter(path)
+    head = [cell.strip() for cell in first_line(path).split(cut)]
     try:
-        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is {not_text(error)}") from error
+        with path.open(encoding=encoding_of(path)) as file:
+            lines = file if cut == "," else (line.replace(",", ".") for line in file)
+            rows = np.loadtxt(lines, delimiter=cut, skiprows=1, ndmin=2)
     except ValueError as error:
         raise FileError(f"{path.name}: a line after the first is not {len(head)} numbers "
                         f"({str(error).split(';')[0]})") from error  # fmt: skip

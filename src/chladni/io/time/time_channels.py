@@ -164,7 +164,8 @@ def only_known(name: str, names: Sequence[str]) -> None:
     if unknown := [n for n in names if n.lower() not in (*_AXES, *_MORE, *BY_NAME)]:
         raise FileError(
             f"{name}: unknown array {', '.join(unknown)}; known of time data are rate, fs, dt, t; "
-            f"force, acceleration, velocity, displacement; {', '.join(_MORE)}"
+            f"force, acceleration, velocity, displacement; {', '.join(_MORE)}; of FRFs "
+            "frequency_hz, values, outputs, inputs"
         )
 
 

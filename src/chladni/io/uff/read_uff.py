@@ -4,7 +4,7 @@ pyuff does the parsing of fields; what the fields mean, units, signs, completene
 sentences about what is wrong are ours. Source of the format: SDRC universal file datasets.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from ...arrays import measurable
 from ...dofs import label
 from ...ema.response_correlations import responses
-from ...ema.setup import Function, Recording, Shapes
+from ...ema.setup import Function, PoleTable, Recording, Shapes
 from ...errors import ChladniError, FileError, named
 from .estimate_stamp import read_stamp, with_variance
 from .uff_accumulator import Channel, Pair, Shape, TimeSignal, UffAccumulator
@@ -49,12 +49,12 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
         frequency, values in volts.
     """
     path = Path(path)
-    uff = UffAccumulator(path)
+    uff, records = UffAccumulator(path), list[FunctionSet]()
     for number, d in sorted(_datasets(uff), key=lambda one: int(one[1]["type"]) != _UNITS):
         where = uff.where(number, int(d["type"]))
         try:
             if int(d["type"]) == _FUNCTION:
-                _take_function(uff, function_set(d, number), where, quantity)
+                records.append(function_set(d, number))
             else:
                 _TAKE[int(d["type"])](uff, d, where)
         except ChladniError:
@@ -64,15 +64,20 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
                 f"{where} is damaged: its lines do not fit together "
                 f"({type(error).__name__}: {error})"
             ) from error
+    parts = _entities(records)
+    for record in records:
+        _take_function(uff, record, parts, uff.where(record.number, _FUNCTION), quantity)
     frf, (averages, added) = frf_matrix(uff, quantity), read_stamp(uff.title)
     time = time_record(uff) if frf is None else None
-    _name_unused(uff, frf is None and time is None)
+    alone = frf is None and time is None
+    _name_unused(uff, alone)
     if frf is not None and averages:
         frf = with_variance(frf, averages)
         uff.notes.append(f"{path.name}: its noise is that of the stated {averages:g} averages")
     return Recording(
         name=path.name,
         frf=frf,
+        poles=_poles(uff) if alone and not responses(uff.functions) else None,
         shapes=_shapes(uff),
         nodes=uff.nodes,
         axes=_axes(uff),
@@ -117,19 +122,42 @@ def _why(error: BaseException) -> str:
     return str(error) or type(error).__name__
 
 
-def _dof(node: int, direction: int) -> str:
-    """Label of a node and a direction code; 0 (scalar) is read as the normal."""
+Entities = Mapping[tuple[int, int], set[str]]  # (end, node) -> names of entities
+
+
+def _entities(records: Sequence[FunctionSet]) -> Entities:
+    """Names of the entities that each node of either end occurs under: several are several nodes.
+
+    A test system that writes node 0 for every point may name the points in their place.
+    """
+    found: dict[tuple[int, int], set[str]] = {}
+    for record in records:
+        for end, (node, _) in enumerate((record.response, record.reference)):
+            found.setdefault((end, node), set()).update({record.names[end]} - {""})
+    return found
+
+
+def _dof(record: FunctionSet, end: int, parts: Entities) -> str:
+    """Label of the response (end 0) or the reference; direction 0 (scalar) is read as the normal.
+
+    The name of an entity stands before the node where the node is not unique without it, and in
+    place of node 0.
+    """
+    (node, direction), name = (record.response, record.reference)[end], record.names[end]
     if abs(direction) > 6:
         raise FileError(f"direction {direction} of node {node} is not one of -6 to 6")
-    return f"{node}:n" if direction == 0 else label(node, abs(direction), direction)
+    dof = f"{node}:n" if direction == 0 else label(node, abs(direction), direction)
+    if not name or len(parts[end, node]) < 2:
+        return dof
+    return f"{name}:{dof.partition(':')[2]}" if node == 0 else f"{name}:{dof}"
 
 
 def _take_function(
-    uff: UffAccumulator, record: FunctionSet, where: str, quantity: str | None
+    uff: UffAccumulator, record: FunctionSet, parts: Entities, where: str, quantity: str | None
 ) -> None:
     kind = record.function
     record = _complete(record, where)
-    node, axis = record.reference
+    node = record.reference[0]
     if kind in _REAL and (np.iscomplexobj(record.y) or (kind == 1 and record.abscissa.kind == 18)):
         they_are = "a function of frequency" if kind == 1 else "complex"
         raise FileError(
@@ -137,11 +165,9 @@ def _take_function(
             "frequency response has function type 4"
         )
     try:
-        output, input = _dof(*record.response), _dof(node, axis)
+        output, input = (_dof(record, end, parts) for end in (0, 1))
     except FileError as error:
         raise FileError(f"{where}: {error}") from error
-    if kind in (4, 5, 6) and node == 0 and axis != 0:
-        input = label(0, abs(axis), axis).replace("0:", "base:")
     if kind in (4, 5) or (kind == 0 and np.iscomplexobj(record.y) and node):
         _take_frf(uff, record, (output, input), where, quantity)
     elif kind in (6, 26):
@@ -283,8 +309,10 @@ def _take_systems(uff: UffAccumulator, d: Dataset, where: str) -> None:
 
 
 def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
-    """A normal mode (analysis type 2) or a complex one (3 and 7); others are no modes."""
+    """A normal mode (analysis type 2) or a complex one (3 and 7) as motion; others are no modes."""
     analysis = int(d["analysis_type"])
+    if int(d["spec_data_type"]) not in _MOTION:
+        return
     if analysis == 2:
         f = d.get("freq", 0.0)
         zeta = d.get("modal_damp_vis", 0.0) or d.get("modal_damp_his", 0.0) / 2
@@ -303,6 +331,8 @@ def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
 
 
 _UNITS, _FUNCTION = 164, 58
+_MOTION = (0, 1, 8, 11, 12)  # data types: unknown, general, displacement, velocity, acceleration
+_RIGID = 1e-3  # of the highest frequency: modes below are rigid motions
 _TAKE = {
     15: _take_nodes,
     55: _take_shape,
@@ -319,6 +349,21 @@ def _axes(uff: UffAccumulator) -> dict[int, np.ndarray]:
     """The nodes whose directions are not those of the global axes."""
     turned = {n: uff.systems[s] for n, s in uff.turned.items() if s in uff.systems}
     return {n: A for n, A in turned.items() if not np.allclose(A, np.eye(3), atol=1e-6)}
+
+
+def _poles(uff: UffAccumulator) -> PoleTable | None:
+    """Frequencies of the mode shapes as a table, rigid motions left out; None without any."""
+    shapes = sorted(uff.shapes, key=lambda shape: shape.frequency)
+    elastic = [s for s in shapes if s.frequency > _RIGID * shapes[-1].frequency]
+    if not elastic:
+        return None
+    uff.notes.append(
+        f"{uff.path.name}: the natural frequencies of its {len(elastic)} mode shapes are compared; "
+        "chladni correlate DECK --modes compares the shapes"
+    )
+    f, zeta = np.array([(s.frequency, s.damping or np.nan) for s in elastic]).T
+    n = len(elastic)
+    return PoleTable(f, np.full(n, np.nan), zeta, np.arange(1, n + 1), ("",) * n)
 
 
 def _shapes(uff: UffAccumulator) -> Shapes | None:

@@ -11,6 +11,10 @@ from ...errors import ChladniError, FileError, named
 from .uff_accumulator import Channel, Pair, UffAccumulator
 
 _SAME_LINE = 1e-5  # single precision abscissas: relative
+NO_PLACE = (
+    "the reference has node 0, so the file does not say where the force acts; its place belongs "
+    "into sensors.csv"
+)
 
 
 def frf_matrix(uff: UffAccumulator, quantity: str | None) -> FRF | None:
@@ -42,12 +46,16 @@ def frf_matrix(uff: UffAccumulator, quantity: str | None) -> FRF | None:
             f"{uff.path.name}: the frequencies do not increase near {frequency[order][k]:g} Hz"
         )
     coherence = _coherence(uff, {v: k for k, v in called.items()}, outputs, inputs, len(frequency))
+    driven = tuple(re.sub("^0:(?!n)", "base:", j) if kind == "transmissibility" else j
+                   for j in inputs)  # fmt: skip
+    if kind != "transmissibility" and any(j.startswith("0:") for j in driven):
+        uff.notes.append(f"{uff.path.name}: {NO_PLACE}")
     try:
         return FRF(
             values[order],
             frequency[order],
             outputs,
-            inputs,
+            driven,
             quantity=kind,  # type: ignore[arg-type]
             coherence=None if coherence is None else coherence[order],
         )

@@ -3,6 +3,7 @@
 Source of the format: SDRC universal file datasets.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,7 @@ class FunctionSet:
     ----------
     function : 1 time, 4 FRF, 5 transmissibility, 6 coherence, ...
     response, reference : (node, direction -6 to 6)
+    names : of the entities (parts of a structure, points) of response and reference; "" for none
     due : how many values the head says there are
     x, y : (n,)
     abscissa, ordinate, denominator : Axis
@@ -44,6 +46,7 @@ class FunctionSet:
     denominator: Axis
     title: str = ""
     number: int = 0
+    names: tuple[str, str] = ("", "")
 
 
 def function_set(d: Mapping[str, Any], number: int) -> FunctionSet:
@@ -64,4 +67,11 @@ def function_set(d: Mapping[str, Any], number: int) -> FunctionSet:
         denominator=denominator,
         title=str(d.get("id1", "")),
         number=number,
+        names=(_name(d.get("rsp_ent_name")), _name(d.get("ref_ent_name"))),
     )
+
+
+def _name(text: object) -> str:
+    """Name of an entity as a word of a label, or an empty text."""
+    name = re.sub(r"[^\w.+-]+", "_", str(text or "").strip())
+    return "" if name.upper() in ("NONE", "NULL", "0") else name

@@ -4,9 +4,11 @@ import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 from ...errors import FileError, named
+from ..encoded_text import as_utf8
 from ..file_size import refuse_large
 from .uff_accumulator import dataset_name
 
@@ -24,9 +26,10 @@ _BINARY = re.compile(rb"(?m)^ *58[bB]")
 def readable(path: Path) -> Iterator[Path]:
     """The file itself, or a tidied copy of it that lives as long as it is needed.
 
-    Text files with end marks that are not in columns 1 to 6, or followed by some blanks, with lines
-    that end in a carriage return alone, and with Fortran's D exponents or those of three digits are
-    tidied; binary records are never touched.
+    Its text becomes UTF-8, in the heads of binary records too. End marks of text files
+    are put into columns 1 to 6, with no blanks behind them. Lines that end in a carriage return
+    alone, Fortran's D exponents and those of three digits are mended. The numbers of binary records
+    are never touched.
 
     Raises
     ------
@@ -38,7 +41,7 @@ def readable(path: Path) -> Iterator[Path]:
         raise FileError(f"no file {path}; the folder has {named(near)}")
     refuse_large(path)
     data = path.read_bytes()
-    tidy = data if _BINARY.search(data) else _tidied(data)
+    tidy = _with_heads_in_utf8(data) if _BINARY.search(data) else as_utf8(_tidied(data))
     marks = len(_MARK.findall(tidy))
     if marks == 0:
         raise FileError(
@@ -58,6 +61,24 @@ def readable(path: Path) -> Iterator[Path]:
         copy = Path(folder) / path.name
         copy.write_bytes(tidy)
         yield copy
+
+
+def _with_heads_in_utf8(data: bytes) -> bytes:
+    """A file of binary records with its text in UTF-8; the same object where it is."""
+    marks = [0, *(m.start() for m in _MARK.finditer(data)), len(data)]
+    parts = [data[a:b] for a, b in pairwise(marks)]
+    made = [_head_in_utf8(part) for part in parts]
+    return data if all(a is b for a, b in zip(parts, made, strict=True)) else b"".join(made)
+
+
+def _head_in_utf8(part: bytes) -> bytes:
+    """A part from its mark on: the whole text, or the head of a binary record."""
+    if not _BINARY.search(part):
+        return as_utf8(part)
+    lines = part.split(b"\n", 2 + _HEAD_LINES)
+    head = [as_utf8(line) for line in lines[: 2 + _HEAD_LINES]]
+    same = all(a is b for a, b in zip(head, lines, strict=False))
+    return part if same else b"\n".join([*head, *lines[2 + _HEAD_LINES :]])
 
 
 def _refuse_untyped(path: Path, number: int, part: bytes) -> None:

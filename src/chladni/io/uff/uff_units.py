@@ -7,6 +7,7 @@ import numpy as np
 
 from ...errors import FileError
 from .uff_function import FunctionSet
+from .unit_labels import is_force, plain, unit
 
 # code of dataset 164: (metre per file length, newton per file force)
 _POUND, _KILOGRAM_FORCE = 4.4482216152605, 9.80665
@@ -20,30 +21,17 @@ _SYSTEMS = {
     7: (0.0254, _POUND),
     8: (1e-3, _KILOGRAM_FORCE),
 }
-_LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "ft": 0.3048}
-_FORCE = {
-    "n": 1.0,
-    "mn": 1e-3,
-    "kn": 1e3,
-    "dan": 10.0,
-    "kip": 1e3 * _POUND,
-    "kp": _KILOGRAM_FORCE,
-    "lbf": _POUND,
-    "lb": _POUND,
-    "kgf": _KILOGRAM_FORCE,
-}
 _RESPONSE = {8: "receptance", 11: "mobility", 12: "accelerance"}
-_GRAVITY = 9.80665
 _HERTZ = {
-    **dict.fromkeys(("", "hz", "hertz", "1/s", "cps"), 1.0),
+    **dict.fromkeys(("", "hz", "hertz", "1/s", "s-1", "cps", "c/s", "cycle/s", "cycles/s"), 1.0),
     "khz": 1e3,
-    **dict.fromkeys(("rad/s", "radians/s"), 1 / (2 * np.pi)),
+    **dict.fromkeys(("rad/s", "radian/s", "radians/s"), 1 / (2 * np.pi)),
     **dict.fromkeys(("1/min", "cpm", "rpm", "r/min", "rev/min", "u/min"), 1 / 60),
 }
 _SPEED = ("rpm", "r/min", "rev/min", "u/min")  # a frequency only where the data type says so
 _FREQUENCY = 18  # specific data type; 0 and 1 leave it open
 _ABSCISSA = {17: "time", 19: "rpm", 20: "order"}
-_ELECTRICAL = re.compile(r"[kmunµ]?v|k?volts?|millivolts?|counts?|lsb|p?coulomb|pc")
+_ELECTRICAL = re.compile(r"[kmunμ]?v|k?volts?|millivolts?|counts?|lsb|p?coulomb|pc")
 
 
 @dataclass(frozen=True)
@@ -70,53 +58,39 @@ def file_units(system: int, length: float, force: float) -> FileUnits:
     return FileUnits(1 / (length or 1.0), 1 / (force or 1.0))
 
 
-def _bare(label: str) -> str:
-    """'(M/S^2)/N' -> 'm/s2/n'."""
-    text = re.sub(r"[\s()\[\]]|\*\*|\^", "", label).replace("²", "2").lower()
-    text = re.sub(r"sec|(?<=/)s\*s", lambda m: "s2" if "*" in m[0] else "s", text)
-    return "" if text in ("none", "null", "-", "1") else text
-
-
 def numerator(label: str) -> tuple[str | None, float]:
     """(quantity, factor to SI) of 'mm/s^2', 'g', 'in'; (None, 1) where it is no motion.
 
     >>> numerator("g")
     ('accelerance', 9.80665)
     """
-    text = _bare(label)
-    if text in ("g", "gn", "gs", "g's"):
-        return "accelerance", _GRAVITY
-    for tail, quantity in (("/s2", "accelerance"), ("/s/s", "accelerance"), ("/s", "mobility")):
-        if text.endswith(tail) and text[: -len(tail)] in _LENGTH:
-            return quantity, _LENGTH[text[: -len(tail)]]
-    return ("receptance", _LENGTH[text]) if text in _LENGTH else (None, 1.0)
+    found = unit(label)
+    if found is None or found.force or found.motion is None:
+        return None, 1.0
+    return found.motion, found.factor
 
 
 def force_factor(label: str) -> float | None:
     """Newton per unit of a label; None where it is no force.
 
-    >>> force_factor("lbf"), force_factor("mm")
-    (4.4482216152605, None)
+    >>> force_factor("lbf"), force_factor("Newton"), force_factor("mm")
+    (4.4482216152605, 1.0, None)
     """
-    return _FORCE.get(_bare(label))
+    found = unit(label)
+    return found.factor if found is not None and is_force(found) else None
 
 
 def ratio(label: str) -> tuple[str | None, float | None, float | None]:
-    """(quantity, length factor, force factor) of a unit label such as '(m/s^2)/N'; None: not said.
+    """(quantity, factor above, factor below) of a unit label such as '(m/s^2)/N'; None: not said.
 
-    >>> ratio("mm/s/N")
-    ('mobility', 0.001, 1.0)
+    >>> ratio("mm/s/N"), ratio("mm/s")
+    (('mobility', 0.001, 1.0), ('mobility', 0.001, None))
     >>> ratio("g/g")
     ('transmissibility', 9.80665, 9.80665)
     """
-    text = _bare(label)
-    quantity, factor = numerator(text)
-    if quantity:
-        return quantity, factor, None
-    head, slash, tail = text.rpartition("/")
-    quantity, factor = numerator(head)
-    if slash and quantity and tail in _FORCE:
-        return quantity, factor, _FORCE[tail]
+    found, text = unit(label), plain(label)
+    if found is not None and found.motion is not None:
+        return found.motion, found.factor, 1.0 if found.force else None
     for cut in range(len(text)):  # motion over motion: every slash may be the bar
         if text[cut] == "/":
             above, below = numerator(text[:cut]), numerator(text[cut + 1 :])
@@ -139,10 +113,10 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
         return Meaning("transmissibility", 1.0)
     said, length, force = ratio(record.ordinate.unit)
     below = record.denominator.unit
-    for unit, motion in ((record.ordinate.unit, said), (below, numerator(below)[0])):
-        if _bare(unit) and not motion and _bare(unit) not in _FORCE:
+    for text, motion in ((record.ordinate.unit, said), (below, numerator(below)[0])):
+        if plain(text) and not motion and force_factor(text) is None:
             raise FileError(
-                f"{where}: the unit {unit!r} is not known; known are m, mm, in, g, N, lbf and "
+                f"{where}: the unit {text!r} is not known; known are m, mm, in, g, N, lbf and "
                 "similar units; state the quantity in the case if the numbers have the units of "
                 "the file's head (dataset 164, else SI)"
             )
@@ -153,7 +127,7 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
         )
     if said == "transmissibility":
         return Meaning(said, length / force if length and force else 1.0)
-    force = force or _FORCE.get(_bare(below)) or units.force
+    force = force or force_factor(below) or units.force
     return Meaning(said or typed, (length or units.length) / force)
 
 
@@ -165,14 +139,14 @@ def hertz(record: FunctionSet, where: str) -> np.ndarray:
     FileError
         If it is something else (a speed, an order, a time), or in a unit that is not known.
     """
-    kind, unit = record.abscissa.kind, _bare(record.abscissa.unit)
+    kind, text = record.abscissa.kind, plain(record.abscissa.unit).strip("()")
     needed = f"a function of frequency has data type {_FREQUENCY} and is in Hz, kHz, rad/s or rpm"
-    is_frequency = kind == _FREQUENCY or (kind in (0, 1) and unit not in _SPEED)
-    if unit not in _HERTZ or not is_frequency:
+    is_frequency = kind == _FREQUENCY or (kind in (0, 1) and text not in _SPEED)
+    if text not in _HERTZ or not is_frequency:
         named = _ABSCISSA.get(kind)
         typed = f"data type {kind}" + (f" ({named})" if named else "")
         raise FileError(f"{where}: its abscissa, {typed}, is in {record.abscissa.unit!r}; {needed}")
-    f = np.asarray(record.x, float) * _HERTZ[unit]
+    f = np.asarray(record.x, float) * _HERTZ[text]
     if np.any(f < 0):
         raise FileError(f"{where}: a frequency of {f.min():g} Hz is negative")
     return f
@@ -187,7 +161,7 @@ def check_calibrated(record: FunctionSet, where: str) -> None:
         If the ordinate or its denominator is in volts, counts or a charge.
     """
     for axis in (record.ordinate, record.denominator):
-        if any(_ELECTRICAL.fullmatch(part) for part in _bare(axis.unit).split("/")):
+        if any(_ELECTRICAL.fullmatch(part) for part in re.split(r"[^a-zμ]", plain(axis.unit))):
             raise FileError(
                 f"{where}: its values are in {axis.unit!r} and the file has no calibration; "
                 "export units of motion and force (m, mm/s, m/s^2 or g over N or lbf); "

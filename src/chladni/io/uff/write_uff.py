@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...arguments import checked
 from ...dofs import parse
 from ...dynamics.frf import FRF
 from ...errors import FileError, LabelError
@@ -28,6 +29,7 @@ MOTION = {
 }
 
 
+@checked
 def write_uff(
     path: str | Path,
     frf: FRF,

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 
+from ....arguments import checked
 from ....errors import FileError
 from ....output import atomic
+from ....own_folder import own_folder
 from ..text.deck import Deck
 from ..text.format import card
 from ..text.source_files import Include, Source
@@ -18,6 +20,7 @@ from .rewrite_card import raw_lines, rewritten
 Lines = dict[int, list[str]]  # new lines in place of a line (from 1)
 
 
+@checked
 def write_deck(
     deck: Deck, path: Path | str, changes: Sequence[Change], home: Path | str | None = None
 ) -> Path:
@@ -34,7 +37,8 @@ def write_deck(
     Raises
     ------
     FileError
-        If ``path`` is one of the files the deck was read from.
+        If ``path`` is one of the files the deck was read from, or a link stands where an included
+        file has to go.
     LabelError
         If a change names a card or field that does not exist.
     """
@@ -45,13 +49,15 @@ def write_deck(
     edits, footer = _edits(deck, changes), _footer(deck, changes)
     if len(footer) > sum(len(s.lines) for s in deck.sources):
         footer = _apart(deck, path, final, footer)
-    places = _places(deck, final, set(edits))
-    for k in sorted(places, reverse=True):
-        source = deck.sources[k]
-        new = {**edits.get(k, {}), **_includes(deck, source, places[k], places)}
-        text = _text(source, new, footer if k == 0 else [])
-        target = path.parent / places[k].relative_to(final.parent)
-        atomic(target, lambda part, text=text: part.write_bytes(text))  # type: ignore[misc]
+    places = _places(deck, final, {*edits, *([deck.begins] if footer else [])})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with own_folder(path.parent) as here:
+        for k in sorted(places, reverse=True):
+            source = deck.sources[k]
+            new = {**edits.get(k, {}), **_includes(deck, source, places[k], places)}
+            text = _text(source, new, footer if k == deck.begins else [])
+            target = path.parent / places[k].relative_to(final.parent)
+            atomic(target, lambda part, text=text: part.write_bytes(text), here)  # type: ignore[misc]
     return path
 
 
@@ -122,7 +128,8 @@ def _apart(deck: Deck, path: Path, final: Path, footer: list[str]) -> list[str]:
 
 def _text(source: Source, new: Lines, footer: list[str]) -> bytes:
     """The file's bytes with lines replaced and others added at the end of its bulk data."""
-    end = b"\r\n" if source.lines and source.lines[0].endswith(b"\r\n") else b"\n"
+    first = source.lines[0] if source.lines else b"\n"
+    end = next((e for e in (b"\r\n", b"\r") if first.endswith(e)), b"\n")
     out: list[bytes] = []
     for number, line in enumerate(source.lines, start=1):
         if number == source.bulk[1] + 1:

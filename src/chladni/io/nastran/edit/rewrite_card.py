@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..text import numbers
-from ..text.format import Value, lines
+from ..text.format import Value, free_fields, is_free, lines
 from ..text.table import Cards
 
 _TOLERANCE = 1e-6
@@ -22,7 +22,7 @@ def rewritten(
 
     Where a value loses more than 1e-6 in the columns it has, the whole card takes wide fields.
     """
-    out = [[line.expandtabs(8) if "," not in line[:72] else line] for line in raw]
+    out = [[line if _free(line) else line.expandtabs(8)] for line in raw]
     spans = _spans([line[0] for line in out])
     beyond: dict[int, str] = {}
     for position, value in sorted(changes.items()):
@@ -40,7 +40,7 @@ def rewritten(
 
 
 def _free(line: str) -> bool:
-    return "," in line.split("$")[0][:72]
+    return is_free(line.encode("latin-1"))
 
 
 def _spans(raw: Sequence[str]) -> list[tuple[int, int, int]]:
@@ -52,6 +52,9 @@ def _spans(raw: Sequence[str]) -> list[tuple[int, int, int]]:
         if not large:
             done = -(-done // 8) * 8
         count = 4 if large else 8
+        if _free(line):  # with fields of lines that it goes on for
+            given = len(free_fields(line.encode("latin-1"))) - 1
+            count *= max(-(-given // count), 1)
         out.append((done, done + count, 16 if large else 8))
         done += count
     return out

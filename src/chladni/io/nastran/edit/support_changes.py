@@ -42,7 +42,7 @@ def _permanent(deck: Deck, gone: set[tuple[int, int]]) -> Iterator[Change]:
     for id, word in zip(grid.integers(1).tolist(), grid.words(7).tolist(), strict=True):
         if id not in released:
             continue
-        own = word.decode("latin-1")
+        own = word.decode("latin-1").replace(" ", "")
         left = _left(id, own or usual, gone)
         if left == (own or usual):
             continue
@@ -84,7 +84,7 @@ def _held(cards: Cards, i: int, ids: np.ndarray) -> Iterator[tuple[int, str]]:
     """(id of a point there is, components) of a card."""
     if cards.name == "SPC1":
         for id in sorted(set(id_list(cards, i, 3, ids)) & set(ids.tolist())):
-            yield id, cards.word(i, 2)
+            yield id, cards.word(i, 2).replace(" ", "")
         return
     card = cards.single(i)
     for k in (2, 5):
@@ -93,4 +93,4 @@ def _held(cards: Cards, i: int, ids: np.ndarray) -> Iterator[tuple[int, str]]:
                 raise ModelError(
                     f"SPC {card.integers(1)[0]} prescribes a motion and stays unchanged"
                 )
-            yield int(card.integers(k)[0]), card.words(k + 1)[0].decode("latin-1")
+            yield int(card.integers(k)[0]), card.words(k + 1)[0].decode("latin-1").replace(" ", "")

@@ -11,7 +11,9 @@ from .changed_deck import write_deck
 from .changes import Change
 
 
-def written_assembly(deck: Deck, changes: Sequence[Change], units: Units | None) -> Assembly:
+def written_assembly(
+    deck: Deck, changes: Sequence[Change], units: Units | None, subcase: int | None = None
+) -> Assembly:
     """The assembly of the deck with changes, its numbers rounded as its cards hold them.
 
     Raises
@@ -21,4 +23,4 @@ def written_assembly(deck: Deck, changes: Sequence[Change], units: Units | None)
     """
     with TemporaryDirectory(prefix="chladni-") as folder:
         path = write_deck(deck, Path(folder) / deck.path.name, changes)
-        return assembly(read_deck(path, deck.allowed), units)
+        return assembly(read_deck(path, deck.allowed), units, subcase)

@@ -9,14 +9,25 @@ import numpy as np
 
 from ....model.assembly import Assembly, Scalars, picked
 from ....output import write_text
-from ....units import Units
+from ....units import UNITS, Units
 from ....units import units as unit_system
+from ..text.deck import Deck
 from ..text.format import Card, Value, card, texts
 from . import part_cards, tie_cards
 from .numbering import Ids, Systems
 
 _EXACT = 1e-11  # relative loss at which a card changes to wide fields
 _SHELL = ("CQUAD4", "CTRIA3")
+_UNITS, _CONTROL = "$ units: ", ("SOL 103", "CEND", "ECHO = NONE")
+
+
+def is_written_here(deck: Deck) -> bool:
+    """True for a deck that :func:`write_assembly` wrote, changed since or not: it begins as such.
+
+    Its shells have the drilling field of :mod:`chladni.fem.shell_drilling` unless K6ROT is given.
+    """
+    first, *control = (t.decode("latin-1").rstrip() for t in deck.sources[0].lines[:4])
+    return first.removeprefix(_UNITS) in UNITS and tuple(control) == _CONTROL
 
 
 def write_assembly(
@@ -44,8 +55,8 @@ def write_assembly(
 
 def _head(assembly: Assembly, units: Units, count: int) -> Iterator[str]:
     """Executive and case control, parameters."""
-    yield f"$ units: {units.name}"
-    yield from ("SOL 103", "CEND", "ECHO = NONE", "METHOD = 1")
+    yield _UNITS + units.name
+    yield from (*_CONTROL, "METHOD = 1")
     if len(assembly.supports):
         yield "SPC = 1"
     if tie_cards.has_equations(assembly):

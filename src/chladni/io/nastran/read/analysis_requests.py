@@ -8,13 +8,14 @@ from ..text.deck import Deck
 from ..text.known_cards import FOLLOWS_TEMPERATURE
 from . import excitation, response_frequencies
 from .context import context, parameter
-from .materials import unlike_moduli
-from .shell_elements import second_axes
+from .materials import lone_moduli, unlike_moduli
+from .rigid_elements import partial_bars
+from .shell_elements import second_axes, warped_solids
 from .springs_and_masses import one_sided_inertia
 from .static_loads import loads, motions
-from .supports import missing_sets
+from .supports import selection_notes
 
-_LEFT_OUT = {
+LEFT_OUT = {
     "PLOAD1": "distributed loads on beams", "RFORCE": "centrifugal loads", "TEMP": "temperatures",
     "TEMPD": "temperatures",
     "TLOAD1": "loads in time", "TLOAD2": "loads in time", "ACCEL": "acceleration fields",
@@ -54,7 +55,7 @@ def analysis(deck: Deck, units: Units | str | None = None) -> Analysis:
         damping=excitation.damping(ctx),
         eigen=excitation.eigenvalues(ctx),
         dynamic=excitation.dynamic(ctx, static, moved),
-        notes=(*remarks(deck), *second_axes(ctx)),
+        notes=tuple(remarks(deck)),
     )
 
 
@@ -67,15 +68,20 @@ def _subcases(deck: Deck) -> Iterator[Subcase]:
         yield Subcase(case.id, *chosen, outputs=case.outputs, residual=wanted)
 
 
-def remarks(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
+def remarks(deck: Deck, names: Iterable[str] = LEFT_OUT) -> Iterator[str]:
     """Cards and parameters that are not heeded or contradict others, one sentence each."""
     for name in names:
         for cards in deck.present(name):
-            yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"
+            yield f"{cards.where(0)}: {name} ({LEFT_OUT[name]}) is left out"
     yield from _unheeded(deck)
-    yield from missing_sets(deck)
+    yield from selection_notes(deck)
     yield from one_sided_inertia(deck)
     yield from unlike_moduli(deck)
+    yield from lone_moduli(deck)
+    yield from partial_bars(deck)
+    places = context(deck, None)
+    yield from second_axes(places)
+    yield from warped_solids(places)
 
 
 def _unheeded(deck: Deck) -> Iterator[str]:

@@ -8,6 +8,7 @@ import numpy as np
 from ....errors import FileError
 from ....model.assembly import Assembly
 from ....units import Units
+from ..export.whole_deck import is_written_here
 from ..text.deck import Deck
 from . import springs_and_masses
 from .beam_elements import beams
@@ -18,9 +19,15 @@ from .sections import Parts
 from .shell_elements import filled_thickness, shells, solids
 from .supports import selected, supports
 
-_ELEMENTS = """CQUAD4 CQUADR CQUAD1 CQUAD2 CTRIA3 CTRIAR CTRIA1 CTRIA2 CHEXA CPENTA CTETRA CBAR
-    CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CDAMP1 CDAMP2 CDAMP3 CDAMP4 CMASS1 CMASS2
-    CMASS3 CMASS4 CVISC CBUSH""".split()
+_STIFF = """CQUAD4 CQUADR CQUAD1 CQUAD2 CTRIA3 CTRIAR CTRIA1 CTRIA2 CHEXA CPENTA CTETRA CBAR
+    CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH""".split()
+_ELEMENTS = (  # those of one kind have no id in common
+    _STIFF,
+    "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),
+    "CMASS1 CMASS2 CMASS3 CMASS4".split(),
+    ["CONM1", "CONM2"],
+)
+_K6ROT = 100.0
 
 
 def assembly(
@@ -42,7 +49,7 @@ def assembly(
     ctx = context(deck, units)
     if not len(ctx.ids):
         raise FileError(f"{deck.path}: there is no GRID, so there is no model")
-    for names in (_ELEMENTS, ("CONM1", "CONM2")):
+    for names in _ELEMENTS:
         _unique_elements(deck, names)
     made = _made(ctx, subcase)
     if not loose:
@@ -81,17 +88,24 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
 
 
 def _k6rot(deck: Deck) -> float | None:
-    """PARAM,K6ROT; None where it is not given, or for CQUADR and CTRIAR, which do not heed it."""
-    if parameter(deck, "K6ROT") in ("", "AUTO") or any(deck.present("CQUADR", "CTRIAR")):
+    """PARAM,K6ROT, 100 where a deck is silent (MSC Nastran's default since 2004).
+
+    None, the drilling field, stands for AUTO, for CQUADR and CTRIAR, which do not heed the
+    parameter, and for decks that were written here without it.
+    """
+    text = parameter(deck, "K6ROT")
+    if text == "AUTO" or any(deck.present("CQUADR", "CTRIAR")):
         return None
-    value = real_parameter(deck, "K6ROT", 0.0)
+    if not text and is_written_here(deck):
+        return None
+    value = real_parameter(deck, "K6ROT", _K6ROT)
     if value < 0:
         raise FileError(f"{deck.path}: PARAM,K6ROT is {value:g}; a stiffness cannot be negative")
     return value
 
 
 def _unique_elements(deck: Deck, names: Sequence[str]) -> None:
-    """An element's id is its own among all elements."""
+    """An element's id is its own among those of its kind; solvers run decks with no more."""
     tables = list(deck.present(*names))
     if not tables:
         return

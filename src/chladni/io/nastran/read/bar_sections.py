@@ -25,6 +25,8 @@ def _section(
     """A section from (A, I1, I2, I12, J) in the deck's units; MID is field 2."""
     A, I1, I2, I12, J = values
     refuse_impossible(card, 0, values)
+    if min(shear) < 0:
+        raise card.refuse(0, f"K1 {shear[0]:g} and K2 {shear[1]:g} cannot be negative")
     L = ctx.scale.length
     return BeamSection(
         materials.isotropic(card, 0, int(card.integers(2)[0])),

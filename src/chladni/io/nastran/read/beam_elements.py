@@ -6,7 +6,7 @@ from ....model.assembly import Beams, concatenated
 from ....model.properties import BeamSection, Part
 from ..text.table import Cards
 from .bar_sections import refuse_impossible
-from .context import Context, digits
+from .context import Context, digits, only_one
 from .sections import Parts
 
 _FAMILY = {"CBAR": "bar", "CBEAM": "beam", "CROD": "rod", "CTUBE": "tube"}
@@ -70,10 +70,13 @@ def _conrods(ctx: Context, parts: Parts, cards: Cards) -> Beams:
     return _straight(ctx, cards, nodes, part)
 
 
+def _default_card(ctx: Context, cards: Cards) -> Cards:
+    return only_one(ctx.deck, "BAROR" if cards.name == "CBAR" else "BEAMOR")
+
+
 def _defaults(ctx: Context, cards: Cards, k: int) -> bytes:
     """Text of field k on BAROR or BEAMOR."""
-    name = "BAROR" if cards.name == "CBAR" else "BEAMOR"
-    found = ctx.deck[name]
+    found = _default_card(ctx, cards)
     return bytes(found.words(k)[0]) if len(found) else b""
 
 
@@ -113,14 +116,14 @@ def _up(ctx: Context, cards: Cards, nodes: np.ndarray, flags: list[str]) -> np.n
     usual = [_defaults(ctx, cards, k) for k in (5, 6, 7)]
     if np.any(blank) and not any(usual):
         raise cards.refuse(int(np.argmax(blank)), "its orientation vector (or G0) is missing")
-    words = np.where(blank, usual[0], words)
-    grid = np.array([w.isdigit() for w in words.tolist()], bool) & (cards.words(6) == b"")
-    grid &= cards.words(7) == b""
+    words, *others = (np.where(blank, w, cards.words(k)) for k, w in enumerate(usual, start=5))
+    grid = np.array([w.isdigit() for w in words.tolist()], bool)
+    grid &= np.all([w == b"" for w in others], axis=0)
     up = np.zeros((len(cards), 3))
     given = ~grid & ~blank
     up[given] = cards.take(given).block(5, 3, 0.0)
     if np.any(blank & ~grid):
-        up[blank & ~grid] = [float(w or 0) for w in usual]
+        up[blank & ~grid] = _default_card(ctx, cards).block(5, 3, 0.0)[0]
     basic = np.array([f[0] == "B" for f in flags])
     up = np.where(basic[:, None], up, ctx.basic(nodes[:, 0], up))
     for i in np.flatnonzero(grid):

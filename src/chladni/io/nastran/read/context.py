@@ -1,5 +1,6 @@
 """What every converter needs: unit factors, grids by row, coordinate systems."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -112,9 +113,18 @@ def units_of(deck: Deck, units: Units | str | None) -> Units:
 def context(deck: Deck, units: Units | str | None) -> Context:
     """Points and factors of a deck; without units its numbers are kept."""
     scale = units_of(deck, units)
-    default = deck["GRDSET"]
+    default = only_one(deck, "GRDSET")
     cp, cd = (int(default.integers(k, 0)[0]) if len(default) else 0 for k in (2, 6))
     return _points(deck, scale, Frames(deck, cp), cp, cd)
+
+
+def only_one(deck: Deck, name: str) -> Cards:
+    """The card of a name of which a deck has one at most."""
+    cards = deck[name]
+    if len(cards) > 1:
+        first = cards.where(0)
+        raise FileError(f"{cards.where(1)}: a second {name}; a deck has one, which is at {first}")
+    return cards
 
 
 def _points(deck: Deck, scale: Units, frames: Frames, cp: int, cd: int) -> Context:
@@ -199,6 +209,8 @@ def id_list(cards: Cards, i: int, first: int, among: np.ndarray | None = None) -
     while k < len(words):
         if words[k] in ("THRU", "TO") and out and k + 1 < len(words):
             step, last = 1, _whole(cards, i, words[k + 1])
+            if last < out[-1]:
+                raise cards.refuse(i, f"{out[-1]} {words[k]} {last} runs backwards")
             if k + 3 < len(words) and words[k + 2] == "BY":
                 step = max(_whole(cards, i, words[k + 3]), 1)
                 k += 2
@@ -228,13 +240,14 @@ def _run(cards: Cards, i: int, ids: range, among: np.ndarray | None) -> list[int
 
 
 def _whole(cards: Cards, i: int, word: str) -> int:
-    if not word.lstrip("+-").isdecimal() or len(word) > 12:
+    if not re.fullmatch(r"[+-]?[0-9]{1,11}", word):
         raise cards.refuse(i, f"{word!r} is not an integer")
     return int(word)
 
 
 def digits(cards: Cards, i: int, word: str, what: str = "component") -> tuple[int, ...]:
-    """Components 1-6 packed in one integer, "123" -> (1, 2, 3); "0" or blank: none."""
+    """Components 1-6 packed in one integer, "123" or "12 3" -> (1, 2, 3); "0" or blank: none."""
+    word = word.replace(" ", "")
     if word in ("", "0"):
         return ()
     if set(word) - set("123456") or len(set(word)) < len(word):

@@ -91,7 +91,7 @@ def _table(
     word = cards.word(i, k)
     if not word or word == "0":
         return None
-    if not word.isdigit():
+    if not word.isdecimal():
         return Tabulated(np.zeros(1), np.array([cards.real(i, k)]))
     if int(word) not in tables:
         there = ", ".join(map(str, sorted(tables)[:8])) or "none"
@@ -106,7 +106,7 @@ def _per_dof(
     out, word = np.zeros(len(rows)), cards.word(i, k)
     if not word or word == "0":
         return out
-    if not word.isdigit():
+    if not word.isdecimal():
         return out + cards.real(i, k)
     known = {(r, c): v for r, c, v in _triples(ctx, ctx.deck[name], int(word))}
     return np.array(

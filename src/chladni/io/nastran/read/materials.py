@@ -51,6 +51,28 @@ class Materials:
             self._made[id] = _MAKERS[cards.name](cards.single(k), self._scale)
         return self._made[id]
 
+    def sheet(self, asker: Cards, i: int, id: int) -> Material:
+        """A material for shells, whose plane stiffness needs |ν| < 1."""
+        found = self.get(asker, i, id)
+        if isinstance(found, Isotropic):
+            self._refuse_ratio(asker, i, found, 1.0, "shells")
+        return found
+
+    def solid(self, asker: Cards, i: int, id: int) -> Isotropic:
+        """A material for solids, which take MAT1 with -1 < ν < 0.5."""
+        found = self.isotropic(asker, i, id)
+        self._refuse_ratio(asker, i, found, 0.5, "solids")
+        return found
+
+    def _refuse_ratio(
+        self, asker: Cards, i: int, found: Isotropic, most: float, users: str
+    ) -> None:
+        """Refuse a Poisson's ratio at which the stiffness is infinite or negative."""
+        if not -1 < found.nu < most:
+            cards, k = self._cards[found.id]
+            where = f"NU {found.nu:g} of material {found.id} ({cards.where(k)})"
+            raise asker.refuse(i, f"{where} is not between -1 and {most:g}, as {users} need")
+
     def isotropic(self, asker: Cards, i: int, id: int) -> Isotropic:
         """The same, for beams and rods, which take MAT1 only."""
         found = self.get(asker, i, id)
@@ -67,16 +89,20 @@ def _density(card: Cards, k: int, scale: Units) -> float:
 
 
 def _isotropic(card: Cards, scale: Units) -> Isotropic:
-    """MAT1: whichever of E, G, ν is blank follows from E = 2 (1 + ν) G."""
+    """MAT1: whichever of E, G, ν is blank follows from E = 2 (1 + ν) G.
+
+    E or G alone leaves the other and ν at zero (MSC Nastran Quick Reference, MAT1).
+    """
     E, G, nu = (float(card.reals(k, np.nan)[0]) for k in (2, 3, 4))
     if np.isnan(E) and np.isnan(G):
         raise card.refuse(0, "neither E nor G is given")
     given = not np.isnan(G)
     if np.isnan(E):
-        nu = 0.0 if np.isnan(nu) else nu
-        E = 2 * (1 + nu) * G
+        E, nu = (0.0, 0.0) if np.isnan(nu) else (2 * (1 + nu) * G, nu)
     elif np.isnan(nu):
-        nu, G, given = (E / (2 * G) - 1, G, True) if given and G else (0.0, 0.0, True)
+        nu, G, given = (
+            (E / (2 * G) - 1, G, True) if given and E and G else (0.0, G if given else 0.0, True)
+        )
     if E < 0 or (given and G < 0):
         raise card.refuse(0, f"E {E:g} and G {G:g} cannot be negative")
     if not -1 < nu <= 0.5 and not given:
@@ -110,11 +136,24 @@ def unlike_moduli(deck: Deck) -> Iterator[str]:
             )
 
 
+def lone_moduli(deck: Deck) -> Iterator[str]:
+    """MAT1 with E alone or G alone: the other two are zero (Quick Reference, MAT1)."""
+    for cards in deck.present("MAT1"):
+        E, G, nu = (cards.words(k) != b"" for k in (2, 3, 4))
+        for i in np.flatnonzero(~nu & (E != G)):
+            alone, other = "EG" if E[i] else "GE"
+            yield (
+                f"{cards.where(int(i))}: MAT1 {cards.integers(1)[i]} has {alone} alone, so "
+                f"{other} and NU are 0, as in Nastran"
+            )
+
+
 def _orthotropic(card: Cards, scale: Units) -> Orthotropic:
     """MAT8."""
     E1, E2 = card.block(2, 2)[0]
     nu12, G12, G1z, G2z = card.block(4, 4, 0.0)[0]
-    if not (E1 > 0 and E2 > 0 and G12 > 0):  # a blank G12 is 0
+    none = G12 == 0 and card.words(5)[0] != b""  # written as such; a blank is an omission
+    if not (E1 > 0 and E2 > 0 and (G12 > 0 or none)):
         raise card.refuse(0, f"E1 {E1:g}, E2 {E2:g} and G12 {G12:g} are to be positive")
     if nu12**2 * E2 >= E1:
         raise card.refuse(0, f"NU12 {nu12:g} is too large for E1/E2 {E1 / E2:g}")

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....model.assembly import Average, Equation, RigidBody
+from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context, digits, id_list
 from .springs_and_masses import skew
@@ -126,13 +127,18 @@ def _moved(ctx: Context, cards: Cards, i: int, words: list[str]) -> Iterator[Dof
 
 
 def _rbar(ctx: Context, cards: Cards, i: int) -> Iterator[Tie]:
-    """RBAR: EID GA GB CNA CNB CMA CMB; one end leads, or the leading dofs are shared."""
+    """RBAR: EID GA GB CNA CNB CMA CMB; one end leads, or the leading dofs are shared.
+
+    CNA is 123456 where both are blank (MSC Nastran Quick Reference, RBAR, Lagrange method). Fewer
+    than six components lead their own like at the other end only, see :func:`partial_bars`.
+    """
     a, b = (ctx.row(cards, i, cards.integer(i, k)) for k in (2, 3))
-    cna, cnb, cma, cmb = (digits(cards, i, cards.word(i, k)) for k in (4, 5, 6, 7))
-    if len(cna) + len(cnb) != 6:
-        raise cards.refuse(i, "CNA and CNB are to hold six components together")
+    cna, cnb, cma, cmb = _bar_components(cards, i)
+    if len(cna) + len(cnb) > 6:
+        raise cards.refuse(i, "CNA and CNB hold more than six components together")
     if not cma and not cmb:
-        cma, cmb = _rest(cna), _rest(cnb)
+        few = len(cna) + len(cnb) < 6
+        cma, cmb = (cnb, cna) if few else (_rest(cna), _rest(cnb))
     if cna == _ALL and not cma:
         yield _body(ctx, cards, i, a, [int(ctx.ids[b])], cmb)
     elif cnb == _ALL and not cmb:
@@ -140,7 +146,30 @@ def _rbar(ctx: Context, cards: Cards, i: int) -> Iterator[Tie]:
     else:
         lead = [(a, c) for c in cna] + [(b, c) for c in cnb]
         follow = [(a, c) for c in cma] + [(b, c) for c in cmb]
-        yield from _general(ctx, cards, i, lead, follow)
+        yield from _general(ctx, cards, i, lead, follow, least=1)
+
+
+def _bar_components(cards: Cards, i: int) -> tuple[tuple[int, ...], ...]:
+    """CNA, CNB, CMA, CMB of an RBAR."""
+    cna, cnb, cma, cmb = (digits(cards, i, cards.word(i, k)) for k in (4, 5, 6, 7))
+    return (cna if cna or cnb else _ALL), cnb, cma, cmb
+
+
+def partial_bars(deck: Deck) -> Iterator[str]:
+    """RBAR of fewer than six leading components, in one sentence.
+
+    MSC's manual asks for six. A solver that computes a bar between solids with CNA = 123 alone
+    gives both ends the same translations and no rotations.
+    """
+    for cards in deck.present("RBAR"):
+        few = [i for i in range(len(cards)) if len(sum(_bar_components(cards, i)[:2], ())) < 6]
+        if few:
+            more = f" and {len(few) - 1} others have" if few[1:] else " has"
+            yield (
+                f"{cards.where(few[0])}: RBAR {cards.integer(few[0], 1)}{more} fewer than six "
+                "components in CNA and CNB: the other end moves equally in these components, the "
+                "rest is not tied"
+            )
 
 
 def _rtrplt(ctx: Context, cards: Cards, i: int) -> Iterator[Tie]:
@@ -227,10 +256,10 @@ def _motion(ctx: Context, dofs: list[Dof], about: np.ndarray) -> np.ndarray:
 
 
 def _general(
-    ctx: Context, cards: Cards, i: int, lead: list[Dof], follow: list[Dof]
+    ctx: Context, cards: Cards, i: int, lead: list[Dof], follow: list[Dof], least: int = 6
 ) -> Iterator[Equation]:
-    """q_m = R_m R_n⁻¹ q_n: one equation a dependent dof."""
-    if len(lead) != 6 or not follow:
+    """q_m = R_m R_n⁺ q_n: one equation a dependent dof; R_n⁺ is the inverse of six rows."""
+    if not least <= len(lead) <= 6 or not follow:
         raise cards.refuse(i, f"{len(lead)} independent components are given, six are needed")
     about = ctx.places[lead[0][0]]
     span = float(np.abs(ctx.places[[r for r, _ in lead + follow]] - about).max()) or 1.0
@@ -238,7 +267,7 @@ def _general(
     Rn, Rm = (_motion(ctx, dofs, about) * unit for dofs in (lead, follow))
     if np.linalg.cond(Rn) > 1e8:
         raise cards.refuse(i, "the six independent components leave a rigid motion free")
-    factors = Rm @ np.linalg.inv(Rn)
+    factors = Rm @ np.linalg.pinv(Rn)
     id, L = cards.integer(i, 1), ctx.scale.length
     for (row, comp), line in zip(follow, factors, strict=True):
         terms = [(row, comp, -1.0)] + [

@@ -106,7 +106,7 @@ def _pshell(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
     mids = [int(card.integers(k, 0)[0]) for k in (2, 4, 6, 11)]
     if mids[1] == -1:
         raise card.refuse(0, "MID2 is -1: plane strain is not supported")
-    found = [materials.get(card, 0, m) if m > 0 else None for m in mids]
+    found = [materials.sheet(card, 0, m) if m > 0 else None for m in mids]
     if found[0] is None and found[1] is None:
         raise card.refuse(0, "neither MID1 nor MID2 is given")
     blank = card.words(3)[0] == b""
@@ -141,7 +141,7 @@ def _plies(ctx: Context, materials: Materials, card: Cards) -> list[Ply]:
         if not t > 0:
             raise card.refuse(0, f"the thickness of layer {len(plies) + 1} is {t:g}")
         angle = float(card.reals(k + 2, 0.0)[0])
-        plies.append(Ply(materials.get(card, 0, mid), t * ctx.scale.length, angle))
+        plies.append(Ply(materials.sheet(card, 0, mid), t * ctx.scale.length, angle))
     if not plies:
         raise card.refuse(0, "the laminate has no layers")
     return plies + plies[::-1] if fields[7:8] in (["SYM"], ["SYMEM"]) else plies
@@ -181,14 +181,14 @@ def _psolid(ctx: Context, materials: Materials, card: Cards, _: int) -> SolidSec
     """PSOLID; ISOP FULL is plain 2x2x2 integration."""
     if card.words(7)[0] in (b"PFLUID", b"FFLUID"):
         raise card.refuse(0, "fluid elements are not supported")
-    material = materials.isotropic(card, 0, int(card.integers(2)[0]))
+    material = materials.solid(card, 0, int(card.integers(2)[0]))
     return SolidSection(material, bool(card.words(6)[0] in (b"FULL", b"1")))
 
 
 def _pquad1(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSection:
     """COSMIC PQUAD1, PTRIA1: membrane MID1, T1; bending MID2, I; shear MID3, T3; NSM."""
     mids = [int(card.integers(k, 0)[0]) for k in (2, 4, 6)]
-    found = [materials.get(card, 0, m) if m > 0 else None for m in mids]
+    found = [materials.sheet(card, 0, m) if m > 0 else None for m in mids]
     inertia, t3 = (float(card.reals(k, 0.0)[0]) for k in (5, 7))
     t = float(card.reals(3, 0.0)[0]) or (12 * inertia) ** (1 / 3)
     if not t > 0:
@@ -208,7 +208,7 @@ def _pquad1(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
 
 def _pquad2(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSection:
     """COSMIC PQUAD2, PTRIA2: homogeneous, MID, T, NSM."""
-    material = materials.get(card, 0, int(card.integers(2)[0]))
+    material = materials.sheet(card, 0, int(card.integers(2)[0]))
     return ShellSection(
         _positive(card, 3, "thickness") * ctx.scale.length,
         material,

@@ -1,9 +1,12 @@
 """Shell elements: corners, thickness, material direction, offset."""
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
 
+from ....geometry.solid_faces import least_warp_cosine
+from ....geometry.solid_shapes import jacobians
 from ....model.assembly import Shells, Solids, concatenated
 from ....model.properties import ShellSection
 from ..text.table import Cards
@@ -11,7 +14,9 @@ from .context import Context
 from .sections import Parts
 
 _QUADS = ("CQUAD4", "CQUADR", "CQUAD1", "CQUAD2")
+_WHOLE = re.compile(rb"[+-]?[0-9]+")
 _TRIANGLES = ("CTRIA3", "CTRIAR", "CTRIA1", "CTRIA2")
+_ORDER = "check the order and place of its grids"
 NORMAL = 1e-6  # length of what is left of a unit vector laid on an element: it stands normal to it
 
 
@@ -48,7 +53,7 @@ def _made(
     X = ctx.places[nodes]
     corners = 3 if cards.name in _TRIANGLES else 4
     normal = _normals(ctx, cards, nodes[:, :corners])
-    pid = cards.properties(None)
+    pid = cards.properties()
     part = parts.of("shell", cards, pid)
     offset = np.zeros(len(cards)) if zoffs is None else cards.reals(zoffs, 0.0) * ctx.scale.length
     return Shells(
@@ -79,7 +84,14 @@ def _normals(ctx: Context, cards: Cards, corners: np.ndarray) -> np.ndarray:
     if np.any(flat):
         i = int(np.argmax(flat))
         raise cards.refuse(i, f"its area is zero; grids {ctx.ids[corners[i]].tolist()}")
-    return normal / size[:, None]
+    normal /= size[:, None]
+    before, after = X - np.roll(X, 1, axis=1), np.roll(X, -1, axis=1) - X
+    turn = np.einsum("nki,ni->nk", np.cross(before, after), normal)
+    if np.any(bad := ~(turn > 0).all(axis=1)):
+        i = int(np.argmax(bad))
+        at = ctx.ids[corners[i, int(np.argmin(turn[i]))]]
+        raise cards.refuse(i, f"its inner angle at grid {at} is 180 degrees or more; {_ORDER}")
+    return normal
 
 
 def _thickness(
@@ -97,10 +109,9 @@ def _thickness(
     t = np.where(np.isnan(own), nominal[:, None], own)
     if np.any(bad := ~(t.mean(axis=1) > 0) | (t < 0).any(axis=1)):
         i = int(np.argmax(bad))
-        missing = np.isnan(t[i]).any()
-        why = (
-            "neither it nor its property gives a thickness" if missing else "its thickness is zero"
-        )
+        why = "its thickness is negative" if (t[i] < 0).any() else "its thickness is zero"
+        if np.isnan(t[i]).any():
+            why = "neither it nor its property gives a thickness"
         raise cards.refuse(i, why)
     return t if corners == 4 else t[:, [0, 1, 2, 2]]
 
@@ -132,7 +143,14 @@ def _axis(ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int)
 
 def _by_system(cards: Cards, k: int) -> np.ndarray:
     """(n,) bool, True where field k is an integer: MCID, not THETA."""
-    return np.array([w.isdigit() for w in cards.words(k).tolist()], bool)
+    words = cards.words(k).tolist()
+    whole = np.array([bool(_WHOLE.fullmatch(w)) for w in words], bool)
+    for i in np.flatnonzero(whole):
+        if words[i].startswith(b"-"):
+            said = words[i].decode("latin-1")
+            why = f"is the integer {said}, so a coordinate system, and none has a negative number"
+            raise cards.refuse(int(i), f"{cards.field_name(k)} {why}; an angle is {said}.")
+    return whole
 
 
 def _from_systems(
@@ -211,48 +229,43 @@ def solids(ctx: Context, parts: Parts) -> tuple[Solids, ...]:
 
 
 def _check_solid(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
-    """Refuse a node named twice and a body without volume."""
+    """Refuse a node named twice, a body without volume, and det J <= 0 at a point of integration.
+
+    Solvers stop there; a body that is merely distorted is computed, see :func:`warped_solids`.
+    """
     same = (np.diff(np.sort(nodes, axis=1), axis=1) == 0).any(axis=1)
     if np.any(same):
         i = int(np.argmax(same))
         raise cards.refuse(i, f"a node is named twice, grids {ctx.ids[nodes[i]].tolist()}")
     X = ctx.places[nodes]
-    span = np.ptp(X, axis=1).max(axis=1)
-    spread = X - X.mean(axis=1)[:, None]
-    thin = np.linalg.svd(spread, compute_uv=False)[:, 2]
-    if np.any(bad := ~(thin > 1e-9 * span)):
+    dV = jacobians(X)
+    size = np.abs(dV).max(axis=1)
+    if np.any(bad := ~(size > _NO_VOLUME * np.ptp(X, axis=1).max(axis=1) ** 3)):
         i = int(np.argmax(bad))
         raise cards.refuse(i, f"its volume is zero; grids {ctx.ids[nodes[i]].tolist()}")
-    for order in _LAYERS.get(cards.name, ()):
-        _refuse_turned(ctx, cards, nodes[:, order])
+    least = (dV * np.sign(dV.sum(axis=1))[:, None]).min(axis=1)
+    if np.any(bad := ~(least > _NO_VOLUME * size)):
+        i = int(np.argmax(bad))
+        raise cards.refuse(
+            i,
+            "it turns inside out: det J vanishes or changes its sign from one point of integration "
+            f"to another; check the order and place of grids {ctx.ids[nodes[i]].tolist()}",
+        )
 
 
-_LAYERS = {  # corners of a face, then those that follow them on the opposite one
-    "CHEXA": ((0, 1, 2, 3, 4, 5, 6, 7), (0, 3, 7, 4, 1, 2, 6, 5), (0, 1, 5, 4, 3, 2, 6, 7)),
-    "CPENTA": ((0, 1, 2, 3, 4, 5),),
-}
+_NO_VOLUME = 1e-12  # det J over the cube of the size, or over the largest det J: rounding
+_WARPED = 0.707  # HEX_WARP of Nastran's GEOMCHECK, 45 degrees
 
 
-def _refuse_turned(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
-    """Refuse a face whose corners follow those of the opposite one better in a turned order.
-
-    Corners a_i, b_i are compared where the element's mean J is the unit. Their order k is the one
-    of largest Σ a_i·b_(i+k). It is k = 0 for a parallelepiped and for what is near to one.
-    """
-    X, m = ctx.places[nodes], nodes.shape[1] // 2
-    round_ = 2 * np.pi * np.arange(m) / m
-    face = np.stack([np.cos(round_), np.sin(round_)], axis=1)
-    parent = np.block([[face, -np.ones((m, 1))], [face, np.ones((m, 1))]])
-    J = np.linalg.pinv(parent) @ (X - X.mean(axis=1)[:, None])
-    size = np.linalg.norm(J, axis=2).prod(axis=1)
-    if np.any(flat := ~(np.abs(np.linalg.det(J)) > 1e-12 * size)):
-        i = int(np.argmax(flat))
-        raise cards.refuse(i, f"it has no volume at its centre; grids {ctx.ids[nodes[i]].tolist()}")
-    a, b = (Y - Y.mean(axis=1)[:, None] for Y in np.split(X @ np.linalg.inv(J), 2, axis=1))
-    fit = np.stack([np.einsum("nij,nij->n", a, np.roll(b, -k, axis=1)) for k in range(m)])
-    if np.any(turned := fit.argmax(axis=0) > 0):
-        i = int(np.argmax(turned))
-        here, there = ctx.ids[nodes[i, :m]].tolist(), ctx.ids[nodes[i, m:]]
-        due = np.roll(there, -int(fit[:, i].argmax())).tolist()
-        why = f"its face {there.tolist()} is turned against the face {here}; in order it is {due}"
-        raise cards.refuse(i, why)
+def warped_solids(ctx: Context) -> Iterator[str]:
+    """Solids with a face warped by more than 45 degrees, one sentence a kind of card."""
+    for name in ("CHEXA", "CPENTA"):
+        for cards in ctx.deck.present(name):
+            X = ctx.places[ctx.rows(cards, cards.ids(3, _SOLIDS[name]))]
+            if len(found := np.flatnonzero(least_warp_cosine(X) < _WARPED)):
+                i, more = int(found[0]), len(found) - 1
+                others = f" and {more} others have" if more else " has"
+                yield (
+                    f"{cards.where(i)}: {name} {cards.integers(1)[i]}{others} a face warped by "
+                    "more than 45 degrees; check the order of the grids"
+                )

@@ -315,7 +315,7 @@ def _bush_frame(
         along = np.zeros(3)
     v = _direction(ctx, cards, i, nodes[0], words)
     if not np.any(along):
-        if v is None or words[0].isdigit():
+        if v is None or words[0].isdecimal():
             if np.ptp(used[:3]) == 0 and np.ptp(used[3:]) == 0:
                 return np.eye(3)  # the same in every frame
             raise cards.refuse(i, "its ends coincide, so it needs a coordinate system CID")
@@ -337,7 +337,7 @@ def _direction(
     """Orientation vector of a bush in the basic frame; None where none is given."""
     if not any(words[:3]):
         return None
-    if words[0].isdigit() and not words[1] and not words[2]:
+    if words[0].isdecimal() and not words[1] and not words[2]:
         return ctx.places[ctx.row(cards, i, int(words[0]))] - ctx.places[node]
     return cards.single(i).block(5, 3, 0.0)[0] @ ctx.frame_at(node)
 
@@ -363,7 +363,7 @@ def _cvisc(ctx: Context, cards: Cards) -> Bushes:
     nodes = ctx.rows(cards, cards.ids(3, 2))
     X, s, n = ctx.places[nodes], ctx.scale, len(cards)
     viscous, frames = np.zeros((n, 6)), np.zeros((n, 3, 3))
-    for i, pid in enumerate(cards.integers(2).tolist()):
+    for i, pid in enumerate(cards.properties().tolist()):
         if pid not in known:
             raise cards.refuse(i, f"there is no PVISC {pid}")
         viscous[i, [0, 3]] = rates[known[pid]]

@@ -5,7 +5,7 @@ from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
 
-from ....errors import FileError
+from ....errors import FileError, named
 from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context, digits, id_list
@@ -65,9 +65,12 @@ def _additions(deck: Deck, kind: str) -> dict[int, list[int]]:
     """
     cards = deck[f"{kind}ADD"]
     added = {int(s): id_list(cards, i, 2) for i, s in enumerate(cards.unique())}
-    for i, parts in enumerate(added.values()):
+    there = _sets(deck, kind) if len(cards) else set()
+    for i, (s, parts) in enumerate(added.items()):
         if not parts:
             raise cards.refuse(i, "it joins no sets")
+        if s in there:  # the cards of this number are joined in any case
+            added[s] = [part for part in parts if part != s]
     try:
         TopologicalSorter(added).prepare()
     except CycleError as error:
@@ -87,7 +90,9 @@ def _tops(deck: Deck, kind: str, there: set[int]) -> list[int]:
 def _resolved(deck: Deck, kind: str, chosen: int, there: set[int]) -> tuple[int, ...]:
     """The plain sets behind a number."""
     added = _additions(deck, kind)
-    known = f"there are {', '.join(map(str, sorted(there | set(added)))) or 'none'}"
+    if not there | set(added):
+        return ()  # with a note of selection_notes
+    known = f"there are {', '.join(map(str, sorted(there | set(added))))}"
     if chosen not in there | set(added):
         raise FileError(
             f"{deck.path}: {kind} set {chosen} is selected but there is no such set; {known}"
@@ -103,7 +108,25 @@ def _resolved(deck: Deck, kind: str, chosen: int, there: set[int]) -> tuple[int,
     return found
 
 
-def missing_sets(deck: Deck) -> Iterator[str]:
+def selection_notes(deck: Deck) -> Iterator[str]:
+    """Sets that are selected and of which there is no card; subcases that select others."""
+    for kind in ("SPC", "MPC"):
+        every = deck.case.subcases
+        cases = [c for c in every if c.get("METHOD")] or [c for c in every if c.get(kind)]
+        chosen = list(dict.fromkeys(c.get(kind) for c in cases))
+        if any(chosen) and not _sets(deck, kind) and not len(deck[f"{kind}ADD"]):
+            said = f"{kind} = {max(chosen)} selects nothing"
+            yield f"{deck.path}: {said}, because there is no {kind} card"
+        elif len(chosen) > 1:
+            ids, sets = ([str(x) for x in found] for found in ((c.id for c in cases), chosen))
+            yield (
+                f"{deck.path}: subcases {named(ids)} select {kind} sets {named(sets)}; "
+                f"subcase {ids[0]} is taken unless another is chosen"
+            )
+    yield from _missing_sets(deck)
+
+
+def _missing_sets(deck: Deck) -> Iterator[str]:
     """SPCADD and MPCADD that name a set the deck does not have, one sentence a card."""
     for kind in ("SPC", "MPC"):
         cards, added = deck[f"{kind}ADD"], _additions(deck, kind)

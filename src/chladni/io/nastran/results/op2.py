@@ -1,15 +1,24 @@
 """OP2 and OP4 files, by way of pyYeti where it is installed."""
 
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ....errors import FileError
+from ...damage import DAMAGED
 from ...file_size import refuse_large
 from .punch import PunchModes
+
+T = TypeVar("T")
+_TABLES = ("OUGV1", "OUG1", "BOPHIG")  # in the deck's displacement frames
+_WORD = 4  # bytes of a word of these tables
+_OTHERWISE = (
+    "give the modes as a punch file (DISPLACEMENT(PUNCH) = ALL) or a universal file (dataset 55)"
+)
 
 
 def read_op2_modes(path: Path | str) -> PunchModes:
@@ -20,14 +29,15 @@ def read_op2_modes(path: Path | str) -> PunchModes:
     FileError
         If pyYeti is absent, or the file holds no eigenvectors it can read.
     """
-    tables = (_read(path, "op2").get("mats") or {}).get("ougv1") or []
-    modal = [t for t in tables if t is not None and "lambda" in t]
+    modal = _read(path, "op2", _eigenvectors)
     if not modal:
-        raise FileError(f"{path} has no eigenvectors (OUGV1)")
+        raise FileError(
+            f"{path} has no real eigenvectors (tables {', '.join(_TABLES)}); {_OTHERWISE}"
+        )
     dofs, phi = np.asarray(modal[0]["dof"], np.int64), np.asarray(modal[0]["ougv1"])
     ids, row = np.unique(dofs[:, 0], return_inverse=True)
     shapes = np.full((len(ids), 6, phi.shape[1]), np.nan)
-    shapes[row, np.maximum(dofs[:, 1], 1) - 1] = phi.real
+    shapes[row, np.maximum(dofs[:, 1], 1) - 1] = phi
     return PunchModes(np.sqrt(np.maximum(modal[0]["lambda"], 0)) / (2 * np.pi), ids, shapes)
 
 
@@ -39,7 +49,8 @@ def read_op4(path: Path | str) -> dict[str, np.ndarray]:
     FileError
         If pyYeti is absent or cannot read the file.
     """
-    return {str(name): np.asarray(matrix) for name, matrix in _read(path, "op4").items()}
+    held = _read(path, "op4", lambda module, at: module.read(str(at), sparse=False))
+    return {str(name): np.asarray(matrix) for name, matrix in held.items()}
 
 
 def _module(name: str) -> ModuleType:
@@ -55,7 +66,21 @@ def _module(name: str) -> ModuleType:
     return module  # type: ignore[no-any-return]
 
 
-def _read(path: Path | str, kind: str) -> dict[str, Any]:
+def _eigenvectors(module: ModuleType, path: Path | str) -> list[dict[str, Any]]:
+    """Tables of real eigenvectors alone: tables that other programs write differently stay shut."""
+    found = []
+    with module.OP2(str(path)) as file:
+        for name, blocks in file.directory(verbose=False).items():
+            for block in blocks if name.startswith(_TABLES) else ():
+                if file._ibytes != _WORD:
+                    raise ValueError("its words have 64 bits")
+                file._fileh.seek(block.start)
+                file.rdop2nt()
+                found.append(file._rdop2ougv1(name))
+    return [table for table in found if table is not None]
+
+
+def _read(path: Path | str, kind: str, read: Callable[[ModuleType, Path | str], T]) -> T:
     if found := Path(path).is_file():
         refuse_large(Path(path))
     module = _module(kind)
@@ -64,11 +89,10 @@ def _read(path: Path | str, kind: str) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library's own making
         try:
-            if kind == "op2":
-                return dict(module.rdpostop2(str(path), getougv1=True))
-            return dict(module.read(str(path), sparse=False))
-        except (ValueError, KeyError, IndexError, RuntimeError, OSError, TypeError) as error:
+            return read(module, path)
+        except (*DAMAGED, UnicodeDecodeError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
+            way = f"; {_OTHERWISE}" if kind == "op2" else ""
             raise FileError(
-                f"{path} cannot be read by pyYeti as {kind.upper()}: {first}"
+                f"{path} cannot be read by pyYeti as {kind.upper()}: {first}{way}"
             ) from error

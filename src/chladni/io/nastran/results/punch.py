@@ -25,7 +25,10 @@ _KINDS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class PunchModes:
-    """Eigenvectors: frequency (r,) [Hz], ids (n,), shapes (n, 6, r); NaN where not punched."""
+    """Eigenvectors: frequency (r,) [Hz], ids (n,), shapes (n, 6, r); NaN where not punched.
+
+    Shapes of a universal file may be complex.
+    """
 
     frequency: np.ndarray
     ids: np.ndarray

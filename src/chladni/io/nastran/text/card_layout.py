@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from ....errors import FileError
+from .format import free_fields, is_free
 from .numbers import bytes_matrix
 from .replicated_cards import expanded
 from .source_files import Source
 from .table import Cards
 
-BOM = b"\xef\xbb\xbf"  # some editors begin a file with it
-_BLANK, _STAR, _PLUS, _COMMA, _DOLLAR = b" *+,$"
+_BLANK, _STAR, _PLUS, _COMMA, _DOLLAR, _NO_LETTER = b" *+,$?"
 _ARITHMETIC = np.arange(80)
 
 
@@ -25,14 +25,17 @@ class _Lines:
     number : (m,) int    line numbers from 0
     text : (m, 80) uint8 upper case, comments blanked
     tokens : dict        of the free-field lines: their fields, the name first
-    large, follows : (m,) bool   16-column fields; a continuation
+    free, large, follows : (m,) bool   commas; 16-column fields; a continuation
+    size : (m,) int      fields, a multiple of 8, or 4 where large
     """
 
     number: np.ndarray
     text: np.ndarray
     tokens: dict[int, list[bytes]]
+    free: np.ndarray
     large: np.ndarray
     follows: np.ndarray
+    size: np.ndarray
 
 
 def tables(source: Source, file: int, files: tuple[Path, ...]) -> dict[str, Cards]:
@@ -42,11 +45,11 @@ def tables(source: Source, file: int, files: tuple[Path, ...]) -> dict[str, Card
         return {}
     order, card = _linked(lines, source.path)
     names, name_of_card = _named(lines, order, card, source.path)
-    size = np.where(lines.large[order], 4, 8)
-    offset, card_size = _offsets(size, card)
+    offset, card_size = _offsets(lines.size[order], lines.large[order], card)
     out = {}
-    for k, name in enumerate(names):
-        mine = np.flatnonzero(name_of_card[card] == k)
+    which = name_of_card[card]
+    sorted_rows = np.split(np.argsort(which, kind="stable"), np.cumsum(np.bincount(which))[:-1])
+    for name, mine in zip(names, sorted_rows, strict=True):
         out[name] = _table(name, lines, order[mine], card[mine], offset[mine], card_size, file)
     return {name: replace(cards, files=files) for name, cards in out.items()}
 
@@ -55,8 +58,6 @@ def _classified(source: Source) -> _Lines:
     """Blank out comments, drop empty lines, tell the formats apart."""
     first, past = source.bulk
     raw = [t.expandtabs(8) if b"\t" in t else t for t in source.lines[first:past]]
-    if raw and first == 0:
-        raw[0] = raw[0].removeprefix(BOM)
     origin: np.ndarray = np.arange(first, past)
     if any(b"=" in t and t[:1] != b"$" for t in raw):
         raw, at = expanded(raw, source.path, first)
@@ -64,7 +65,7 @@ def _classified(source: Source) -> _Lines:
     text = np.zeros((len(raw), 80), np.uint8)
     if raw:
         text = bytes_matrix(np.array(raw, dtype="S80"))
-    text = np.where((text < _BLANK) | (text > 126), _BLANK, text).astype(np.uint8)
+    text = np.where(text < _BLANK, _BLANK, np.where(text > 126, _NO_LETTER, text)).astype(np.uint8)
     text -= 32 * ((text >= ord("a")) & (text <= ord("z"))).astype(np.uint8)
     keep = text != _BLANK
     dollar = np.flatnonzero((text == _DOLLAR).any(axis=1))
@@ -76,9 +77,8 @@ def _classified(source: Source) -> _Lines:
         keep &= (origin < include.first) | (origin >= include.past)
     number = np.flatnonzero(keep)
     text = text[number]
-    tokens = {
-        int(i): _split(raw[number[i]]) for i in np.flatnonzero((text[:, :72] == _COMMA).any(axis=1))
-    }
+    commas = np.flatnonzero((text[:, :72] == _COMMA).any(axis=1))
+    tokens = {int(i): free_fields(t) for i in commas if is_free(t := raw[number[i]])}
     return _formats(origin[number], text, tokens)
 
 
@@ -91,19 +91,20 @@ def _skipped(text: np.ndarray) -> np.ndarray:
     )
 
 
-def _split(line: bytes) -> list[bytes]:
-    """Fields of a free-field line."""
-    return [t.strip() for t in line.split(b"$")[0].upper().split(b",")]
-
-
 def _formats(number: np.ndarray, text: np.ndarray, tokens: dict[int, list[bytes]]) -> _Lines:
     head = text[:, :8]
     large = (head == _STAR).any(axis=1)
     follows = (head == _BLANK).all(axis=1) | (head[:, 0] == _PLUS) | (head[:, 0] == _STAR)
+    free = np.zeros(len(text), bool)
+    free[list(tokens)] = True
+    size = np.zeros(len(text), int)
     for i, fields in tokens.items():
         large[i] = b"*" in fields[0]
         follows[i] = fields[0][:1] in (b"", b"+", b"*")
-    return _Lines(number, text, tokens, large, follows)
+        size[i] = len(fields) - 1
+    unit = np.where(large, 4, 8)
+    size = np.maximum(-(-size // unit), 1) * unit
+    return _Lines(number, text, tokens, free, large, follows, size)
 
 
 def _linked(lines: _Lines, path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -111,7 +112,7 @@ def _linked(lines: _Lines, path: Path) -> tuple[np.ndarray, np.ndarray]:
     if lines.follows[0]:
         raise FileError(f"{path}:{lines.number[0] + 1}: a continuation line with no card before it")
     order = np.arange(len(lines.number))
-    strays = _strays(lines, path)
+    strays = _strays(lines)
     if strays:
         order = _chained(lines.follows, strays)
     return order, np.cumsum(~lines.follows[order]) - 1
@@ -121,32 +122,21 @@ def _marks(lines: _Lines, columns: slice) -> np.ndarray:
     """(m,) S8 continuation names without their first character, blank on free-field lines."""
     text = np.ascontiguousarray(lines.text[:, columns])
     names = np.strings.strip(text.view(f"S{text.shape[1]}").ravel())
-    names[list(lines.tokens)] = b""
+    names[lines.free] = b""
     return names
 
 
-def _strays(lines: _Lines, path: Path) -> dict[int, int]:
+def _strays(lines: _Lines) -> dict[int, int]:
     """Continuations that name another line than the one above them: {line: line it follows}."""
     asks, names = _marks(lines, slice(73, 80)), _marks(lines, slice(1, 8))
     names = np.where(lines.follows, names, b"")
     differ = np.flatnonzero((names[1:] != b"") & (names[1:] != asks[:-1])) + 1
-    _check_dangling(lines, asks, names, path)
     if not len(differ):
         return {}
     owner: dict[bytes, int] = {}
     for i in np.flatnonzero(asks != b""):
         owner.setdefault(asks[i], int(i))
     return {int(i): owner[names[i]] for i in differ if names[i] in owner and owner[names[i]] != i}
-
-
-def _check_dangling(lines: _Lines, asks: np.ndarray, names: np.ndarray, path: Path) -> None:
-    """Refuse a card that announces a continuation (+NAME in field 10) which is nowhere."""
-    plus = (lines.text[:, 72] == _PLUS) & (asks != b"")
-    alone = plus & ~np.append(lines.follows[1:], False)
-    for i in np.flatnonzero(alone):
-        if asks[i] not in names:
-            mark = "+" + asks[i].decode()
-            raise FileError(f"{path}:{lines.number[i] + 1}: the continuation {mark} is missing")
 
 
 def _chained(follows: np.ndarray, strays: dict[int, int]) -> np.ndarray:
@@ -172,7 +162,7 @@ def _named(
     text = lines.text[heads, :8]
     text = np.ascontiguousarray(np.where(text == _STAR, _BLANK, text)).astype(np.uint8)
     words = np.strings.strip(text.view("S8").ravel())
-    for k in np.flatnonzero(np.isin(heads, list(lines.tokens))):
+    for k in np.flatnonzero(lines.free[heads]):
         words[k] = lines.tokens[int(heads[k])][0].replace(b"*", b"").strip()
     padded = np.ascontiguousarray(words.astype("S8"))
     _, first, inverse = np.unique(padded.view(np.uint64), return_index=True, return_inverse=True)
@@ -185,7 +175,7 @@ def _checked(word: bytes, path: Path, number: int) -> str:
     name = word.decode("latin-1")
     if name.startswith("BEGIN "):
         raise FileError(f"{path}:{number + 1}: superelement sections are not supported")
-    if " " in name:
+    if " " in name or not name[:1].isalpha():
         raise FileError(
             f"{path}:{number + 1}: {name!r} is not a card name; fields have columns of 8 or 16, "
             "or are separated by commas"
@@ -193,12 +183,14 @@ def _checked(word: bytes, path: Path, number: int) -> str:
     return name
 
 
-def _offsets(size: np.ndarray, card: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _offsets(
+    size: np.ndarray, large: np.ndarray, card: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """(first field of each line within its card, fields of each card, a multiple of 8)."""
     total = np.cumsum(size) - size
     head = np.flatnonzero(np.append(True, np.diff(card) > 0))
     offset = total - np.repeat(total[head], np.diff(np.append(head, len(card))))
-    for i in np.flatnonzero((size == 8) & (offset % 8 == 4)):
+    for i in np.flatnonzero(~large & (offset % 8 == 4)):
         offset[i:][card[i:] == card[i]] += 4  # a small line begins a new row of eight
     count = np.maximum.reduceat(offset + size, head)
     return offset, -(-count // 8) * 8
@@ -217,7 +209,7 @@ def _table(
     heads = np.flatnonzero(np.append(True, np.diff(card) > 0))
     start = np.concatenate([[0], np.cumsum(card_size[card[heads]])]).astype(np.int64)
     base = start[np.cumsum(np.append(False, np.diff(card) > 0))] + offset
-    free = np.isin(rows, list(lines.tokens)) if lines.tokens else np.zeros(len(rows), bool)
+    free = lines.free[rows]
     long = [len(t) for i in rows[free] for t in lines.tokens[int(i)]]
     width = max(16 if np.any(lines.large[rows]) else 8, *long, 8)
     text = np.zeros(start[-1], f"S{min(width, 80)}")
@@ -226,22 +218,9 @@ def _table(
         body = np.ascontiguousarray(lines.text[rows[which], 8:72]).view(f"S{64 // columns}")
         text[base[which, None] + np.arange(columns)] = body
     for i in np.flatnonzero(free):
-        fields = _free_fields(name, lines, int(rows[i]))
+        fields = lines.tokens[int(rows[i])][1:]
         text[base[i] : base[i] + len(fields)] = fields
     line_start = np.append(heads, len(rows)).astype(np.int64)
     number = lines.number[rows] + 1
     files = np.full(len(heads), file)
     return Cards(name, np.strings.strip(text), start, files, number, line_start)
-
-
-def _free_fields(name: str, lines: _Lines, i: int) -> list[bytes]:
-    """Data fields of a free-field line: eight, or four with large fields."""
-    tokens, count = lines.tokens[i], 4 if lines.large[i] else 8
-    beyond = [t for t in tokens[count + 1 :] if t]
-    if len(beyond) > 1 or (beyond and beyond[0][:1] not in (b"+", b"*")):
-        word = beyond[0].decode("latin-1")
-        raise FileError(
-            f"line {lines.number[i] + 1}: {name}: {word!r} is beyond field {count + 1} of a "
-            "free-field line; continue on a line that begins with a comma"
-        )
-    return tokens[1 : count + 1]

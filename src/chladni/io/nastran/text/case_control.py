@@ -1,11 +1,12 @@
 """Executive and case control: which solution, and what each subcase selects."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from .case_control_sets import EVERY, continued, members
+from .case_control_sets import EVERY, members
+from .known_commands import SELECTS, SUBCASES, Command, commands
 
 _SOLUTIONS: Final = {
     "SESTATIC": 101, "SESTATICS": 101, "STATIC": 101, "STATICS": 101,
@@ -13,29 +14,11 @@ _SOLUTIONS: Final = {
     "SEDCEIG": 107, "SEMCEIG": 110, "SEDTRAN": 109, "SEMTRAN": 112,
 }  # fmt: skip
 _COSMIC: Final = {1: 101, 3: 103, 8: 108, 11: 111}
-SELECTS: Final = {
-    "SPC": "SPC", "MPC": "MPC", "LOAD": "LOAD", "METHOD": "METHOD", "METH": "METHOD",
-    "FREQ": "FREQ", "FREQUENCY": "FREQ", "FREQUENC": "FREQ", "DLOAD": "DLOAD",
-    "SDAMP": "SDAMP", "SDAMPING": "SDAMP", "SUPORT1": "SUPORT", "SUPORT": "SUPORT",
-    "LOADSET": "LOADSET", "K2GG": "K2GG", "M2GG": "M2GG", "B2GG": "B2GG",
-    "K2PP": "K2PP", "M2PP": "M2PP", "B2PP": "B2PP",
-}  # fmt: skip
-_COMMAND = re.compile(r"^\s*([A-Z]\w*)\s*(?:\([^)]*\))?\s*=\s*([\w.]+)")
-_ONE_SET = re.compile(r"^\s*\w+\s*(?:\([^)]*\))?\s*=\s*\d+\s*$")
-_SUBCASE = re.compile(r"^\s*(SUBCASE|SUBCOM|SYM|REPCASE)\s*=?\s*(\d+)", re.I)
-_SET = re.compile(r"^\s*SET\s+(\d+)\s*=\s*(.*)", re.I)
+_ID = re.compile(r"^=?\s*([0-9]+)")
+_SET = re.compile(r"^([0-9]+)\s*=\s*(.*)")
 _OUTPUTS: Final = ("DISP", "VELO", "ACCE", "VECT")  # how the requests for motion begin
-_PARAM = re.compile(r"^\s*PARAM\s*,\s*(\w+)\s*,\s*([^,\s]+)", re.I)
-_SOL = re.compile(r"^\s*SOL[\s,]+(\w+)", re.I)
-
-
-def selects_one(command: str, text: str) -> bool:
-    """True where a command that selects names one set, or matrices by their names.
-
-    >>> selects_one("SPC", "SPC = 7"), selects_one("SPC", "SPC = ALL")
-    (True, False)
-    """
-    return bool((_COMMAND if "2" in command else _ONE_SET).match(text.upper()))
+_PARAM = re.compile(r"^,?\s*(\w+)[\s,]+([^,\s]+)")
+_SOL = re.compile(r"^\s*SOL[\s,=]+(\w+)", re.I)
 
 
 @dataclass(frozen=True)
@@ -61,28 +44,63 @@ class CaseControl:
     subcases: tuple[SubcaseSelection, ...] = ()
     present: bool = False
     parameters: dict[str, str] = field(default_factory=dict)  # PARAM above BEGIN BULK
+    commands: tuple[Command, ...] = ()
 
 
-def case_control(lines: Iterable[str], sections: bool) -> CaseControl:
-    """Parse the lines before BEGIN BULK; ``sections``: there is a case control at all."""
-    sol, common, cases, current, parameters = 0, _Case(0), [], None, {}
-    sets: dict[int, tuple[tuple[int, int], ...]] = {}
-    for text in continued(line.split("$")[0] for line in lines):
-        if found := _SET.match(text):
-            sets[int(found[1])] = members(found[2])
-        elif found := _SOL.match(text):
-            sol = _solution(found[1])
-        elif found := _SUBCASE.match(text):
-            current = _Case(int(found[2]))
-            cases.append(current)
-        elif found := _PARAM.match(text):
-            parameters[found[1].upper()] = found[2].upper()
-        elif found := _COMMAND.match(text.upper()):
-            if found[1] == "AUTOSPC":
-                parameters["AUTOSPC"] = found[2]
-            (current or common).add(found[1], found[2], sets)
-    made = [case.over(common) for case in cases] or [common.over(_Case(0))]
-    return CaseControl(sol, tuple(made) if sections else (), sections, parameters)
+def case_control(control: Sequence[tuple[str, str]], sections: bool) -> CaseControl:
+    """Parse (file:line, text) above BEGIN BULK; ``sections``: there is a case control at all."""
+    stated = [_solution(m[1]) for _, text in control if (m := _SOL.match(text.split("$")[0]))]
+    reading = _CaseReading()
+    every = commands(control)
+    for command in reversed(every):  # a set may be asked for above the line that defines it
+        if command.name == "SET":
+            reading.take(command)
+    for command in every:
+        reading.take(command)
+    common = reading.common
+    made = [case.over(common) for case in reading.cases] or [common.over(_Case(0))]
+    return CaseControl(
+        stated[-1] if stated else 0,
+        tuple(made) if sections else (),
+        sections,
+        reading.parameters,
+        every,
+    )
+
+
+class _CaseReading:
+    """A case control being read."""
+
+    def __init__(self) -> None:
+        self.common = _Case(0)
+        self.cases: list[_Case] = []
+        self.parameters: dict[str, str] = {}
+        self.sets: dict[int, tuple[tuple[int, int], ...]] = {}  # as they are where one reads
+        self.stepped: _Case | None = None  # the subcase as it is above its first STEP
+
+    def take(self, command: Command) -> None:
+        """Heed one command."""
+        name, rest = command.name, command.rest
+        if name == "SET" and (found := _SET.match(rest)):
+            self.sets[int(found[1])] = members(found[2])
+        elif name in SUBCASES and (found := _ID.match(rest)):
+            self.cases.append(_Case(int(found[1])))
+            self.stepped = None
+        elif name == "STEP" and _ID.match(rest) and self.cases:
+            self._step()
+        elif name == "PARAM" and (found := _PARAM.match(rest)):
+            self.parameters[found[1]] = found[2]
+        else:
+            if name == "AUTOSPC" and command.value:
+                self.parameters["AUTOSPC"] = command.value
+            (self.cases[-1] if self.cases else self.common).add(command, self.sets)
+
+    def _step(self) -> None:
+        """A subcase of several steps is a subcase for each (SOL 400)."""
+        if self.stepped is not None:
+            self.cases.append(self.stepped.copy())
+        else:
+            self.stepped = self.cases[-1].copy()
 
 
 class _Case:
@@ -95,20 +113,26 @@ class _Case:
         self.outputs: list[tuple[int, int]] | None = None
         self.residual: bool | None = None
 
-    def add(self, command: str, value: str, sets: dict[int, tuple[tuple[int, int], ...]]) -> None:
+    def copy(self) -> "_Case":
+        """A subcase of the same selections."""
+        new = _Case(self.id)
+        new.selects, new.matrices = {**self.selects}, {**self.matrices}
+        new.outputs, new.residual = self.outputs, self.residual
+        return new
+
+    def add(self, command: Command, sets: dict[int, tuple[tuple[int, int], ...]]) -> None:
         """Keep a selection, a request for motion; anything else is other output."""
-        name = SELECTS.get(command)
-        if command == "RESVEC":
+        value, kept = command.value, SELECTS.get(command.name)
+        if command.name == "RESVEC" and value:
             self.residual = value not in ("NO", "NOSYSTEM")
-        elif command[:4] in _OUTPUTS:
-            wanted = (
-                (EVERY,) if value == "ALL" else sets.get(int(value) if value.isdecimal() else 0)
-            )
+        elif command.name[:4] in _OUTPUTS and value:
+            chosen = sets.get(int(value) if value.isdecimal() else 0)
+            wanted = (EVERY,) if value == "ALL" else chosen
             self.outputs = [*(self.outputs or ()), *(wanted or ())]
-        elif name and value.isdecimal():
-            self.selects[name] = int(value)
-        elif name and "2" in name:
-            self.matrices[name] = value
+        elif kept and "2" in kept:
+            self.matrices[kept] = value
+        elif kept and value.isdecimal() and "FLUID" not in command.described:
+            self.selects[kept] = int(value)
 
     def over(self, common: "_Case") -> SubcaseSelection:
         """The subcase with what stands above all subcases."""
@@ -124,6 +148,6 @@ class _Case:
 
 
 def _solution(word: str) -> int:
-    if word.isdecimal():
+    if word.isdecimal() and word.isascii():
         return _COSMIC.get(int(word), int(word))
     return _SOLUTIONS.get(word.upper(), 0)

@@ -1,27 +1,10 @@
 """SET commands of the case control: 1, 5, 10 THRU 20 EXCEPT 15, over several lines."""
 
 import re
-from collections.abc import Iterable, Iterator
 from typing import Final
 
 EVERY: Final = (1, 2**62)
-_RUN = re.compile(r"^(\d+)\s+THRU\s+(\d+)(?:\s+EXCEPT\s+(.*))?$", re.I)
-
-
-def continued(lines: Iterable[str]) -> Iterator[str]:
-    """Lines of which one that ends with a comma goes on in the next.
-
-    >>> list(continued(["SET 1 = 2,", "  3", "SPC = 1"]))
-    ['SET 1 = 2, 3', 'SPC = 1']
-    """
-    waiting = ""
-    for line in lines:
-        text = f"{waiting} {line.strip()}" if waiting else line
-        waiting = text.rstrip() if text.rstrip().endswith(",") else ""
-        if not waiting:
-            yield text
-    if waiting:
-        yield waiting
+_RUN = re.compile(r"^(\d+)\s+THRU\s+(\d+)(?:\s+EXCEPT\s+(.*))?$", re.I | re.A)
 
 
 def members(text: str) -> tuple[tuple[int, int], ...]:

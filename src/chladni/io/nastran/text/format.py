@@ -1,11 +1,42 @@
-"""Cards as text: eight columns a field, sixteen where eight would lose what matters."""
+"""Cards as text: eight columns a field, sixteen where eight would lose what matters, or commas."""
 
 from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
 
 from . import numbers
 
 Value = float | int | str | None
 Card = list[Value]  # its name, then its fields
+
+
+def is_free(line: bytes) -> bool:
+    """True where commas separate the fields: one stands behind the name, or behind nothing.
+
+    >>> is_free(b"GRID,1"), is_free(b",2.5"), is_free(b"DEQATN  7       F(A,B)=A+B")
+    (True, True, False)
+    """
+    head, comma, _ = line.partition(b"$")[0][:72].partition(b",")
+    return bool(comma) and len(head.split()) < 2 and (not head.strip() or not head[:8].isspace())
+
+
+def free_fields(line: bytes) -> list[bytes]:
+    """Name and fields of a free-field line; those beyond field 9 belong to the next line.
+
+    A continuation mark in field 10 is no field.
+
+    >>> free_fields(b"SPC1, 1, 3, 11, 12, 13, 14, 15, 16, +A $ edge")
+    [b'SPC1', b'1', b'3', b'11', b'12', b'13', b'14', b'15', b'16']
+    """
+    found = [t.strip() for t in line.split(b"$")[0].upper().split(b",")]
+    last = 5 if b"*" in found[0] else 9
+    while len(found) > last and not found[-1]:
+        found.pop()
+    if len(found) == last + 1 and found[last][:1] in (b"+", b"*"):
+        word = found[last].decode("latin-1")
+        real = "." in word and not np.isnan(numbers.parse_real(word))
+        return found if real else found[:last]
+    return found
 
 
 def card(name: str, values: Sequence[Value], tolerance: float = 1e-6) -> list[str]:

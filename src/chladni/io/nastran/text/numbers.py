@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 _BARE_EXPONENT = re.compile(r"([0-9.])([+-])")
+_REAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(E[+-]?\d+|[+-]\d+)?", re.ASCII)
 _DIGIT_OR_DOT = np.zeros(256, bool)
 _DIGIT_OR_DOT[list(b"0123456789.")] = True
 
@@ -42,6 +43,9 @@ def _first_bad(text: np.ndarray, parse: type) -> int:
 
 
 def _parsed(text: np.ndarray, kind: type) -> tuple[np.ndarray, int]:
+    joined = (bytes_matrix(text) == ord("_")).any(axis=1)  # which Python takes, and no solver
+    if np.any(joined):
+        return np.zeros(len(text), kind), int(np.argmax(joined))
     try:
         return text.astype(kind), -1
     except (ValueError, OverflowError):
@@ -126,14 +130,10 @@ def parse_real(text: str) -> float:
     >>> parse_real("1.5-3"), parse_real("2.D+3"), parse_real("x")
     (0.0015, 2000.0, nan)
     """
-    try:
-        value = float(text)
-    except ValueError:
-        word = _BARE_EXPONENT.sub(r"\1E\2", text.strip().upper().replace("D", "E"))
-        try:
-            value = float(word)
-        except ValueError:
-            return float("nan")
+    word = text.strip().upper().replace("D", "E")
+    if not _REAL.fullmatch(word):
+        return float("nan")
+    value = float(_BARE_EXPONENT.sub(r"\1E\2", word))
     return value if np.isfinite(value) else float("nan")
 
 

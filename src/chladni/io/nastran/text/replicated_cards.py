@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ....errors import FileError
+from .format import is_free
 from .numbers import parse_real
 
 _COUNT = re.compile(rb"^=\s*\(?(\d+)\)?$")
 _MOST = 1_000_000
+_OF_TEXT = (b"DEQATN", b"DTI")  # cards in which = is a letter like any other
 
 
 def expanded(lines: Sequence[bytes], path: Path, first: int) -> tuple[list[bytes], list[int]]:
@@ -21,9 +23,12 @@ def expanded(lines: Sequence[bytes], path: Path, first: int) -> tuple[list[bytes
     origin: list[int] = []
     above: list[bytes] = []
     pattern: list[bytes] = []
+    name = b""
     for k, line in enumerate(lines, start=first):
         body = line.split(b"$")[0].rstrip()
-        if b"=" not in body or not _repeats(body):
+        if body[:1].isalpha():
+            name = body[:8].partition(b",")[0].strip().upper()
+        if b"=" not in body or name in _OF_TEXT or not _repeats(body):
             out.append(line)
             origin.append(k)
             if body:
@@ -48,7 +53,7 @@ def _repeats(body: bytes) -> bool:
 
 def fields(body: bytes) -> list[bytes]:
     """Fields of a line, by commas or by columns of eight, trailing blanks dropped."""
-    if b"," in body:
+    if is_free(body):
         found = [t.strip() for t in body.split(b",")]
     else:
         body = body.expandtabs(8)[:72]

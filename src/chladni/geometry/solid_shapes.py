@@ -136,3 +136,13 @@ FAMILIES = {
         np.full(4, 1 / 24),
     ),
 }
+
+
+def jacobians(X: np.ndarray) -> np.ndarray:
+    """Det J (m, g) [m³] of solids (m, k, 3) at their integration points, then at their centre.
+
+    The order of the nodes may be of either hand; det J then has either sign at all points.
+    """
+    family = FAMILIES[X.shape[1]]
+    points = (*family.points, *family.mass_points, family.centre)
+    return np.stack([np.linalg.det(family.gradients(xi) @ X) for xi in points], axis=1)

@@ -1,0 +1,65 @@
+"""Check a bare deck: the use that each of its cards and commands is of, and what refuses it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import FileError
+
+
+@dataclass(frozen=True)
+class CardUse:
+    """Cards of one name, or a command of the case control."""
+
+    name: str
+    count: int
+    use: str  # read, left out, passed over, not understood
+    meaning: str
+
+
+@dataclass(frozen=True)
+class DeckCheck:
+    """The table of a deck's cards and the sentence that refuses some, "" where all are known."""
+
+    cards: tuple[CardUse, ...]
+    refused: str
+
+
+def check_deck(path: Path, allow: Sequence[str] = ()) -> DeckCheck:
+    """List the cards of a deck, those not understood first, and try to make a structure of it.
+
+    Raises
+    ------
+    FileError, ModelError
+        If the text is no deck, or its cards are understood and make no structure.
+    """
+    from ..io.nastran import assembly, read_deck
+    from ..io.nastran.read.analysis_requests import LEFT_OUT
+    from ..io.nastran.text.deck import parsed_deck, unknown
+    from ..io.nastran.text.known_cards import meaning
+    from ..io.nastran.text.known_commands import MEANINGS
+
+    deck = parsed_deck(path, allow)
+    strange = {one.name: one for one in unknown(deck)}
+    out = []
+    for name, cards in deck.cards.items():
+        use = "left out" if name in LEFT_OUT else meaning(name)[0]
+        if name in strange:
+            use = "not understood"
+        elif name in deck.allowed:
+            use = "allowed"
+        out.append(CardUse(name, len(cards), use, LEFT_OUT.get(name) or meaning(name)[1]))
+    commands = [one for one in strange.values() if one.name not in deck.cards]
+    command = "a command of the case control"
+    out += [
+        CardUse(n, 1, "not understood", MEANINGS.get(n, command))
+        for n in (c.name for c in commands)
+    ]
+    order = ("not understood", "allowed", "left out", "read", "passed over")
+    out.sort(key=lambda row: (order.index(row.use), row.name))
+    try:
+        made = read_deck(path, allow)
+    except FileError as error:
+        return DeckCheck(tuple(out), str(error))
+    assembly(made)
+    return DeckCheck(tuple(out), "")

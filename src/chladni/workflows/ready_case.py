@@ -1,0 +1,89 @@
+"""A case made ready for a fit: everything that diagnose and calibrate refuse before they fit.
+
+``chladni check`` and ``chladni init`` ask the same, so that what they find in order is not refused.
+"""
+
+from dataclasses import dataclass
+
+from ..case import Case
+from ..ema.finding import Finding, Screening
+from ..ema.screening_lines import screening_lines
+from ..errors import FileError
+from ..progress import Progress, silent
+from ..search.preparation import prepare
+from ..search.question import Prepared, Question
+from .axes_check import refuse_turned_axes
+from .mended_case import undone as mapped_away
+from .question_of_case import question_of
+from .screening_of_case import (
+    RecordingAtFault,
+    screened_prepared,
+    screened_unprepared,
+    unmendable,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ReadyCase:
+    """The question of one state of a case, prepared, and the screening of its recording."""
+
+    question: Question
+    prepared: Prepared
+    screening: Screening | None
+
+
+def refuse_without_effects(case: Case) -> None:
+    """Refuse a deck without parts for the effects.
+
+    Raises
+    ------
+    FileError
+        If it has neither shells nor beams.
+    """
+    if not len(case.assembly.shells) + len(case.assembly.beams):
+        raise FileError(
+            f"{case.path}: the deck has neither shells nor beams, but the effects of diagnose act "
+            "on these; calibrate and correlate accept any deck"
+        )
+
+
+def ready(
+    case: Case, diagnosing: bool, progress: Progress = silent, every_line: bool = True,
+    undone: tuple[Finding, ...] = (),
+) -> ReadyCase:  # fmt: skip
+    """Identify the recording, build the reduced problem, screen; nothing is fitted.
+
+    Parameters
+    ----------
+    diagnosing : False for a calibration, which takes any deck and fits a recording at fault
+    every_line : False if nothing will be fitted: a long recording is then identified from the lines
+        that its screening needs
+    undone : faults of the recording that were mapped away already
+
+    Raises
+    ------
+    RecordingAtFault
+        If the recording shows a fault that a fit cannot compensate; for a calibration only if a map
+        undoes it.
+    FileError, LabelError, ModelError
+        If nothing can be compared.
+    """
+    if diagnosing:
+        refuse_without_effects(case)
+    question = question_of(case)
+    use = None if every_line or question.frf is None else screening_lines(question.frf)
+    try:
+        prepared = prepare(question, progress, use)
+    except FileError:  # a recording at fault may hold nothing to fit, and says so itself
+        alone = screened_unprepared(case)
+        if alone is None or not alone.faults:
+            raise
+        raise RecordingAtFault(alone) from None
+    if prepared.identified is not None:
+        refuse_turned_axes(case, prepared.identified, prepared.nominal)
+    lines = None if use is None else case.lines(case.frfs[0].frequency) & use
+    screening = screened_prepared(case, prepared, lines)
+    if screening is not None and unmendable(screening):
+        if diagnosing or mapped_away(case, screening, undone) is not None:
+            raise RecordingAtFault(screening)
+    return ReadyCase(question, prepared, screening)
