@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from ..dynamics.reduction import attachments, shifted
 from ..errors import LabelError, named
 from ..fem.measured_dofs import MeasuredDofs
-from ..fem.modelled import Modelled, node_points
+from ..fem.modelled import Modelled
 
 NOTHING = 1e-8  # of √(|H_oo| |H_ii|): a smaller |H_oi| is rounding
 LINES, DAMPING = 30, 0.05  # at which responses are compared
@@ -107,6 +107,6 @@ def _silent(model: Modelled, one: MeasuredDofs, other: MeasuredDofs) -> np.ndarr
     every = sp.csr_array(sp.vstack([at.rows(built) for at in (one, other)]))
     flexible = f[f > 0.02 * top]
     hertz = 0.5 * float(flexible[0] if len(flexible) else top)
-    S = every @ attachments(shifted(built.system, hertz, node_points(built)), every)
+    S = every @ attachments(shifted(built.system, hertz), every)
     scale, n = np.sqrt(np.diag(S)), len(one.labels)
     return np.asarray(silent & (np.abs(S[:n, n:]) <= NOTHING * np.outer(scale[:n], scale[n:])))
