@@ -73,6 +73,23 @@ def test_data_no_fit_saw_can_refuse_a_name(gain, votes, left, verdict, why):
         assert found.one_of == (("crack", BEYOND) if open_ else ())
 
 
+def test_a_leader_that_cannot_be_fitted_again_leaves_the_name_to_the_next():
+    """It is one hypothesis lost, and the answer is that of the others."""
+    lost = {"crack": {"fitted": False}}
+    assert named(table(row("crack", 100.0), row("point-mass", 99.0), then=lost)) == "point-mass"
+    found = decision(table(row("crack", 100.0), then=lost))
+    assert (found.verdict, found.reason, found.named) == (REST, R.NOT_FITTED, False)
+
+
+def test_a_set_that_cannot_be_fitted_again_is_refused():
+    made = together("set 0", (80.0, 80.0), DUE)
+    singles = [row("crack", 100.0), row("point-mass", 90.0)]
+    assert decision(table(*singles, sets=[made])).whole is not None
+    found = decision(table(*singles, sets=[made], then={"set 0": {"fitted": False}}))
+    assert found.whole is None
+    assert R.SET_REFUSED in {s.reason for s in found.steps}
+
+
 def test_a_renewed_fit_that_lost_its_gain_is_not_named():
     made = one(1.2 * DUE, Votes(0.0, 1.0, 1.0), then={"crack": {"neg2_log_evidence": -0.9 * DUE}})
     assert decision(made).reason is R.TOO_LITTLE

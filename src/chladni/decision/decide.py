@@ -116,6 +116,11 @@ def _with_lead_refined(case: JudgedTable, decision: Decision) -> Decision:
     """Decide on the leader, fitted again on a refined basis, with all data."""
     key, *behind = decision.order
     lead, step = case.table.refinement(key), Step(Reason.RENEWED, key)
+    if not lead.fitted:
+        return replace(
+            decision, verdict="not in catalogue", reason=Reason.NOT_FITTED, named=False,
+            steps=steps(decision, step),
+        )  # fmt: skip
     named = replace(
         decision, order=(lead.key, *behind), due=case.due(lead), steps=steps(decision, step)
     )

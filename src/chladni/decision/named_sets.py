@@ -34,6 +34,8 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
     """
     table = case.table
     row = table.refinement(whole.key)
+    if not row.fitted:
+        return Step(Reason.SET_REFUSED, whole.key, Reason.NOT_FITTED)
     lost = max(0.0, row.neg2_log_evidence - table.rows[whole.key].neg2_log_evidence)
     done = [Step(Reason.FOUND_TOGETHER, whole.key)]
     for k, gain in enumerate(whole.gains):

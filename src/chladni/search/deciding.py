@@ -168,8 +168,6 @@ def _refined(
             alternative = on_its_own_basis(prepared, found, alternative)
         whole = refine(alternative)
     except ModelError as error:
-        if (key,) == lead or key in known.sets:
-            raise
         row = replace(known.table.rows[key], key=refined(key), fitted=False)
         return replace(known, failed={**known.failed, key: str(error)}).row(row)
     done = {refined(k) for k in known.refinements if (k,) != lead and not known.whole}

@@ -179,6 +179,8 @@ class DecisionWords:
             why = f"that is too little for {self._held_out_of_set(step)}"
         elif step.why is Reason.UNFIT:
             why = f"the residual is not explained: {self.known.tests[refined(step.key)].what}"
+        elif step.why is Reason.NOT_FITTED:
+            why = f"they could not be fitted again: {self.known.failed[step.key]}"
         else:
             why = REFUSED[step.why]
         return f"{self._found_together(step)}; but {why}"
