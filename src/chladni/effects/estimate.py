@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 
 def in_mm(place: Iterable[float]) -> str:
-    """Coordinates [m] as text in millimetres: 120, -35, 4."""
-    return ", ".join(f"{1e3 * v:.0f}" for v in place)
+    """Coordinates [m] as text in millimetres: 120, -35, 0."""
+    return ", ".join(str(round(1e3 * float(v))) for v in place)
 
 
 @dataclass(frozen=True)
