@@ -142,6 +142,7 @@ _CURES = {  # what to do about each kind of error
     "[Nastran cards](cards.md) lists what is read.",
     "AccuracyError": "Read the reason in `distrust`. "
     "[Troubleshooting](../guide/troubleshooting.md) leads from it to the cause.",
+    "ArgumentError": "Give the argument the type or the range that the sentence names.",
     "Interrupted": "Run the command again. A study continues with the samples that are kept.",
     "ExtensionError": "Update the named package, or uninstall it.",
 }

@@ -135,7 +135,8 @@ def first_of(folder: Path, held: bool = True) -> np.ndarray:
 
 def test_recordings_without_a_mode_are_said_to_have_none(tmp_path: Path) -> None:
     f = np.linspace(5, 60, 300)
-    values = np.array([0.7, 0.9])[:, None] * np.ones((300, 1, 1)) + 0j
+    turn = np.exp(1e-3j * np.random.default_rng(0).normal(size=(300, 2, 1)))
+    values = np.array([0.7, 0.9])[:, None] * turn
     flat = FRF(values, f, ("3:+Z", "12:+Z"), ("8:+Z",), "accelerance")
     write_npz(tmp_path / "a.npz", flat)
     case = load_case(case_of(tmp_path, "a.npz", plate_deck()))

@@ -76,6 +76,7 @@ def chain_faults(
         "interpretations"
     )
     answers = without_modes(frf, lines) > FLAT
+    answers &= min(_beyond_power(H, seen.weights @ seen.f) for H in seen.answers()) > FLAT
     named = [best] if explains(best.Q, best.Q / best.share) and answers else late
     findings = [_applicable(h, tried).finding for h in sorted(named, key=lambda h: h.share)[:1]]
     if not findings and answers and declared > EXPLAINED * CHANCE:
@@ -108,11 +109,17 @@ def _nothing_fits(declared: float, best: Hypothesis) -> Finding:
 def without_modes(frf: FRF, lines: np.ndarray) -> float:
     """Q of the recording against a power of frequency, another one for each channel.
 
-    Below all modes a structure is rigid, and interpretations cannot be distinguished.
+    Below all modes a structure is rigid, and interpretations cannot be distinguished. This
+    holds for the recording as for the model.
     """
     k = lines & (frf.frequency > 0)
-    H, f = frf.values[k].reshape(k.sum(), -1), frf.frequency[k]
+    return _beyond_power(frf.values[k], frf.frequency[k])
+
+
+def _beyond_power(H: np.ndarray, f: np.ndarray) -> float:
+    """Q of responses (n_f, ...) against powers of f: the median of the channels."""
     x, level = np.stack([np.ones(len(f)), np.log(f)], axis=1), log10_of(np.abs(H))
+    level = level.reshape(len(f), -1)
     return float(np.median(mean_squares(level - x @ np.linalg.lstsq(x, level, rcond=None)[0])))
 
 

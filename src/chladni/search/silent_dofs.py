@@ -45,11 +45,22 @@ def refuse_silent(model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs) 
         return
     at = _only(sides[what], np.flatnonzero(own))
     ways = [axis for axis, n in AXES if not _silent(model, _along(at, n), other).all()]
+    theirs: list[str] = []
+    if what == "drive":
+        said += f" declared along {_declared(other)}"
+        theirs = [axis for axis, n in AXES if not _silent(model, at, _along(other, n)).all()]
     raise LabelError(
-        f"{_listed(what, at.labels)} of the model {said} (its response is less than {NOTHING:g} of "
-        f"that of the point itself); {_would(ways)}correct the place or the direction in the label "
-        "or in sensors.csv, or leave the channel out with use = no"
+        f"{_listed(what, at.labels)} of the model, declared along {_declared(at)}, {said} (its "
+        f"response is less than {NOTHING:g} of that of the point itself); {_would(ways, theirs)}"
+        "correct the place or the direction in the label or in sensors.csv, or leave the channel "
+        "out with use = no"
     )
+
+
+def _declared(at: MeasuredDofs) -> str:
+    """The axes nearest to the directions of dofs."""
+    nearest = np.abs(at.directions).argmax(axis=1)
+    return " and ".join("XYZ"[k] for k in sorted(set(nearest.tolist())))
 
 
 def _held(
@@ -66,9 +77,12 @@ def _held(
     yield f"{_would(ways)}compare the grid and direction of each with the supports"
 
 
-def _would(ways: Sequence[str]) -> str:
+def _would(ways: Sequence[str], of_sensors: Sequence[str] = ()) -> str:
     """The directions that would respond."""
-    return f"along {' or '.join(ways)} it would; " if ways else "no other direction would; "
+    said = f"along {' or '.join(ways)} it would" if ways else "no other direction would"
+    if of_sensors:
+        said += f", or with sensors along {' or '.join(of_sensors)}"
+    return f"{said}; "
 
 
 def _listed(what: str, labels: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..case.recordings import DEAD
 from ..ema.finding import Screening
-from ..errors import ChladniError, FileError, LabelError
+from ..errors import ChladniError, FileError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
@@ -269,8 +269,6 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
             for f in () if screening is None else screening.findings:
                 text, remedy = f.text.rstrip("."), f.repair + _ITSELF * bool(f.mend)
                 out.append(CaseFinding(text, remedy, f.severity == "fault"))
-    except LabelError:  # a drive or sensor at which the model does not respond
-        raise
     except ChladniError as error:
         out.append(CaseFinding(_without_path(case, error), BLOCKS, True))
     return list(dict.fromkeys(out))

@@ -193,8 +193,8 @@ def far_off(result: DiagnosisResult) -> Iterator[str]:
     if Q is not None and Q > FAR_OFF and result.compared == "responses":
         yield (
             f"the responses of the deck differ from the recording by a factor of "
-            f"{10 ** np.sqrt(Q):.2g} (rms over the fitted lines and channels, Q = {Q:.3g}), which "
-            "no calibration explains; check units, channels, places and directions"
+            f"{10 ** np.sqrt(Q):.2g} (rms, Q = {Q:.3g}); no calibration explains that; check "
+            "units, channels, places and directions"
         )
 
 
