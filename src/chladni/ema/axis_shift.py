@@ -14,14 +14,14 @@ import numpy as np
 from ..dynamics.frf import FRF
 from .finding import Check, Finding
 from .identification import Identified, kept_lines, pole_data
-from .pole_fitting import PoleData, polish
+from .pole_fitting import PoleData, bounded, polish, solved
 from .pole_search import chi_of
 from .pole_selection import Rule
 
 SURE = 5.0  # standard deviations of a shift that is named, and root of the fall of χ²
 POOR = 3.0  # times the noise: an identification that leaves more does not hold the axis
 REACH = 0.9  # of the lowest line: the greatest shift that is tried
-TRIALS = 11
+TRIALS, STEPS = 37, 10  # shifts, and steps of a fit
 LINES, CHANNELS = 500, 16  # to compare on: they show a shift of a few lines as well as all
 
 
@@ -37,8 +37,10 @@ class AxisShift:
 def axis_shift(frf: FRF, found: Identified, use: np.ndarray | None = None) -> AxisShift | None:
     """Estimate the shift of the axis; None where the poles do not fit the recording.
 
-    Poles below half of the lowest line may stand for a shift, so each shift is tried with them and
-    without, at the price of a pole.
+    Poles move with the axis, and residues are fitted again. This profile is smooth, and its fall
+    is at most that of a whole fit, which is made at its lowest value. Poles below half of the
+    lowest line may stand for a shift, so each shift is tried with them and without, at the price of
+    a pole.
     """
     keep = np.flatnonzero(kept_lines(frf, found.band, use))
     keep = keep[:: max(1, len(keep) // LINES)]
@@ -46,35 +48,31 @@ def axis_shift(frf: FRF, found: Identified, use: np.ndarray | None = None) -> Ax
     some = frf.sel(outputs=[frf.outputs[k] for k in loud])
     lines = np.isin(np.arange(len(frf.frequency)), keep)
     lowest = float(frf.frequency[keep[0]])
-    sets = [found.poles]
-    if (found.frequency < lowest / 2).any():
-        sets.append(found.poles[found.frequency >= lowest / 2])
 
-    def fitted(shift: float, p: np.ndarray) -> tuple[float, float]:
-        """χ² with the price of its poles, and χ of a fit on the axis less a shift [Hz]."""
+    def fitted(shift: float, p: np.ndarray, steps: int) -> tuple[float, float, np.ndarray]:
+        """χ² with the price of its poles, χ, and the poles on the recorded axis."""
         data, top = pole_data(replace(some, frequency=some.frequency - shift), lines)
-        fit, _ = polish(data, (p - 2j * np.pi * shift) / top)
-        return fit.chi2 + _price(data) * len(p), chi_of(data, fit)
+        q = bounded((p - 2j * np.pi * shift) / top, 0.1)
+        fit, _ = polish(data, q, iterations=steps) if steps else solved(data, q)
+        return fit.chi2 + _price(data) * len(p), chi_of(data, fit), fit.p * top + 2j * np.pi * shift
 
-    def cost(shift: float) -> float:
-        return min(fitted(shift, p)[0] for p in sets)
-
+    low = found.frequency < lowest / 2
+    sets = [fitted(0.0, p, STEPS)[2] for p in ([found.poles, found.poles[~low]] if low.any() else
+                                               [found.poles])]  # fmt: skip
     trials = np.linspace(-REACH, REACH, TRIALS) * lowest
-    costs = [cost(t) for t in trials]
-    k, step = int(np.argmin(costs)), float(trials[1] - trials[0])
-    ends = max(trials[k] - step, trials[0]), min(trials[k] + step, trials[-1])
-    from scipy.optimize import minimize_scalar
-
-    found_by = minimize_scalar(cost, bounds=ends, method="bounded", options={"xatol": step / 50})
-    best = float(found_by.x)
-    p = min(sets, key=lambda p: fitted(best, p)[0])
-    chi = fitted(best, p)[1]
-    if chi > POOR:
+    profiles = [[fitted(t, p, 0)[0] for t in trials] for p in sets]
+    p = sets[int(np.argmin([min(profile) for profile in profiles]))]
+    k, h = int(np.argmin(np.min(profiles, axis=0))), float(trials[1] - trials[0])
+    whole = [fitted(float(t), p, STEPS) for t in trials[k] + h * np.arange(-1, 2)]
+    below, here, above = (cost for cost, _, _ in whole)
+    slope, rise = (above - below) / 2, above + below - 2 * here
+    if rise <= 0 or whole[1][1] > POOR:
         return None
-    noise, h = max(1.0, chi**2), 0.1 * step
-    rise = fitted(best + h, p)[0] + fitted(best - h, p)[0] - 2 * fitted(best, p)[0]
-    sd = float(np.sqrt(2 * noise / rise)) * h if rise > 0 else np.inf
-    return AxisShift(best, sd, (cost(0.0) - cost(best)) / noise)
+    best = float(trials[k] + np.clip(-slope / rise, -1, 1) * h)
+    noise = max(1.0, whole[1][1] ** 2)
+    zero = min(fitted(0.0, each, STEPS)[0] for each in sets)
+    gain = (zero - fitted(best, p, STEPS)[0]) / noise
+    return AxisShift(best, float(np.sqrt(2 * noise / rise)) * h, gain)
 
 
 def _price(data: PoleData) -> float:

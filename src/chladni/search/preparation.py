@@ -53,18 +53,21 @@ FAR = 6.0  # reach of the basis for poles: material may be several times softer 
 
 
 def prepare(
-    question: Question, progress: Progress = silent, lines: np.ndarray | None = None
-) -> Prepared:
+    question: Question, progress: Progress = silent, lines: np.ndarray | None = None,
+    fitted: bool = True,
+) -> Prepared:  # fmt: skip
     """Identify, decide how to compare, choose the held-out data, build the reduced problem.
 
     Parameters
     ----------
     lines : (n_f,) bool, of the recording from which its modes are identified, default all
+    fitted : False if nothing will be fitted; the error of the mesh, which refuses nothing and
+        takes the most time, is then left out
     """
     uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
-        return _by_poles(question, uncertain, progress)
-    return _by_responses(question, progress, lines)
+        return _by_poles(question, uncertain, progress, fitted)
+    return _by_responses(question, progress, lines, fitted)
 
 
 def _place_sd(question: Question) -> float:
@@ -74,7 +77,7 @@ def _place_sd(question: Question) -> float:
 
 
 def _by_responses(
-    question: Question, progress: Progress, lines_used: np.ndarray | None
+    question: Question, progress: Progress, lines_used: np.ndarray | None, fitted: bool
 ) -> Prepared:
     frf = question.frf
     assert frf is not None
@@ -107,7 +110,7 @@ def _by_responses(
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
     progress("the error of its mesh", 0.5)
-    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    mesh = mesh_hidden(nominal, f_max, measured_on(question)) if fitted else []
     progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
     left_out = HeldOutChoice(held_out_sensors(question), held_band, (low, fit_max), reach)
@@ -198,14 +201,14 @@ def equalised_lines(
     return f
 
 
-def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepared:
+def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain, progress)
     f_max = float(frequency[-1]) * 1.15
     highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
     nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))
     if question.frf is not None:
         refuse_silent(nominal, question.outputs, question.inputs)
-    built, mesh = nominal.structure, mesh_hidden(nominal, f_max)
+    built, mesh = nominal.structure, mesh_hidden(nominal, f_max) if fitted else []
     reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))
     held = np.zeros(len(frequency), bool)

@@ -48,7 +48,7 @@ def refuse_without_effects(case: Case) -> None:
 
 
 def ready(
-    case: Case, diagnosing: bool, progress: Progress = silent, every_line: bool = True,
+    case: Case, diagnosing: bool, progress: Progress = silent, fitted: bool = True,
     undone: tuple[Finding, ...] = (),
 ) -> ReadyCase:  # fmt: skip
     """Identify the recording, build the reduced problem, screen; nothing is fitted.
@@ -56,8 +56,8 @@ def ready(
     Parameters
     ----------
     diagnosing : False for a calibration, which takes any deck and fits a recording at fault
-    every_line : False if nothing will be fitted: a long recording is then identified from the lines
-        that its screening needs
+    fitted : False if nothing will be fitted: a long recording is then identified from the lines
+        that its screening needs, and the error of the mesh is left out
     undone : faults of the recording that were mapped away already
 
     Raises
@@ -71,9 +71,9 @@ def ready(
     if diagnosing:
         refuse_without_effects(case)
     question = question_of(case)
-    use = None if every_line or question.frf is None else screening_lines(question.frf)
+    use = None if fitted or question.frf is None else screening_lines(question.frf)
     try:
-        prepared = prepare(question, progress, use)
+        prepared = prepare(question, progress, use, fitted)
     except FileError:  # a recording at fault may hold nothing to fit, and says so itself
         alone = screened_unprepared(case)
         if alone is None or not alone.faults:
