@@ -27,6 +27,7 @@ from .time_record import overloaded
 
 LINES = 3.0  # in a half-bandwidth: fewer leave the damping uncertain
 POOR = 3.0  # times the noise that an identification leaves: its quantity may be wrong
+FEW_LINES, FEW_CHANNELS = 300, 6  # on which readings of a recording are compared
 STRONG = 3.0  # fall of χ² due to a mode over its required gain
 
 
@@ -130,11 +131,22 @@ def other_readings(frf: FRF, strong: Identified, use: np.ndarray | None) -> list
     """
     if frf.quantity not in QUANTITIES or strong.chi <= POOR:
         return []
-    read = {
-        error: strong_modes(identify(mapped(frf, error.mend), strong.band, use=use))
-        for error in _otherwise(frf)
-    }
-    return other_reading(strong, read)
+    some, lines = _few(frf, strong, use)
+
+    def modes(of: FRF) -> Identified:
+        return strong_modes(identify(of, strong.band, use=lines))
+
+    read = {error: modes(mapped(some, error.mend)) for error in _otherwise(frf)}
+    return other_reading(modes(some), read)
+
+
+def _few(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[FRF, np.ndarray]:
+    """The loudest channels of a recording and lines in the band: enough to compare readings."""
+    f, (low, high) = frf.frequency, strong.band
+    kept = np.flatnonzero((f >= low) & (f <= high) & (True if use is None else use))
+    kept = kept[:: -(-len(kept) // FEW_LINES) or 1]
+    loud = np.sort(np.argsort(-_rms(frf))[:FEW_CHANNELS])
+    return frf.sel(outputs=[frf.outputs[k] for k in loud]), np.isin(np.arange(len(f)), kept)
 
 
 def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[Finding], Check]:
