@@ -9,7 +9,7 @@ from ..errors import named
 from .finding import Check, Finding
 from .screening import roughness
 
-LEVEL = 1e-4  # of the largest magnitude: lines that near are one level
+LEVEL = 2e-6  # of the largest magnitude: equal in six digits, as noise seldom makes three lines
 BENT = 10.0  # times the phase that so small a change of magnitude leaves near a maximum
 LEAST_CUT = 3  # lines of one level
 JUMPING = 0.1  # roughness of magnitudes over that of the FRFs; of noise it is a fifth and more
