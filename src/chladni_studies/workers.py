@@ -16,6 +16,7 @@ from .worker_memory import keep_freed_memory
 
 PATIENCE = 15  # seconds a scheduler may take to answer
 MOST_PER_CORE = 4  # local processes a core
+STARTS = 3  # of local workers, of which one may be killed in its start
 WORTH = 10.0  # seconds in one process above which others are started
 ENDED = "its worker ended without a message in every attempt; there may be too little memory"
 NO_WORKER = "the scheduler has no worker yet; waiting until one joins it"
@@ -86,13 +87,17 @@ def _local_cluster(workers: int) -> Iterator[Any]:
 
     options = {"threads_per_worker": 1, "memory_limit": None, "dashboard_address": None}
     with _quiet("distributed", "distributed.nanny", "distributed.scheduler", "distributed.worker"):
-        try:
-            cluster = LocalCluster(workers, silence_logs=logging.CRITICAL, **options)
-        except (OSError, RuntimeError, TimeoutError) as error:
-            raise FileError(
-                f"{workers} local workers could not be started; --workers 1 needs none, and a "
-                'script with more workers needs if __name__ == "__main__":'
-            ) from error
+        for left in range(STARTS - 1, -1, -1):
+            try:
+                cluster = LocalCluster(workers, silence_logs=logging.CRITICAL, **options)
+                break
+            except (OSError, RuntimeError, TimeoutError) as error:  # one may be killed in its start
+                if not left:
+                    raise FileError(
+                        f"{workers} local workers could not be started in {STARTS} tries; "
+                        "--workers 1 needs none, and a script with more workers needs if "
+                        '__name__ == "__main__":'
+                    ) from error
         with cluster, Client(cluster) as client:
             yield client
 

@@ -82,7 +82,7 @@ def test_workers_that_cannot_start_are_one_sentence(deck):
     file.write_text(script)
     ran = subprocess.run([sys.executable, str(file)], capture_output=True, text=True)
     last = ran.stderr.splitlines()[-1]
-    assert "2 local workers could not be started" in last
+    assert "2 local workers could not be started in 3 tries" in last
     assert 'needs if __name__ == "__main__":' in last
 
 
