@@ -37,7 +37,7 @@ def test_draws_of_the_model_itself_have_uniform_p(reduced, damped):
     data = replace(data, values=data.model(state)).allowing_errors(state)
     _, J = data.scaled(state, True)
     r0, J0 = prior_residuals(effects, SCALES, np.zeros(2), state)
-    model, rng = _Linear(data.error, J, J0, data.known, data.use, 2), np.random.default_rng(1)
+    model, rng = _Linear(data.error, J, J0, data.use, 2), np.random.default_rng(1)
     sd = np.array([e.parameters[0].sd for e in effects])
     drawn = np.array([_drawn(model, sd, len(r0), rng) for _ in range(600)])
     p = [ranked(drawn[k], drawn[300:])[0] for k in range(300)]

@@ -28,7 +28,6 @@ from .linear_model import LinearModel
 from .map_fit import MassMeasurement, prior_residuals, unknowns
 from .pole_data import SCALE, SCALE_SD, Poles
 from .result import FitStatistic
-from .whitening import Whitening
 
 LEAST_P = 0.01  # p below which an explanation does not fit
 DRAWS = 300
@@ -63,7 +62,6 @@ class _Linear(LinearModel):
     """A linearised fit of responses with errors of form, and the layout of its residuals."""
 
     error: Discrepancy
-    known: Whitening | None
     use: np.ndarray
     inputs: int
 
@@ -138,7 +136,7 @@ def adequacy(
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     r, J = data.scaled(state, True)
     r0, J0 = prior_residuals(fit.effects, mass_measurement, fit.x, state)
-    model = _Linear(data.error, J, J0, data.known, data.use, data.values.shape[2])
+    model = _Linear(data.error, J, J0, data.use, data.values.shape[2])
     seen, square = model.statistics(r, r0)
     rng = np.random.default_rng(20250103)
     sd = np.array([p.sd for p in unknowns(fit.effects)])

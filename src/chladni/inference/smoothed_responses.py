@@ -65,7 +65,6 @@ class Smoothed:
 
     def answers(
         self,
-        power: int | None = None,
         scale: float = 1.0,
         delay: float = 0.0,
         drive: np.ndarray | None = None,
@@ -75,11 +74,11 @@ class Smoothed:
 
         Lines are times ``scale``; the model's frequencies are shifted by each of ``shifts`` (ln).
         """
-        k, load = self.power if power is None else power, self.drive if drive is None else drive
+        load = self.drive if drive is None else drive
         direct = self.direct if drive is None else 0.0
         for shift in shifts:
             s = 2j * np.pi * self.f[:, None] * scale / np.exp(shift)
-            above = s**k * np.exp(-s * delay)
+            above = s**self.power * np.exp(-s * delay)
             D = self.weights @ (above / (self.omega**2 + 2 * DAMPING * self.omega * s + s**2))
             yield modal_sum(self.phi_o, D, load) + direct
 

@@ -50,13 +50,18 @@ def candidates(
     ----------
     most : so many of them alone, those that score best where they begin
     """
-    every = proposals(problem, null).candidates
-    return every if most is None else _leading(UpdatingContext(problem, null), every, most)
+    context = UpdatingContext(problem, null).ready()
+    every = _proposed(context).candidates
+    return every if most is None else _leading(context, every, most)
 
 
 def proposals(problem: UpdatingProblem, null: HypothesisFit) -> Proposals:
     """The most promising of every family; one that fails numerically is lost, and no other."""
-    context, lost = UpdatingContext(problem, null).ready(), {}
+    return _proposed(UpdatingContext(problem, null).ready())
+
+
+def _proposed(context: "UpdatingContext") -> Proposals:
+    problem, lost = context.problem, dict[str, str]()
 
     def proposed(family: Family) -> list[Candidate]:
         try:
