@@ -51,6 +51,7 @@ def test_what_is_not_understood_stands_first_with_its_meaning(deck, tmp_path):
         ("RFORCE", 1, "left out"),
     ]
     assert "spot welds" in rows[0]["meaning"]
+    assert "2 kinds of cards and commands are not" in (tmp_path / "out/report.html").read_text()
     assert "CWELD (2 cards" in check_deck(path).refused
     found = check_deck(path, ("CWELD", "STATSUB"))
     assert not found.refused

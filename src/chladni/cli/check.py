@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..errors import AccuracyError, FileError
 from ..progress import within
-from ..report.blocks import Table
+from ..report.blocks import Items, Table
 from ..report.result_json import to_json
 from ..report.words import counted
 from ..workflows.case_check import check
@@ -57,10 +57,11 @@ def _deck(source: Path, allow: tuple[str, ...], out: Path | None) -> None:
         found = check_deck(source, allow)
         job.json("check.json", asdict(found))
         rows = [(c.name, str(c.count), c.use, c.meaning) for c in found.cards]
-        job.lead = f"{counted(len(rows), 'kind', 'kinds')} of cards; " + (
+        job.lead = f"{counted(len(rows), 'kind', 'kinds')} of cards and commands; " + (
             "the deck is refused." if found.refused else "the deck is read."
         )
-        job.section("Cards", [Table(("card", "count", "use", "meaning"), rows, words=_WORDS)])
+        table = Table(("card", "count", "use", "meaning"), rows, words=_WORDS)
+        job.section("Cards", [*([Items([found.refused])] if found.refused else []), table])
         say_sections(job.lead, job.sections)
     if found.refused:
         raise AccuracyError(found.refused)

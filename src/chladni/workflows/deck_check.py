@@ -33,14 +33,15 @@ def check_deck(path: Path, allow: Sequence[str] = ()) -> DeckCheck:
     FileError, ModelError
         If the text is no deck, or its cards are understood and make no structure.
     """
-    from ..io.nastran import assembly, read_deck
+    from ..io.nastran import assembly
     from ..io.nastran.read.analysis_requests import LEFT_OUT
-    from ..io.nastran.text.deck import parsed_deck, unknown
+    from ..io.nastran.text.deck import parsed_deck, refuse_unknown, unknown
     from ..io.nastran.text.known_cards import meaning
     from ..io.nastran.text.known_commands import MEANINGS
 
     deck = parsed_deck(path, allow)
-    strange = {one.name: one for one in unknown(deck)}
+    found = unknown(deck)
+    strange = {one.name: one for one in found}
     out = []
     for name, cards in deck.cards.items():
         use = "left out" if name in LEFT_OUT else meaning(name)[0]
@@ -49,17 +50,17 @@ def check_deck(path: Path, allow: Sequence[str] = ()) -> DeckCheck:
         elif name in deck.allowed:
             use = "allowed"
         out.append(CardUse(name, len(cards), use, LEFT_OUT.get(name) or meaning(name)[1]))
-    commands = [one for one in strange.values() if one.name not in deck.cards]
     command = "a command of the case control"
     out += [
-        CardUse(n, 1, "not understood", MEANINGS.get(n, command))
-        for n in (c.name for c in commands)
+        CardUse(name, 1, "not understood", MEANINGS.get(name, command))
+        for name in strange
+        if name not in deck.cards
     ]
     order = ("not understood", "allowed", "left out", "read", "passed over")
     out.sort(key=lambda row: (order.index(row.use), row.name))
     try:
-        made = read_deck(path, allow)
+        refuse_unknown(deck, found)
     except FileError as error:
         return DeckCheck(tuple(out), str(error))
-    assembly(made)
+    assembly(deck)
     return DeckCheck(tuple(out), "")

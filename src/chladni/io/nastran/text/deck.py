@@ -60,7 +60,7 @@ def read_deck(path: Path | str, allow: Sequence[str] = ()) -> Deck:
         the case control that are not known to leave the structure as it is.
     """
     deck = parsed_deck(path, allow)
-    _refuse(deck, unknown(deck))
+    refuse_unknown(deck, unknown(deck))
     return deck
 
 
@@ -115,7 +115,7 @@ def unknown(deck: Deck) -> tuple[Unknown, ...]:
     return tuple(one for one in every if one.name not in deck.allowed)
 
 
-def _refuse(deck: Deck, found: Sequence[Unknown]) -> None:
+def refuse_unknown(deck: Deck, found: Sequence[Unknown]) -> None:
     """Refuse everything that is not understood in one sentence."""
     if not found:
         return
