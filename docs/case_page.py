@@ -123,7 +123,7 @@ _FILES = """\
   there may be `magnitude` and `phase_deg` or `phase_rad`.
 - FRF as `.npz` or `.mat`: arrays `frequency_hz` (n_f,), `values` (n_f, n_out, n_in), `outputs`,
   `inputs`; optional `coherence`, `variance`, `quantity`, `level`, `article`.
-- A drive or a sensor at which the model does not respond is refused with its label: a support holds
+- A drive or a sensor at which the model does not respond is refused with its label. A support holds
   it, or its direction is uncoupled (a force in the plane of a flat sheet, sensors across it).
 - Where a table moves the supports, the input is `base:+X`, `base:+Y` or `base:+Z` and the quantity
   transmissibility, acceleration per acceleration (unit 1). All grids that the deck holds by SPC

@@ -48,7 +48,7 @@ def plain(value: Any) -> Any:
 def atomic(
     path: Path | str, write: Callable[[Path], object], within: OwnFolder | None = None
 ) -> Path:
-    """Let ``write`` fill a temporary file beside ``path``, of the same suffix, then move it.
+    """Let ``write`` fill a temporary file next to ``path``, of the same suffix, then move it.
 
     Parameters
     ----------

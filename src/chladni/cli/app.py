@@ -158,7 +158,7 @@ def _offered() -> dict[str, str | ModuleType]:
 
 
 def _said_by_source(name: str) -> str:
-    """The first sentence of a command, from the source of its module; "" where there is none."""
+    """The first sentence of a command, from the source of its module; "" without one."""
     package, *inner = name.split(".")
     found = find_spec(package)
     for folder in (found and found.submodule_search_locations) or ():

@@ -5,7 +5,7 @@ An effect acts on the reduced model in six ways only (:data:`Term`):
 - It multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
   stiffness) on groups of shells. It multiplies calibrated operators and never subtracts nominal
   ones. Every stiffness therefore stays positive, whatever the other parameters do.
-- It adds *point terms* c(p) bᵀb to K or M, with rows b of the structure (a spring, a mass) and of
+- It adds *point terms* c(p) bᵀb to K or M. Rows b are of the structure (a spring, a mass) and of
   dofs that it brings along (a mass on a spring). An effect that releases clamps
   (fem/released.py) has rows beyond the dofs of the deck.
 - It adds *operators* c(p) A, c > -1, where A is the contribution of a part to K or M. Where A is a

@@ -281,7 +281,7 @@ def changed_gains(
     """A gain or a unit that changes within the recording: g_k = <HF_k, Y_k> / <HF_k, HF_k>.
 
     The gains of one output over blocks k have one level before an instant and another after it.
-    Those of all other outputs stay. A nonlinear structure changes all of them.
+    The gains of all other outputs stay. A nonlinear structure changes all of them.
     """
     if frf.quantity != record.quantity or frf.inputs != record.inputs:
         return [], Check("steady gains", "the FRFs are of another quantity", None)

@@ -20,8 +20,9 @@ Corners alone transfer little twist round a bend. At K6ROT 100 MacNeal-Harder's 
 times too soft (field 0.99) and Raasch's hook 1.26 times. Sheets of a tailgate change by 0.2 % in
 frequency. Nastran corrects this by shell normals (PARAM,SNORM), which are not read here. Therefore
 the field is used for meshes that are made here. Beams with offsets on a sheet twist the rotation
-about its normal, where the field is too stiff: a stringer on a floor has its first mode at 22.06 Hz
-with it, 20.26 Hz with K6ROT 100, 20.31 Hz by another code. Decks are read with Nastran's 100.
+about its normal, and there the field is too stiff. A stringer on a floor has its first mode at
+22.06 Hz with it and at 20.26 Hz with K6ROT 100. Another code has 20.31 Hz. Decks are read with
+Nastran's 100.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What every converter needs: unit factors, grids by row, coordinate systems."""
+"""Unit factors, grids by row and coordinate systems, which every converter needs."""
 
 import re
 from dataclasses import dataclass, replace

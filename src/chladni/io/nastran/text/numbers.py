@@ -125,7 +125,7 @@ def real(value: float, width: int = 8) -> str:
 
 
 def parse_real(text: str) -> float:
-    """Value of one Nastran real; nan where the text is none.
+    """Value of one Nastran real; nan of any other text.
 
     >>> parse_real("1.5-3"), parse_real("2.D+3"), parse_real("x")
     (0.0015, 2000.0, nan)
