@@ -355,14 +355,29 @@ def _within(hint: Any) -> list[type]:
 
 
 def attributes(kind: type) -> dict[str, str]:
-    """Meaning by name, from the section Attributes of a docstring."""
-    text = inspect.cleandoc(kind.__doc__ or "")
-    section = re.split(r"\nAttributes\n-+\n", text)
-    if len(section) < 2:
-        return {}
+    """Meaning by name: the section Attributes of a docstring, or the comments at the fields.
+
+    A comment stands behind its field or above it; ``# low, high: ends [m]`` is of both.
+    """
+    section = re.split(r"\nAttributes\n-+\n", inspect.cleandoc(kind.__doc__ or ""))
+    rows = section[1].split("\n\n")[0].splitlines() if len(section) > 1 else []
+    above: list[str] = []
+    for line in inspect.getsource(kind).splitlines():
+        comment = re.fullmatch(r"    # (.*)", line)
+        field = re.match(r"    (\w+): ", line)
+        if comment:
+            above.append(comment[1])
+        elif field:
+            said = [*above, *re.findall(r"  # (.*)", line)]
+            grouped = re.match(r"\w+(?:, \w+)+: ", said[0]) if said else None
+            if grouped:
+                rows += [said[0].replace(": ", " : ", 1), *(f"    {x}" for x in said[1:])]
+            elif said:
+                rows += [f"{field[1]} : {said[0]}", *(f"    {x}" for x in said[1:])]
+            above = []
     out: dict[str, str] = {}
     names: list[str] = []
-    for line in section[1].split("\n\n")[0].splitlines():
+    for line in rows:
         head = re.match(r"(\w+(?:, \w+)*) : (.*)", line)
         if head:
             names = head[1].split(", ")

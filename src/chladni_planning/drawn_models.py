@@ -25,18 +25,11 @@ FULL = 2  # drawn models solved in full for the basis
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """A model whose parts' thickness may be drawn.
-
-    Attributes
-    ----------
-    model : Reduced
-    effects : tuple of PartScale   thickness of each part
-    rigid : int                    number of rigid modes, equal for every draw
-    """
+    """A model whose parts' thickness may be drawn."""
 
     model: Reduced
-    effects: tuple[PartScale, ...]
-    rigid: int
+    effects: tuple[PartScale, ...]  # thickness of each part
+    rigid: int  # number of rigid modes, equal for every draw
 
     @property
     def basis(self) -> np.ndarray:

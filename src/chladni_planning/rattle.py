@@ -18,42 +18,25 @@ TAKE_UP = 2e-5  # [m]: roughness and paint, of sheets that lie on each other
 
 @dataclass(frozen=True, eq=False)
 class Openings:
-    """Places where two sheets may meet, for all pairs of parts.
+    """Places where two sheets may meet, for all pairs of parts."""
 
-    Attributes
-    ----------
-    pairs : ((str, str), ...)       parts
-    pair : (g,) int                 position of the pair of each place
-    points : (g, 3)                 [m]
-    clearance : (g,)                [m]; for touching places the middle of the possible interval
-    known : (g,) bool               False where the sheets touch within the accuracy of the mesh
-    motion : (g, r)                 opening in each mode [1/√kg]
-    touching : ((str, str), ...)    pairs that touch away from joints within the mesh's accuracy
-    """
-
-    pairs: tuple[tuple[str, str], ...]
-    pair: np.ndarray
-    points: np.ndarray
-    clearance: np.ndarray
-    known: np.ndarray
-    motion: np.ndarray
+    pairs: tuple[tuple[str, str], ...]  # parts
+    pair: np.ndarray  # (g,) int; position of the pair of each place
+    points: np.ndarray  # (g, 3) [m]
+    clearance: np.ndarray  # (g,) [m]; for touching places the middle of the possible interval
+    known: np.ndarray  # (g,) bool; False where the sheets touch within the accuracy of the mesh
+    motion: np.ndarray  # (g, r) opening in each mode [1/√kg]
+    # pairs that touch away from joints within the mesh's accuracy
     touching: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Rattle:
-    """First contact for each shaker candidate, at the resonance of least force.
+    """First contact for each shaker candidate, at the resonance of least force."""
 
-    Attributes
-    ----------
-    force : (n,)      amplitude at which the first place closes [N]; inf where none closes
-    place : (n,) int  position among the openings; -1 where none closes
-    mode : (n,) int   resonance at which it closes; -1 where none closes
-    """
-
-    force: np.ndarray
-    place: np.ndarray
-    mode: np.ndarray
+    force: np.ndarray  # (n,) amplitude at which the first place closes [N]; inf where none closes
+    place: np.ndarray  # (n,) int; position among the openings; -1 where none closes
+    mode: np.ndarray  # (n,) int; resonance at which it closes; -1 where none closes
 
 
 def openings(assembly: Assembly, motion: np.ndarray) -> Openings:

@@ -301,18 +301,13 @@ def _sights(n: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Triangles that may stand in a line of sight.
+    """Triangles that may stand in a line of sight."""
 
-    Attributes
-    ----------
-    a, e1, e2 : (m, 3)   a corner and two edges [m]
-    reach : (m,)         longest of the two edges [m]
-    """
-
+    # a, e1, e2: (m, 3) a corner and two edges [m]
     a: np.ndarray
     e1: np.ndarray
     e2: np.ndarray
-    reach: np.ndarray
+    reach: np.ndarray  # (m,) longest of the two edges [m]
 
     @classmethod
     def of(cls, corners: np.ndarray) -> "Obstacles":

@@ -86,25 +86,16 @@ class PlanSettings:
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """A place and a direction in which a sensor may measure: rows of ``phi`` of a :class:`Plan`.
+    """A place and a direction in which a sensor may measure: rows of ``phi`` of a :class:`Plan`."""
 
-    Attributes
-    ----------
-    ids : (m,) int          grids, or numbers of centres as in :class:`SensorCandidates`
-    place : (m,) int        position among the places
-    points, directions : (m, 3)
-    labels : tuple of str   412:+Z along an axis, else 412:n
-    normal : (m,) bool      glued flat; False: on a block, along the sheet
-    side : (m,)             +1, -1: side of the surface normal
-    """
-
-    ids: np.ndarray
-    place: np.ndarray
+    ids: np.ndarray  # (m,) int; grids, or numbers of centres as in :class:`SensorCandidates`
+    place: np.ndarray  # (m,) int; position among the places
+    # points, directions: (m, 3)
     points: np.ndarray
     directions: np.ndarray
-    labels: tuple[str, ...]
-    normal: np.ndarray
-    side: np.ndarray
+    labels: tuple[str, ...]  # 412:+Z along an axis, else 412:n
+    normal: np.ndarray  # (m,) bool glued flat; False: on a block, along the sheet
+    side: np.ndarray  # (m,) +1, -1: side of the surface normal
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -17,20 +17,12 @@ LEAST_MAC = 0.5  # MAC below which a mode is lost
 
 @dataclass(frozen=True, eq=False)
 class FollowedModes:
-    """Elastic modes of the nominal model, at the translations of a few nodes.
+    """Elastic modes of the nominal model, at the translations of a few nodes."""
 
-    Attributes
-    ----------
-    frequency : (r,) [Hz]
-    shapes : (k, r)
-    dofs : (k, 2) int    point id and component of each row
-    rigid : int          modes below them
-    """
-
-    frequency: np.ndarray
-    shapes: np.ndarray
-    dofs: np.ndarray
-    rigid: int
+    frequency: np.ndarray  # (r,) [Hz]
+    shapes: np.ndarray  # (k, r)
+    dofs: np.ndarray  # (k, 2) int; point id and component of each row
+    rigid: int  # modes below them
 
     @property
     def solved(self) -> int:

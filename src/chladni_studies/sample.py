@@ -29,24 +29,14 @@ FAULTS = (  # errors of a sample with impossible values; the other samples conti
 
 @dataclass(frozen=True, eq=False)
 class StudyModel:
-    """All that a sample needs in addition to its values; every worker receives it once.
+    """All that a sample needs in addition to its values; every worker receives it once."""
 
-    Attributes
-    ----------
-    model : Model            as the deck has it
-    case : Case or None      every sample is scored against its recording
-    varied : tuple of Variation
-    settings : StudySettings
-    modes : FollowedModes    of the nominal model
-    reach : float            modes are solved up to this frequency for responses [Hz]; 0: by count
-    """
-
-    model: Model
-    case: Case | None
+    model: Model  # as the deck has it
+    case: Case | None  # every sample is scored against its recording, or None
     varied: tuple[Variation, ...]
     settings: StudySettings
-    modes: FollowedModes
-    reach: float = 0.0
+    modes: FollowedModes  # of the nominal model
+    reach: float = 0.0  # modes are solved up to this frequency for responses [Hz]; 0: by count
 
     def assembly(self, values: np.ndarray) -> Assembly:
         """The structure with these values (d,)."""

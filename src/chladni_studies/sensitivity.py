@@ -22,30 +22,21 @@ SIGNIFICANT = 1e-9  # relative range of a result below which it does not depend 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """One result against all parameters (d,); nan where a measure does not apply.
+    """One result against all parameters (d,); nan where a measure does not apply."""
 
-    Attributes
-    ----------
-    result : name of its column
-    log_slope : d ln y / d ln p of the best power law y = c Π p^s
-    r2 : share of the variance of ln y that this law explains
-    standardised : regression coefficients times sd(p) / sd(y)
-    first, total : Sobol' indices; ``first_interval``, ``total_interval``: half their 95 % interval
-    mu_star, sigma : mean of |elementary effects| and their standard deviation, over the range
-    used : number of samples used
-    """
-
-    result: str
-    log_slope: np.ndarray
-    r2: float
-    standardised: np.ndarray
+    result: str  # name of its column
+    log_slope: np.ndarray  # d ln y / d ln p of the best power law y = c Π p^s
+    r2: float  # share of the variance of ln y that this law explains
+    standardised: np.ndarray  # regression coefficients times sd(p) / sd(y)
+    # first, total: Sobol' indices; ``first_interval``, ``total_interval``: half their 95 % interval
     first: np.ndarray
     first_interval: np.ndarray
     total: np.ndarray
     total_interval: np.ndarray
+    # mu_star, sigma: mean of |elementary effects| and their standard deviation, over the range
     mu_star: np.ndarray
     sigma: np.ndarray
-    used: int
+    used: int  # number of samples used
 
 
 def sensitivity(

@@ -40,20 +40,13 @@ _WORDS = {
 
 @dataclass
 class StudyStore:
-    """An open folder of a study.
-
-    Attributes
-    ----------
-    folder : Path
-    rows : {number: row}    of the finished samples, failed ones included
-    notes : notes on the folder for the user
-    """
+    """An open folder of a study."""
 
     folder: Path
-    rows: dict[int, dict[str, Any]]
+    rows: dict[int, dict[str, Any]]  # {number: row} of the finished samples, failed ones included
     file: IO[bytes]
     held: OwnFolder
-    notes: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  # notes on the folder for the user
 
     def keep(self, result: SampleResult, values: Mapping[str, float]) -> dict[str, Any]:
         """Write a finished sample; it is safe from a kill when this returns."""

@@ -34,25 +34,16 @@ _SDS = 2.0  # prior standard deviations to either side, where a case gives no bo
 
 @dataclass(frozen=True)
 class Variation:
-    """One number of the deck and the range it is sampled over.
+    """One number of the deck and the range it is sampled over."""
 
-    Attributes
-    ----------
-    name : name in tables, "t of inner"
-    free : FreeParameter    the number and its parts
-    nominal : the deck's own value; 1 where the members' values differ
-    low, high : in ``unit``, as ``nominal``
-    unit : SI; "deck units" of a bare deck, "of the deck's" where members differ
-    log : sampled uniformly in the logarithm
-    """
-
-    name: str
-    free: FreeParameter
-    nominal: float
+    name: str  # name in tables, "t of inner"
+    free: FreeParameter  # the number and its parts
+    nominal: float  # the deck's own value; 1 where the members' values differ
+    # low, high: in ``unit``, as ``nominal``
     low: float
     high: float
-    unit: str
-    log: bool = False
+    unit: str  # SI; "deck units" of a bare deck, "of the deck's" where members differ
+    log: bool = False  # sampled uniformly in the logarithm
 
     def value(self, u: np.ndarray) -> np.ndarray:
         """Values at u in [0, 1]."""

@@ -18,25 +18,16 @@ _FORM = re.compile(
 
 @dataclass(frozen=True)
 class VaryText:
-    """A range as `t of inner=0.6:0.8`, `E=90%:110%`, `point-mass at 412=1e-5:2e-4:log`.
+    """A range as `t of inner=0.6:0.8`, `E=90%:110%`, `point-mass at 412=1e-5:2e-4:log`."""
 
-    Attributes
-    ----------
-    text : as it was given
-    name : field of parts, or an effect of the catalogue
-    parts : names with commas; None: of all that have the field
-    grid : place of the effect; None: the place given by a case
-    low, high : ends of the range as they were given
-    log : uniform in the logarithm
-    """
-
-    text: str
-    name: str
-    parts: str | None
-    grid: int | None
+    text: str  # as it was given
+    name: str  # field of parts, or an effect of the catalogue
+    parts: str | None  # names with commas; None: of all that have the field
+    grid: int | None  # place of the effect; None: the place given by a case
+    # low, high: ends of the range as they were given
     low: str
     high: str
-    log: bool
+    log: bool  # uniform in the logarithm
 
     @property
     def is_effect(self) -> bool:

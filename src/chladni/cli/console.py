@@ -26,18 +26,11 @@ AGAIN = 60.0  # and how often from then on
 
 @dataclass
 class Console:
-    """Further targets of lines in addition to standard output.
+    """Further targets of lines in addition to standard output."""
 
-    Attributes
-    ----------
-    verbose : every stage, note and warning on standard error
-    log : the same and all that was said, with the time, in a file
-    shows : whether a page that was written is opened in the browser
-    """
-
-    verbose: bool = False
-    log: IO[str] | None = None
-    shows: bool = False
+    verbose: bool = False  # every stage, note and warning on standard error
+    log: IO[str] | None = None  # the same and all that was said, with the time, in a file
+    shows: bool = False  # whether a page that was written is opened in the browser
     begun: float = field(default_factory=time.monotonic)
 
     def aside(self, text: str) -> None:

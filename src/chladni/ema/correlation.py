@@ -145,25 +145,16 @@ def deviation(model: FRF, test: FRF) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Quality:
-    """Q = mean |δ|² over channels and lines, and where it comes from.
+    """Q = mean |δ|² over channels and lines, and where it comes from."""
 
-    Attributes
-    ----------
-    Q : float                 mean |δ|²
-    total : float             Σ |δ|², unnormalised as in Echaniz Granado (2015)
-    magnitude, phase : float  the shares of Q from |H| (log₁₀) and from the angle
-    channel : (n_out, n_in)   mean over lines
-    band : (n_bands,)         mean over the lines of each band
-    bands : ((low, high), ...)  [Hz]
-    """
-
-    Q: float
-    total: float
+    Q: float  # mean |δ|²
+    total: float  # Σ |δ|², unnormalised as in Echaniz Granado (2015)
+    # magnitude, phase: the shares of Q from |H| (log₁₀) and from the angle
     magnitude: float
     phase: float
-    channel: np.ndarray
-    band: np.ndarray
-    bands: tuple[tuple[float, float], ...]
+    channel: np.ndarray  # (n_out, n_in) mean over lines
+    band: np.ndarray  # (n_bands,) mean over the lines of each band
+    bands: tuple[tuple[float, float], ...]  # ((low, high), ...) [Hz]
 
 
 def quality(

@@ -23,43 +23,31 @@ def probability(p: float) -> str:
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault, or possible fault, of a recording.
+    """One fault, or possible fault, of a recording."""
 
-    Attributes
-    ----------
-    kind : what it is, in a few words (duplicated channels, reversed sign, delay, ...)
-    text : one sentence with the numbers
-    severity : a fault is to be mended before anything is fitted; a warning is to be checked; what
-        was a fault is mended where the diagnosis applied ``mend``
-    channels : labels of the outputs (or inputs) it concerns; none: the whole chain
-    repair : a line of case.toml or sensors.csv that would mend it, or what to do
-    value : its size (a gain, a delay [s], a ratio, ...), nan where it has none
-    mend : name and arguments of the map of the FRFs (:mod:`.frf_maps`) that undoes it exactly; none
-        where no map does, or the cause is not beyond doubt
-    """
-
-    kind: str
-    text: str
+    kind: str  # what it is, in a few words (duplicated channels, reversed sign, delay, ...)
+    text: str  # one sentence with the numbers
+    # a fault is to be mended before anything is fitted; a warning is to be checked; what was a
+    # fault is mended where the diagnosis applied ``mend``
     severity: Severity = "fault"
+    # labels of the outputs (or inputs) it concerns; none: the whole chain
     channels: tuple[str, ...] = ()
-    repair: str = ""
+    repair: str = ""  # a line of case.toml or sensors.csv that would mend it, or what to do
+    # its size (a gain, a delay [s], a ratio, ...), nan where it has none
     value: float = float("nan")
+    # name and arguments of the map of the FRFs (:mod:`.frf_maps`) that undoes it exactly; none
+    # where no map does, or the cause is not beyond doubt
     mend: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Check:
-    """One check and its result.
+    """One check and its result."""
 
-    Attributes
-    ----------
-    name, result : in words
-    passed : None if the check was not possible
-    """
-
+    # name, result: in words
     name: str
     result: str
-    passed: bool | None = True
+    passed: bool | None = True  # None if the check was not possible
 
 
 @dataclass(frozen=True)

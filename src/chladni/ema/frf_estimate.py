@@ -55,23 +55,15 @@ class EstimateSettings:
 
 @dataclass(frozen=True, eq=False)
 class FrfEstimate:
-    """FRFs of a time recording, and the method of their estimation.
+    """FRFs of a time recording, and the method of their estimation."""
 
-    Attributes
-    ----------
-    frf : FRF                   with coherence and variance where there are averages
-    excitation, method : as used
-    averages : float            independent ones
-    added_damping : float       that an exponential window added to every pole [1/s]
-    distortion : (n_f, n_out) or None  harmonics 2 to 5 over the fundamental, of a stepped sine
-    notes : tuple of str
-    """
-
-    frf: FRF
+    frf: FRF  # with coherence and variance where there are averages
+    # excitation, method: as used
     excitation: Excitation
     method: Method
-    averages: float
-    added_damping: float = 0.0
+    averages: float  # independent ones
+    added_damping: float = 0.0  # that an exponential window added to every pole [1/s]
+    # (n_f, n_out) harmonics 2 to 5 over the fundamental, of a stepped sine
     distortion: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 

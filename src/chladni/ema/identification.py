@@ -27,33 +27,24 @@ AWAY = 3.0  # times the band, above or below: of a pole there damping moves H by
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """H(s) = s^q [Σ_r R_r/(s-p_r) + R̄_r/(s-p̄_r) + L/s² + U], with the spread of the poles.
+    """H(s) = s^q [Σ_r R_r/(s-p_r) + R̄_r/(s-p̄_r) + L/s² + U], with the spread of the poles."""
 
-    Attributes
-    ----------
-    poles : (r,) complex             p_r [rad/s], by increasing |p|
-    residues : (r, n_out, n_in)      R_r of the receptance
-    lower, upper : (n_out, n_in)     L, U: modes below and above the band
-    frequency_sd, damping_sd : (r,)  standard deviations [Hz], [-]
-    relative_delta_chi2 : (r,)       rise of χ² without the pole, over what it must pay
-    chi : float                      rms of the whitened residual (1: the noise is all that is left)
-    outputs, inputs, quantity        as in the recording
-    band : (low, high)               [Hz] that was fitted
-    covariance : ModalCovariance     of poles and residues (None of modes made otherwise)
-    """
-
-    poles: np.ndarray
-    residues: np.ndarray
+    poles: np.ndarray  # (r,) complex; p_r [rad/s], by increasing |p|
+    residues: np.ndarray  # (r, n_out, n_in) R_r of the receptance
+    # lower, upper: (n_out, n_in) L, U: modes below and above the band
     lower: np.ndarray
     upper: np.ndarray
+    # frequency_sd, damping_sd: (r,) standard deviations [Hz], [-]
     frequency_sd: np.ndarray
     damping_sd: np.ndarray
-    relative_delta_chi2: np.ndarray
-    chi: float
+    relative_delta_chi2: np.ndarray  # (r,) rise of χ² without the pole, over what it must pay
+    chi: float  # rms of the whitened residual (1: the noise is all that is left)
+    # outputs, inputs, quantity: as in the recording
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
     quantity: str
-    band: tuple[float, float]
+    band: tuple[float, float]  # (low, high) [Hz] that was fitted
+    # of poles and residues (None of modes made otherwise)
     covariance: ModalCovariance | None = None
 
     @property

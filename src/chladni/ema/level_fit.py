@@ -25,23 +25,17 @@ LEAST_LEVELS = 3  # levels an element is fitted to
 
 @dataclass(frozen=True, eq=False)
 class ElementFit:
-    """An element fitted to levels of one mode.
-
-    Attributes
-    ----------
-    element : Element
-    frequency, damping : of the mode without it [Hz], of critical
-    values, sd : (n,)   its numbers, and the standard deviation of their logarithm (signed: of them)
-    largest : amplitude they refer to [m]
-    chi2, data : weighted squares left, and the count of data
-    """
+    """An element fitted to levels of one mode."""
 
     element: Element
+    # frequency, damping: of the mode without it [Hz], of critical
     frequency: float
     damping: float
+    # values, sd: (n,) its numbers, and the standard deviation of their logarithm (signed: of them)
     values: np.ndarray
     sd: np.ndarray
-    largest: float
+    largest: float  # amplitude they refer to [m]
+    # chi2, data: weighted squares left, and the count of data
     chi2: float
     data: int
 
@@ -157,21 +151,14 @@ def _bounds(element: Element, signed: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 @dataclass(frozen=True, eq=False)
 class HeldOutLevels:
-    """Held-out levels: predictions at their measured amplitudes.
+    """Held-out levels: predictions at their measured amplitudes."""
 
-    Attributes
-    ----------
-    rows : (m,)                    positions among the levels of the mode
-    fit : the best element by the fitted levels
-    frequency, damping : (m,)      predicted at the measured amplitude [Hz], of critical
-    mean : (f, ζ)                  of the fitted levels: the prediction of one linear model
-    """
-
-    rows: np.ndarray
-    fit: ElementFit
+    rows: np.ndarray  # (m,) positions among the levels of the mode
+    fit: ElementFit  # the best element by the fitted levels
+    # frequency, damping: (m,) predicted at the measured amplitude [Hz], of critical
     frequency: np.ndarray
     damping: np.ndarray
-    mean: tuple[float, float]
+    mean: tuple[float, float]  # (f, ζ) of the fitted levels: the prediction of one linear model
 
     def misses(self, mode: ModeLevels) -> tuple[float, float, float, float]:
         """Rms of ln (predicted / measured) of f and ζ, then of ln (mean / measured)."""

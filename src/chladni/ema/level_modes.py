@@ -26,20 +26,14 @@ MOVED_DAMPING = 0.15  # likewise; damping of a clamped object repeats to about 5
 
 @dataclass(frozen=True, eq=False)
 class AtLevel:
-    """A recording, its modes, and what was held at which level while it was taken.
+    """A recording, its modes, and what was held at which level while it was taken."""
 
-    Attributes
-    ----------
-    level : [N], or [m/s²] where a base or a response was held
-    control : whether that is the amplitude of the force, or of the response of the drive point
-    averages : of the estimate, where the noise comes from the coherence
-    """
-
-    level: float | None
+    level: float | None  # [N], or [m/s²] where a base or a response was held
     frf: FRF
     modes: Identified
+    # whether that is the amplitude of the force, or of the response of the drive point
     control: Control = "force"
-    averages: int = 1
+    averages: int = 1  # of the estimate, where the noise comes from the coherence
 
     @cached_property
     def variance(self) -> np.ndarray:
@@ -66,30 +60,22 @@ class AtLevel:
 
 @dataclass(frozen=True, eq=False)
 class ModeLevels:
-    """One mode at every level where it was found, by increasing level.
+    """One mode at every level where it was found, by increasing level."""
 
-    Attributes
-    ----------
-    output : the output whose displacement is the amplitude
-    level : (k,)                       [N] or [m/s²]
-    amplitude : (k,)                   at which the mode was seen [m]
-    frequency, frequency_sd : (k,)     [Hz]
-    damping, damping_sd : (k,)         of critical
-    frequency_own, damping_own : (k,)  of these the part that is a level's own: the rest moves all
-        levels alike, for one level is the reference of all
-    amplitude_sd : (k,)                of the lines that were averaged [m]; 0 where all have one
-    """
-
-    output: str
-    level: np.ndarray
-    amplitude: np.ndarray
+    output: str  # the output whose displacement is the amplitude
+    level: np.ndarray  # (k,) [N] or [m/s²]
+    amplitude: np.ndarray  # (k,) at which the mode was seen [m]
+    # frequency, frequency_sd: (k,) [Hz]
     frequency: np.ndarray
     frequency_sd: np.ndarray
+    # damping, damping_sd: (k,) of critical
     damping: np.ndarray
     damping_sd: np.ndarray
+    # frequency_own, damping_own: (k,) of these the part that is a level's own: the rest moves all
+    # levels alike, for one level is the reference of all
     frequency_own: np.ndarray
     damping_own: np.ndarray
-    amplitude_sd: np.ndarray
+    amplitude_sd: np.ndarray  # (k,) of the lines that were averaged [m]; 0 where all have one
 
     def sel(self, rows: np.ndarray) -> Self:
         """Some of the levels."""

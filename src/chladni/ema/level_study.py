@@ -57,19 +57,13 @@ SETTLED_BY = (
 
 @dataclass(frozen=True, eq=False)
 class ModeStudy:
-    """One mode over levels and the nonlinearity that it indicates.
-
-    Attributes
-    ----------
-    mode : ModeLevels
-    signature : Signature
-    fits : elements fitted to all levels, best first; none where they are fewer than three
-    held_out : intermediate levels, predicted from the others; None for fewer than four levels
-    """
+    """One mode over levels and the nonlinearity that it indicates."""
 
     mode: ModeLevels
     signature: Signature
+    # elements fitted to all levels, best first; none where they are fewer than three
     fits: tuple[ElementFit, ...] = ()
+    # intermediate levels, predicted from the others; None for fewer than four levels
     held_out: HeldOutLevels | None = None
 
     @property

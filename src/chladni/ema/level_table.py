@@ -14,31 +14,25 @@ NORMAL_95 = 1.96  # standard deviations of a 95 % interval
 
 @dataclass(frozen=True)
 class LevelRow:
-    """A mode at one level: measured, by the best element, and predicted if it was held out.
+    """A mode at one level: measured, by the best element, and predicted if it was held out."""
 
-    Attributes
-    ----------
-    level : of excitation or response, as the case controls it
-    amplitude_m : displacement of the output [m]
-    frequency_hz, frequency_sd_hz, damping, damping_sd : measured
-    fitted_hz, fitted_damping : by the best element
-    foretold_hz, foretold_damping : predicted, if the level was held out
-    stiffness, loss : κ' and κ'' of the element at that amplitude, over the mode's stiffness
-    frequency_low_hz, frequency_high_hz, damping_low, damping_high : 95 % interval due to noise
-    """
-
-    level: float
-    amplitude_m: float
+    level: float  # of excitation or response, as the case controls it
+    amplitude_m: float  # displacement of the output [m]
+    # frequency_hz, frequency_sd_hz, damping, damping_sd: measured
     frequency_hz: float
     frequency_sd_hz: float
     damping: float
     damping_sd: float
+    # fitted_hz, fitted_damping: by the best element
     fitted_hz: float | None = None
     fitted_damping: float | None = None
+    # foretold_hz, foretold_damping: predicted, if the level was held out
     foretold_hz: float | None = None
     foretold_damping: float | None = None
+    # stiffness, loss: κ' and κ'' of the element at that amplitude, over the mode's stiffness
     stiffness: float | None = None
     loss: float | None = None
+    # frequency_low_hz, frequency_high_hz, damping_low, damping_high: 95 % interval due to noise
     frequency_low_hz: float | None = None
     frequency_high_hz: float | None = None
     damping_low: float | None = None
@@ -47,70 +41,50 @@ class LevelRow:
 
 @dataclass(frozen=True)
 class ElementNumber:
-    """A number of an element with its 95 % interval.
+    """A number of an element with its 95 % interval."""
 
-    Attributes
-    ----------
-    name, value, unit : of the number
-    low, high : its interval
-    """
-
+    # name, value, unit: of the number
     name: str
     value: float
     unit: str
+    # low, high: its interval
     low: float
     high: float
 
 
 @dataclass(frozen=True)
 class TriedElement:
-    """An element that was fitted to all levels of a mode.
+    """An element that was fitted to all levels of a mode."""
 
-    Attributes
-    ----------
-    name : of the element
-    chi2, data : what it leaves, and the number of data
-    bic : Bayesian information criterion; the lowest is best
-    p : of its χ²
-    numbers : of the element
-    """
-
-    name: str
+    name: str  # of the element
+    # chi2, data: what it leaves, and the number of data
     chi2: float
     data: int
-    bic: float
-    p: float | None
-    numbers: tuple[ElementNumber, ...] = ()
+    bic: float  # Bayesian information criterion; the lowest is best
+    p: float | None  # of its χ²
+    numbers: tuple[ElementNumber, ...] = ()  # of the element
 
 
 @dataclass(frozen=True)
 class LevelTable:
-    """One mode over levels.
+    """One mode over levels."""
 
-    Attributes
-    ----------
-    output : label of the output at which it was seen
-    signature : the kind of change: linear, drift, or a nonlinearity
-    p_frequency, p_damping : chance of such differences of a mode with one frequency, one damping
-    sentence : its change with level and the nonlinearity indicated; "" if it does not change
-    explained : True if the first element explains it
-    rows, elements : levels rising; elements, best first
-    foretold_by : the element chosen and fitted without the levels that were held out
-    mean_hz, mean_damping : of the levels it was fitted to: one linear model
-    curve : (amplitude [m], frequency [Hz], damping) of the first element
-    """
-
-    output: str
-    signature: str
+    output: str  # label of the output at which it was seen
+    signature: str  # the kind of change: linear, drift, or a nonlinearity
+    # its change with level and the nonlinearity indicated; "" if it does not change
     sentence: str = ""
+    # p_frequency, p_damping: chance of such differences of a mode with one frequency, one damping
     p_frequency: float | None = None
     p_damping: float | None = None
-    explained: bool = False
+    explained: bool = False  # True if the first element explains it
+    # rows, elements: levels rising; elements, best first
     rows: tuple[LevelRow, ...] = ()
     elements: tuple[TriedElement, ...] = ()
-    foretold_by: str = ""
+    foretold_by: str = ""  # the element chosen and fitted without the levels that were held out
+    # mean_hz, mean_damping: of the levels it was fitted to: one linear model
     mean_hz: float | None = None
     mean_damping: float | None = None
+    # (amplitude [m], frequency [Hz], damping) of the first element
     curve: tuple[tuple[float, float, float], ...] = ()
 
 

@@ -20,25 +20,18 @@ DRAWS = 400  # random shapes
 
 @dataclass(frozen=True)
 class Likeness:
-    """One pair of modes, compared at the sensors.
+    """One pair of modes, compared at the sensors."""
 
-    Attributes
-    ----------
-    mac : on all channels
-    noise_leaves : expected MAC of the true shape with the one that was identified
-    seen, seen_mac : channels that see the mode, and the MAC on them
-    chance : that the best of as many random shapes as there are model modes reaches ``seen_mac``
-    space : share of the test's shape in the span of all model modes nearby
-    half, half_chance : MAC on the best half of the channels, and how often the best half for a
-        random shape reaches it; nan where ``mac`` is not poor
-    """
-
-    mac: float
-    noise_leaves: float
+    mac: float  # on all channels
+    noise_leaves: float  # expected MAC of the true shape with the one that was identified
+    # seen, seen_mac: channels that see the mode, and the MAC on them
     seen: int
     seen_mac: float
+    # that the best of as many random shapes as there are model modes reaches ``seen_mac``
     chance: float
-    space: float
+    space: float  # share of the test's shape in the span of all model modes nearby
+    # half, half_chance: MAC on the best half of the channels, and how often the best half for a
+    # random shape reaches it; nan where ``mac`` is not poor
     half: float = float("nan")
     half_chance: float = float("nan")
 

@@ -30,18 +30,11 @@ _SINGULAR = 1e-12  # of the largest: directions of the poles that the data do no
 
 @dataclass(frozen=True, eq=False)
 class ModalCovariance:
-    """δp_r = L_r z and δR_rc = S_rc z + e_rc, z of unit covariance, over real and imaginary part.
+    """δp_r = L_r z, δR_rc = S_rc z + e_rc, z of unit covariance, over real and imaginary part."""
 
-    Attributes
-    ----------
-    pole : (r, 2, m)           L, roots: Cov(p_i, p_j) = L_i L_jᵀ [rad/s]
-    shared : (r, n_c, 2, m)    S: effect of the uncertain poles on all residues together
-    local : (r, n_c, 2, 2)     Cov e: effect of a channel's own noise on its residue
-    """
-
-    pole: np.ndarray
-    shared: np.ndarray
-    local: np.ndarray
+    pole: np.ndarray  # (r, 2, m) L, roots: Cov(p_i, p_j) = L_i L_jᵀ [rad/s]
+    shared: np.ndarray  # (r, n_c, 2, m) S: effect of the uncertain poles on all residues together
+    local: np.ndarray  # (r, n_c, 2, 2) Cov e: effect of a channel's own noise on its residue
 
     def sel(self, modes: np.ndarray | slice) -> Self:
         """Some of the modes."""

@@ -9,18 +9,13 @@ from ..errors import ShapeError
 
 @dataclass(frozen=True, eq=False)
 class ModePairs:
-    """Positions of paired modes, in order of the test's frequency, and of modes without partner.
+    """Positions of paired modes, in order of the test's frequency, and of modes without partner."""
 
-    Attributes
-    ----------
-    model, test : (k,) int
-    mac : (k,)           of each pair; nan where no shapes were given
-    alone_model, alone_test : int arrays
-    """
-
+    # model, test: (k,) int
     model: np.ndarray
     test: np.ndarray
-    mac: np.ndarray
+    mac: np.ndarray  # (k,) of each pair; nan where no shapes were given
+    # alone_model, alone_test: int arrays
     alone_model: np.ndarray
     alone_test: np.ndarray
 

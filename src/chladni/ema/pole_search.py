@@ -32,18 +32,11 @@ Spread = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Poles and residues, as they were scaled.
-
-    Attributes
-    ----------
-    fit : PoleFit
-    spread : (r,), (r,)   standard deviations of |p| and of ζ
-    chi : float           rms of the residual over the noise stated or assumed
-    """
+    """Poles and residues, as they were scaled."""
 
     fit: PoleFit
-    spread: Spread
-    chi: float
+    spread: Spread  # (r,), (r,) standard deviations of |p| and of ζ
+    chi: float  # rms of the residual over the noise stated or assumed
 
 
 def searched(

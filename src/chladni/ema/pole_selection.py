@@ -29,20 +29,12 @@ BEYOND = 1.3  # as far outside the band a pole may stand for what rings there
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Poles of every order tried.
+    """Poles of every order tried."""
 
-    Attributes
-    ----------
-    order : (k,) int      number of pole pairs of the fit each pole comes from
-    poles : (k,) complex  scaled as the data
-    delta_chi2 : (k,)     rise of χ² without the pole
-    orders : (n_orders,) int
-    """
-
-    order: np.ndarray
-    poles: np.ndarray
-    delta_chi2: np.ndarray
-    orders: np.ndarray
+    order: np.ndarray  # (k,) int; number of pole pairs of the fit each pole comes from
+    poles: np.ndarray  # (k,) complex; scaled as the data
+    delta_chi2: np.ndarray  # (k,) rise of χ² without the pole
+    orders: np.ndarray  # (n_orders,) int
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,15 +26,11 @@ class EqualisedError:
     """Error of an equalised response: d ln H per standard deviation of each identified number.
 
     The error is the sum of all columns, each times an independent factor of unit variance.
-
-    Attributes
-    ----------
-    own : (k, n_s, n_out, n_in)      a channel's own linear unknowns, independent between channels
-    common : (m, n_s, n_out, n_in)   the poles, one factor for all channels
     """
 
+    # (k, n_s, n_out, n_in) a channel's own linear unknowns, independent between channels
     own: np.ndarray
-    common: np.ndarray
+    common: np.ndarray  # (m, n_s, n_out, n_in) the poles, one factor for all channels
 
 
 def equalised_error(

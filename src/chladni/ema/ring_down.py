@@ -17,20 +17,14 @@ LEVELS = 6  # steps of amplitude at which frequency and damping are given
 
 @dataclass(frozen=True, eq=False)
 class RingDown:
-    """Decay of one mode at one output.
-
-    Attributes
-    ----------
-    output : str
-    frequency, damping : float        over the whole decay [Hz], fraction of critical
-    amplitude : (k,)                  levels, falling, in the unit of the response
-    frequency_at, damping_at : (k,)   about these levels
-    """
+    """Decay of one mode at one output."""
 
     output: str
+    # frequency, damping: over the whole decay [Hz], fraction of critical
     frequency: float
     damping: float
-    amplitude: np.ndarray
+    amplitude: np.ndarray  # (k,) levels, falling, in the unit of the response
+    # frequency_at, damping_at: (k,) about these levels
     frequency_at: np.ndarray
     damping_at: np.ndarray
 

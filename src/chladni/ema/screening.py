@@ -18,32 +18,20 @@ _LN10 = np.log(10.0)
 
 @dataclass(frozen=True, eq=False)
 class Homogeneity:
-    """Comparison of two levels of the same test.
+    """Comparison of two levels of the same test."""
 
-    Attributes
-    ----------
-    ratio : float           mean |H₂ - H₁|² / (σ₁² + σ₂²): 1 for a linear structure
-    rms : float             of log₁₀(H₂ / H₁), complex: the size of the difference
-    channel : (n_out, n_in)  ratio of each channel
-    frequency : (n_f,)      Hz, the common lines
-    line : (n_f,)           ratio about each line
-    limit : float           ratio that chance does not reach
-    linear : bool
-    p : float               of so large a ratio by chance, N ratio being of a gamma distribution
-    channels : tuple of str  outputs whose own ratio is beyond chance, the one first that moves most
-        for its own response; none where it is linear
-    bands : ((low, high), ...)  runs of such lines [Hz], the worst first; none likewise
-    """
-
-    ratio: float
-    rms: float
-    channel: np.ndarray
-    frequency: np.ndarray
-    line: np.ndarray
-    limit: float
+    ratio: float  # mean |H₂ - H₁|² / (σ₁² + σ₂²): 1 for a linear structure
+    rms: float  # of log₁₀(H₂ / H₁), complex: the size of the difference
+    channel: np.ndarray  # (n_out, n_in) ratio of each channel
+    frequency: np.ndarray  # (n_f,) Hz, the common lines
+    line: np.ndarray  # (n_f,) ratio about each line
+    limit: float  # ratio that chance does not reach
     linear: bool
-    p: float = float("nan")
+    p: float = float("nan")  # of so large a ratio by chance, N ratio being of a gamma distribution
+    # outputs whose own ratio is beyond chance, the one first that moves most for its own response;
+    # none where it is linear
     channels: tuple[str, ...] = ()
+    # ((low, high), ...) runs of such lines [Hz], the worst first; none likewise
     bands: tuple[tuple[float, float], ...] = ()
 
 

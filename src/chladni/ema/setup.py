@@ -78,19 +78,13 @@ class Function:
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Mode shapes as a file holds them (dataset 55): any scale, real or complex.
+    """Mode shapes as a file holds them (dataset 55): any scale, real or complex."""
 
-    Attributes
-    ----------
-    frequency, damping : (r,)  [Hz], fraction of critical
-    values : (n, r)
-    dofs : tuple of n labels
-    """
-
+    # frequency, damping: (r,) [Hz], fraction of critical
     frequency: np.ndarray
     damping: np.ndarray
-    values: np.ndarray
-    dofs: tuple[str, ...]
+    values: np.ndarray  # (n, r)
+    dofs: tuple[str, ...]  # n labels
 
     def __post_init__(self) -> None:
         due = (len(self.dofs), len(self.frequency))
@@ -170,17 +164,11 @@ class Sensor:
 
 @dataclass(frozen=True)
 class SensorAccuracy:
-    """Standard deviations of gain, direction and position of sensors and force gauges.
+    """Standard deviations of gain, direction and position of sensors and force gauges."""
 
-    Attributes
-    ----------
-    gain : relative; calibrators let pass 3 %
-    direction : [rad] either way; glued by eye
-    position : [m] either way, where a sensor's own is not stated; placed by a tape measure
-    """
-
-    gain: float = 0.01
-    direction: float = float(np.radians(1.0))
+    gain: float = 0.01  # relative; calibrators let pass 3 %
+    direction: float = float(np.radians(1.0))  # [rad] either way; glued by eye
+    # [m] either way, where a sensor's own is not stated; placed by a tape measure
     position: float = 1.5e-3
 
 

@@ -44,19 +44,13 @@ MOST_FAULTS = 3  # faults that are named one after another
 
 @dataclass(frozen=True, eq=False)
 class ModelShapes:
-    """Shapes of the model at the channels, also for other directions and places.
+    """Shapes of the model at the channels, also for other directions and places."""
 
-    Attributes
-    ----------
-    values : (n, m)       shapes at the outputs
-    frequency : (m,)      [Hz]
-    turned : (n) -> (k, m), names   the same places along other directions
-    elsewhere : (n) -> (k, m), names   other places along the channel's direction
-    """
-
-    values: np.ndarray
-    frequency: np.ndarray
+    values: np.ndarray  # (n, m) shapes at the outputs
+    frequency: np.ndarray  # (m,) [Hz]
+    # (n) -> (k, m), names: the same places along other directions
     turned: Callable[[int], tuple[np.ndarray, list[str]]] | None = None
+    # (n) -> (k, m), names: other places along the channel's direction
     elsewhere: Callable[[int], tuple[np.ndarray, list[str]]] | None = None
 
 

@@ -17,26 +17,17 @@ from .propagation import propagated, standard_deviations
 
 @dataclass(frozen=True, eq=False)
 class MeasuredShapes:
-    """Shapes of identified modes at the outputs.
+    """Shapes of identified modes at the outputs."""
 
-    Attributes
-    ----------
-    outputs : tuple of n labels
-    values : (n, r) complex   Ψ, turned so that they are as real as they can be
-    participation : (n_in, r) complex   ψ at the inputs, R_r ≈ Ψ_r participation_rᵀ / 2i Im p_r
-    collinearity : (r,)       1: all channels move in phase (a normal mode); 0: none do
-    rank : (r,)               share of the residue one mode explains (1 for one input)
-    scaled : bool             1/√kg, by a drive point; else of largest entry 1
-    polarity : (r,)           sign of the modal constant at the drive point: -1 is impossible, so
-                              that sensor or force gauge is reversed
-    """
-
-    outputs: tuple[str, ...]
-    values: np.ndarray
+    outputs: tuple[str, ...]  # n labels
+    values: np.ndarray  # (n, r) complex; Ψ, turned so that they are as real as they can be
+    # (n_in, r) complex; ψ at the inputs, R_r ≈ Ψ_r participation_rᵀ / 2i Im p_r
     participation: np.ndarray
-    collinearity: np.ndarray
-    rank: np.ndarray
-    scaled: bool
+    collinearity: np.ndarray  # (r,) 1: all channels move in phase (a normal mode); 0: none do
+    rank: np.ndarray  # (r,) share of the residue one mode explains (1 for one input)
+    scaled: bool  # 1/√kg, by a drive point; else of largest entry 1
+    # (r,) sign of the modal constant at the drive point: -1 is impossible, so that sensor or force
+    # gauge is reversed
     polarity: np.ndarray
 
 

@@ -51,22 +51,13 @@ def window(name: str, n: int, decay: float = 0.01) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Averaged auto and cross spectra, up to one common factor.
+    """Averaged auto and cross spectra, up to one common factor."""
 
-    Attributes
-    ----------
-    frequency : (n_f,) Hz
-    ff : (n_f, n_in, n_in)     Σ F Fᴴ / n
-    yf : (n_f, n_out, n_in)    Σ Y Fᴴ / n
-    yy : (n_f, n_out)          Σ |Y|² / n
-    averages : float           independent averages
-    """
-
-    frequency: np.ndarray
-    ff: np.ndarray
-    yf: np.ndarray
-    yy: np.ndarray
-    averages: float
+    frequency: np.ndarray  # (n_f,) Hz
+    ff: np.ndarray  # (n_f, n_in, n_in) Σ F Fᴴ / n
+    yf: np.ndarray  # (n_f, n_out, n_in) Σ Y Fᴴ / n
+    yy: np.ndarray  # (n_f, n_out) Σ |Y|² / n
+    averages: float  # independent averages
 
 
 def spectra(

@@ -25,22 +25,13 @@ CONFIRMED = 1 / 3  # of the orders that could hold all poles found
 
 @dataclass(frozen=True, eq=False)
 class Stabilisation:
-    """Poles of every order.
+    """Poles of every order."""
 
-    Attributes
-    ----------
-    states : (k,) int     order of the system each pole comes from
-    frequency : (k,)      [Hz]
-    damping : (k,)        [-]
-    kind : (k,) str       o new, f frequency, d and damping, v and shape, s all three
-    sigma : (n,)          singular values, over the largest
-    """
-
-    states: np.ndarray
-    frequency: np.ndarray
-    damping: np.ndarray
-    kind: np.ndarray
-    sigma: np.ndarray
+    states: np.ndarray  # (k,) int; order of the system each pole comes from
+    frequency: np.ndarray  # (k,) [Hz]
+    damping: np.ndarray  # (k,) [-]
+    kind: np.ndarray  # (k,) str; o new, f frequency, d and damping, v and shape, s all three
+    sigma: np.ndarray  # (n,) singular values, over the largest
 
     def seen(self, found: Identified) -> np.ndarray:
         """Share of the orders rich enough for all poles found in which each of them stands (r,)."""

@@ -19,20 +19,12 @@ _SURPLUS = 2.0  # rows of O over the states sought: the rest is noise that the S
 
 @dataclass(frozen=True, eq=False)
 class Subspace:
-    """O of the largest order; a smaller order uses its first columns.
+    """O of the largest order; a smaller order uses its first columns."""
 
-    Attributes
-    ----------
-    O : (n_o q, n)     extended observability matrix, columns by falling singular value
-    sigma : (n,)       singular values: a step down is the number of states
-    outputs : int      n_o
-    alpha : float      of the bilinear map, in the units of s
-    """
-
-    O: np.ndarray
-    sigma: np.ndarray
-    outputs: int
-    alpha: float
+    O: np.ndarray  # (n_o q, n) extended observability matrix, columns by falling singular value
+    sigma: np.ndarray  # (n,) singular values: a step down is the number of states
+    outputs: int  # n_o
+    alpha: float  # of the bilinear map, in the units of s
 
     def modes(self, order: int) -> tuple[np.ndarray, np.ndarray]:
         """Upper poles (r,) of the system of that many states and their shapes (n_o, r).

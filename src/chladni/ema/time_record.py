@@ -12,23 +12,15 @@ from ..errors import ShapeError
 
 @dataclass(frozen=True, eq=False)
 class TimeRecord:
-    """Time histories of all channels of one test: hits or bursts as blocks, or one long stretch.
+    """Time histories of all channels of one test: hits or bursts as blocks, or one long stretch."""
 
-    Attributes
-    ----------
-    force : (b, n_in, n)      [N]; where the base was moved, its motion in the unit of the responses
-    response : (b, n_out, n)  [m], [m/s] or [m/s²] as ``quantity`` says
-    rate : float              samples per second
-    inputs, outputs : tuple of str
-    quantity : of the response per input
-    """
-
+    # (b, n_in, n) [N]; where the base was moved, its motion in the unit of the responses
     force: np.ndarray
-    response: np.ndarray
-    rate: float
+    response: np.ndarray  # (b, n_out, n) [m], [m/s] or [m/s²] as ``quantity`` says
+    rate: float  # samples per second
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    quantity: Quantity = "accelerance"
+    quantity: Quantity = "accelerance"  # of the response per input
 
     def __post_init__(self) -> None:
         b, _, n = self.force.shape if self.force.ndim == 3 else (0, 0, 0)

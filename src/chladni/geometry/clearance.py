@@ -20,28 +20,16 @@ from .thickness_mapping import shell_area
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Places of one part that face another part.
-
-    Attributes
-    ----------
-    parts : (str, str)
-    rows : (k,) int          rows of points on the first part
-    opposite : (k, 3) int    rows of the opposite triangle
-    weight : (k, 3)          of these
-    normal : (k, 3)          unit, from the first part to the second
-    clearance : (k,)         distance less half of both thicknesses [m]
-    uncertainty : (k,)       h² κ/8 of both sides [m]
-    free : (k,) bool         farther than ``away`` from any joint
-    """
+    """Places of one part that face another part."""
 
     parts: tuple[str, str]
-    rows: np.ndarray
-    opposite: np.ndarray
-    weight: np.ndarray
-    normal: np.ndarray
-    clearance: np.ndarray
-    uncertainty: np.ndarray
-    free: np.ndarray
+    rows: np.ndarray  # (k,) int; rows of points on the first part
+    opposite: np.ndarray  # (k, 3) int; rows of the opposite triangle
+    weight: np.ndarray  # (k, 3) of these
+    normal: np.ndarray  # (k, 3) unit, from the first part to the second
+    clearance: np.ndarray  # (k,) distance less half of both thicknesses [m]
+    uncertainty: np.ndarray  # (k,) h² κ/8 of both sides [m]
+    free: np.ndarray  # (k,) bool; farther than ``away`` from any joint
 
     @property
     def touching(self) -> np.ndarray:
@@ -153,26 +141,15 @@ def _in_box(points: np.ndarray, other: np.ndarray, margin: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class PairClearance:
-    """The smallest clearance of two parts.
-
-    Attributes
-    ----------
-    parts : (str, str)
-    least : float              clearance at the nearest place [m]
-    least_free : float         the same away from joints; inf if there is no such place [m]
-    uncertainty : float        at that place [m]
-    close : int                number of places away from joints with less than half a millimetre
-    touching : bool            True if any place away from joints is within its uncertainty
-    place : (3,)               the nearest place away from joints [m]
-    """
+    """The smallest clearance of two parts."""
 
     parts: tuple[str, str]
-    least: float
-    least_free: float
-    uncertainty: float
-    close: int
-    touching: bool
-    place: tuple[float, float, float]
+    least: float  # clearance at the nearest place [m]
+    least_free: float  # the same away from joints; inf if there is no such place [m]
+    uncertainty: float  # at that place [m]
+    close: int  # number of places away from joints with less than half a millimetre
+    touching: bool  # True if any place away from joints is within its uncertainty
+    place: tuple[float, float, float]  # (3,) the nearest place away from joints [m]
 
 
 def all_gaps(

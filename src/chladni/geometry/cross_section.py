@@ -11,18 +11,12 @@ OBLIQUE = 3.0  # a sheet that lies nearly in the plane is drawn at most this man
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """The cuts of faces by a plane normal to an axis.
+    """The cuts of faces by a plane normal to an axis."""
 
-    Attributes
-    ----------
-    axis : int             0, 1 or 2: x, y or z is constant
-    lines : (k, 2, 2)      ends of the cuts in the plane, along the two other axes in order [m]
-    face : (k,) int        index of the face of each cut
-    """
-
-    axis: int
+    axis: int  # 0, 1 or 2: x, y or z is constant
+    # (k, 2, 2) ends of the cuts in the plane, along the two other axes in order [m]
     lines: np.ndarray
-    face: np.ndarray
+    face: np.ndarray  # (k,) int; index of the face of each cut
 
 
 def cross_section(points: np.ndarray, faces: np.ndarray, axis: int, at: float) -> CrossSection:

@@ -12,25 +12,17 @@ from .facets import cell_areas
 
 @dataclass(frozen=True, eq=False)
 class FormedMesh:
-    """Sheets with the thickness forming left them.
+    """Sheets with the thickness forming left them."""
 
-    Attributes
-    ----------
-    ids : (n,) int            node ids of the file
-    points : (n, 3)           [m]
-    cells : (m, 4) int        rows of points; a triangle repeats its third; (0, 4): points alone
-    part : (m,) int           part id of each cell
-    thickness : (m, 4)        at the corners [m]
-    names : dict              part id -> name, where the file has them
-    nodal : (n,)              thickness at the points [m], NaN where no cell has any
-    """
-
-    ids: np.ndarray
-    points: np.ndarray
+    ids: np.ndarray  # (n,) int; node ids of the file
+    points: np.ndarray  # (n, 3) [m]
+    # (m, 4) int; rows of points; a triangle repeats its third; (0, 4): points alone
     cells: np.ndarray
-    part: np.ndarray
-    thickness: np.ndarray
+    part: np.ndarray  # (m,) int; part id of each cell
+    thickness: np.ndarray  # (m, 4) at the corners [m]
+    # part id -> name, where the file has them
     names: dict[int, str] = field(default_factory=dict)
+    # (n,) thickness at the points [m], NaN where no cell has any
     nodal: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:

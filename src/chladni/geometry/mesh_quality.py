@@ -15,20 +15,12 @@ LEAST_SINE, MOST_ASPECT, MOST_WARP = 0.3, 20.0, 0.15
 
 @dataclass(frozen=True, eq=False)
 class ElementQuality:
-    """Shape of every shell (n,).
+    """Shape of every shell (n,)."""
 
-    Attributes
-    ----------
-    sine : least sine of a corner angle; 1 is best, a folded shell is negative
-    aspect : longest side over shortest
-    warp : distance of the corners from the mean plane over the mean side length
-    skew : 1 - |cos| of the angle between the mid-lines; 1 is square
-    """
-
-    sine: np.ndarray
-    aspect: np.ndarray
-    warp: np.ndarray
-    skew: np.ndarray
+    sine: np.ndarray  # least sine of a corner angle; 1 is best, a folded shell is negative
+    aspect: np.ndarray  # longest side over shortest
+    warp: np.ndarray  # distance of the corners from the mean plane over the mean side length
+    skew: np.ndarray  # 1 - |cos| of the angle between the mid-lines; 1 is square
 
 
 def element_quality(assembly: Assembly) -> ElementQuality:
@@ -53,46 +45,27 @@ def element_quality(assembly: Assembly) -> ElementQuality:
 
 @dataclass(frozen=True)
 class PartCheck:
-    """The mesh of one part.
-
-    Attributes
-    ----------
-    shells, triangles : int
-    bad : int                shells beyond a limit of shape
-    worst_sine : float
-    free_edge : float        length of its free edges [m]
-    pieces : int             connected sheets
-    turned : int             edges across which the normals disagree
-    branched : int           edges of more than two shells
-    joined : bool            tied to any other part
-    """
+    """The mesh of one part."""
 
     part: str
     shells: int
     triangles: int
-    bad: int
+    bad: int  # shells beyond a limit of shape
     worst_sine: float
-    free_edge: float
-    pieces: int
-    turned: int
-    branched: int
-    joined: bool
+    free_edge: float  # length of its free edges [m]
+    pieces: int  # connected sheets
+    turned: int  # edges across which the normals disagree
+    branched: int  # edges of more than two shells
+    joined: bool  # tied to any other part
 
 
 @dataclass(frozen=True, eq=False)
 class MeshCheck:
-    """The checks of all parts, and the parts that are not connected.
-
-    Attributes
-    ----------
-    parts : tuple of PartCheck
-    bad : (k,) int            ids of shells beyond a limit of shape
-    loose : tuple of str      parts not connected to the largest structure
-    """
+    """The checks of all parts, and the parts that are not connected."""
 
     parts: tuple[PartCheck, ...]
-    bad: np.ndarray
-    loose: tuple[str, ...]
+    bad: np.ndarray  # (k,) int; ids of shells beyond a limit of shape
+    loose: tuple[str, ...]  # parts not connected to the largest structure
 
     @property
     def fit(self) -> bool:

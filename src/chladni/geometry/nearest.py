@@ -30,46 +30,28 @@ ShellChoice = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows 
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
-    """Nearest points of a surface to k places.
+    """Nearest points of a surface to k places."""
 
-    Attributes
-    ----------
-    shell : (k,) int      rows of ``ShellSurface.nodes``
-    place : (k, 3)        [m]
-    nodes : (k, 3) int    rows of points of the triangle
-    weight : (k, 3)       barycentric weights of these nodes
-    distance : (k,)       [m]
-    normal : (k, 3)       unit normal of the triangle, by the order of the shell's grids
-    """
-
-    shell: np.ndarray
-    place: np.ndarray
-    nodes: np.ndarray
-    weight: np.ndarray
-    distance: np.ndarray
-    normal: np.ndarray
+    shell: np.ndarray  # (k,) int; rows of ``ShellSurface.nodes``
+    place: np.ndarray  # (k, 3) [m]
+    nodes: np.ndarray  # (k, 3) int; rows of points of the triangle
+    weight: np.ndarray  # (k, 3) barycentric weights of these nodes
+    distance: np.ndarray  # (k,) [m]
+    normal: np.ndarray  # (k, 3) unit normal of the triangle, by the order of the shell's grids
 
 
 @dataclass(frozen=True, eq=False)
 class ShellSurface:
-    """Shells that are searched for nearest points.
-
-    Attributes
-    ----------
-    name : str
-    points : (n, 3)     all points of the assembly [m]
-    nodes : (m, 4)      rows of points
-    rows : (m,)         rows of ``assembly.shells``
-    tree, owner :       sample points on the longer mid-lines of shells (k,), and their shells
-    cover :             largest distance of a point of the shell from its sample point [m]
-    """
+    """Shells that are searched for nearest points."""
 
     name: str
-    points: np.ndarray
-    nodes: np.ndarray
-    rows: np.ndarray
+    points: np.ndarray  # (n, 3) all points of the assembly [m]
+    nodes: np.ndarray  # (m, 4) rows of points
+    rows: np.ndarray  # (m,) rows of ``assembly.shells``
+    # tree, owner: sample points on the longer mid-lines of shells (k,), and their shells
     tree: "cKDTree" = field(repr=False)
     owner: np.ndarray = field(repr=False)
+    # largest distance of a point of the shell from its sample point [m]
     cover: np.ndarray = field(repr=False)
 
     @classmethod

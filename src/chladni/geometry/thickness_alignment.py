@@ -26,22 +26,13 @@ _REFLECTION = np.diag([1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """x -> R x + d.
+    """x -> R x + d."""
 
-    Attributes
-    ----------
-    rotation : (3, 3)
-    shift : (3,)          [m]
-    residual : float      trimmed rms distance from the structure [m]
-    mirrored : bool       R is a reflection: the formed mesh is of the other side
-    start : str           name of the best start
-    """
-
-    rotation: np.ndarray
-    shift: np.ndarray
-    residual: float
-    mirrored: bool
-    start: str
+    rotation: np.ndarray  # (3, 3)
+    shift: np.ndarray  # (3,) [m]
+    residual: float  # trimmed rms distance from the structure [m]
+    mirrored: bool  # R is a reflection: the formed mesh is of the other side
+    start: str  # name of the best start
 
 
 def moved(formed: FormedMesh, by: Alignment) -> FormedMesh:

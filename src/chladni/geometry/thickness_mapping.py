@@ -26,27 +26,17 @@ _GAUSS = np.array([_NEAR**2, _NEAR * _FAR, _FAR**2, _NEAR * _FAR])  # weights of
 
 @dataclass(frozen=True)
 class PartMapping:
-    """The result of the mapping for one part.
-
-    Attributes
-    ----------
-    part : str
-    source : str             name or number of the formed part
-    coverage : float         share of the area with a partner
-    distance_95 : float      95th percentile of the distance to it [m]
-    mean : float             area mean of the mapped thickness [m]
-    mass_before, mass_after : float  [kg]
-    round_trip : float       rms of formed -> mesh -> formed, relative to t; nan for points, scans
-    """
+    """The result of the mapping for one part."""
 
     part: str
-    source: str
-    coverage: float
-    distance_95: float
-    mean: float
+    source: str  # name or number of the formed part
+    coverage: float  # share of the area with a partner
+    distance_95: float  # 95th percentile of the distance to it [m]
+    mean: float  # area mean of the mapped thickness [m]
+    # mass_before, mass_after: [kg]
     mass_before: float
     mass_after: float
-    round_trip: float
+    round_trip: float  # rms of formed -> mesh -> formed, relative to t; nan for points, scans
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,22 +23,13 @@ FEATURES = ("one", "bent", "bent around")
 
 @dataclass(frozen=True, eq=False)
 class ThinningModel:
-    """1 - t/t₀ = x·β (1 + e_part) + e_place.
+    """1 - t/t₀ = x·β (1 + e_part) + e_place."""
 
-    Attributes
-    ----------
-    beta : (3,)            of FEATURES
-    part_spread : float    standard deviation of a part's strength, relative
-    place_spread : float   of a place within a part [-]
-    left_out : dict        part -> rms error of t/t₀ predicted from all other parts
-    trivial : dict         part -> rms error of t/t₀ for the gauge thickness
-    """
-
-    beta: np.ndarray
-    part_spread: float
-    place_spread: float
-    left_out: dict[str, float]
-    trivial: dict[str, float]
+    beta: np.ndarray  # (3,) of FEATURES
+    part_spread: float  # standard deviation of a part's strength, relative
+    place_spread: float  # of a place within a part [-]
+    left_out: dict[str, float]  # part -> rms error of t/t₀ predicted from all other parts
+    trivial: dict[str, float]  # part -> rms error of t/t₀ for the gauge thickness
 
 
 def gauge(assembly: Assembly) -> np.ndarray:

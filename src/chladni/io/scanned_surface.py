@@ -33,20 +33,12 @@ UNREADABLE = (
 
 @dataclass(frozen=True, eq=False)
 class ScannedSurface:
-    """A triangulated surface.
+    """A triangulated surface."""
 
-    Attributes
-    ----------
-    points : (n, 3)       [m]
-    cells : (m, 4) int    triangles as rows of points, the third repeated
-    volume : float        inside, nan unless the surface is closed and wound one way [m³]
-    notes : tuple of str  what is remarkable about it
-    """
-
-    points: np.ndarray
-    cells: np.ndarray
-    volume: float
-    notes: tuple[str, ...]
+    points: np.ndarray  # (n, 3) [m]
+    cells: np.ndarray  # (m, 4) int; triangles as rows of points, the third repeated
+    volume: float  # inside, nan unless the surface is closed and wound one way [m³]
+    notes: tuple[str, ...]  # what is remarkable about it
 
 
 def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:

@@ -45,35 +45,22 @@ _FAR = 0.01  # [m] from the mesh: worth saying
 
 @dataclass(frozen=True, eq=False)
 class CaseDraft:
-    """Content of the case that `chladni init` writes.
+    """Content of the case that `chladni init` writes."""
 
-    Attributes
-    ----------
-    deck, recordings : files
-    units : Units, and ``units_why`` how they are known
-    assembly : SI
-    mass : of the deck [kg]
-    quantity : the user's word, "" where the files say it
-    allow : cards of the deck that are passed over
-    read : recordings as read, the compared one first
-    dofs : where its outputs and inputs are
-    notes : what was assumed
-    missing : what is still missing, and how to supply it
-    """
-
+    # deck, recordings: files
     deck: Path
     recordings: tuple[Path, ...]
-    units: Units
+    units: Units  # and ``units_why`` how they are known
     units_why: str
     assembly: Assembly
-    mass: float
-    quantity: str
+    mass: float  # of the deck [kg]
+    quantity: str  # the user's word, "" where the files say it
     weighed: float | None
-    allow: tuple[str, ...]
-    read: tuple[Recording, ...]
-    dofs: tuple[MatchedDof, ...]
-    notes: tuple[str, ...]
-    missing: tuple[str, ...]
+    allow: tuple[str, ...]  # cards of the deck that are passed over
+    read: tuple[Recording, ...]  # recordings as read, the compared one first
+    dofs: tuple[MatchedDof, ...]  # where its outputs and inputs are
+    notes: tuple[str, ...]  # what was assumed
+    missing: tuple[str, ...]  # what is still missing, and how to supply it
 
     @property
     def found(self) -> str:

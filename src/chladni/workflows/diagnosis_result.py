@@ -48,22 +48,16 @@ class ChangedDeck:
 
 @dataclass(frozen=True, eq=False)
 class UpdatedModels:
-    """The three structures of a diagnosis, with their responses and the recording's.
+    """The three structures of a diagnosis, with their responses and the recording's."""
 
-    Attributes
-    ----------
-    nominal : Modelled                 the deck as it was given
-    calibrated, final : ChangedDeck    without and with the effect; identical if none is named
-    curves : {"test", "before", "after": FRF}, empty without an FRF
-    held_out : labels of outputs that were not fitted
-    test : the modes of the recording
-    """
-
-    nominal: Modelled
+    nominal: Modelled  # the deck as it was given
+    # calibrated, final: without and with the effect; identical if none is named
     calibrated: ChangedDeck
     final: ChangedDeck
+    # {"test", "before", "after": FRF}, empty without an FRF
     curves: dict[str, FRF] = field(default_factory=dict)
-    held_out: tuple[str, ...] = ()
+    held_out: tuple[str, ...] = ()  # labels of outputs that were not fitted
+    # the modes of the recording
     test: MeasuredModes = field(default_factory=lambda: MeasuredModes(np.zeros(0)))
 
 
@@ -147,13 +141,7 @@ class DiagnosisResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class StateResult:
-    """One state of an object, and its result.
+    """One state of an object, and its result."""
 
-    Attributes
-    ----------
-    name : of the state; beside it stand all keys of the state's own diagnosis
-    result : of this state
-    """
-
-    name: str
-    result: DiagnosisResult
+    name: str  # of the state; beside it stand all keys of the state's own diagnosis
+    result: DiagnosisResult  # of this state

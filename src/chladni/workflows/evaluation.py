@@ -33,21 +33,13 @@ LINES = 2500  # of an FRF: more take minutes to identify; whoever wants that nam
 
 @dataclass(frozen=True, eq=False)
 class RecordingEvaluation:
-    """Evaluation of one recording.
+    """Evaluation of one recording."""
 
-    Attributes
-    ----------
-    recording : Recording     with the FRFs
-    estimate : details of their estimation, if it held time data
-    decays : free decays of its strongest modes, if its inputs stop
-    levels : study of the modes over the decaying amplitude
-    screening : Screening
-    """
-
-    recording: Recording
-    estimate: FrfEstimate | None
-    decays: tuple[RingDown, ...]
+    recording: Recording  # with the FRFs
+    estimate: FrfEstimate | None  # details of their estimation, if it held time data
+    decays: tuple[RingDown, ...]  # free decays of its strongest modes, if its inputs stop
     screening: Screening
+    # study of the modes over the decaying amplitude
     levels: LevelStudy = field(default_factory=LevelStudy)
 
 

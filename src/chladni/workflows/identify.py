@@ -38,20 +38,12 @@ TRUST = 5.0  # rms of the whitened residual above which poles are not to be trus
 
 @dataclass(frozen=True, eq=False)
 class RecordingModes:
-    """Modes identified from one recording, and its screening.
-
-    Attributes
-    ----------
-    recording : Recording
-    whole : Identified      with the poles outside the band that contribute to it
-    screening : Screening   faults that the recording itself reveals
-    diagram : Stabilisation poles of every order of the subspace method
-    """
+    """Modes identified from one recording, and its screening."""
 
     recording: Recording
-    whole: Identified
-    screening: Screening
-    diagram: Stabilisation
+    whole: Identified  # with the poles outside the band that contribute to it
+    screening: Screening  # faults that the recording itself reveals
+    diagram: Stabilisation  # poles of every order of the subspace method
 
     @property
     def modes(self) -> Identified:

@@ -27,27 +27,19 @@ QUICK = CalibrationSettings(quick=True)
 
 @dataclass(frozen=True, eq=False)
 class JointModelFit:
-    """A deck with one kind of joint modelled in another way, calibrated.
+    """A deck with one kind of joint modelled in another way, calibrated."""
 
-    Attributes
-    ----------
-    name : joints and model, as "welds rigid"; "deck" for the deck itself
-    refused : why it could not be made or fitted, in one sentence; then nothing else is known
-    fitted, held_out : Q before and after the calibration
-    frequency_rms : of ln(model/test) of the paired frequencies before and after [%]
-    mass : of the calibrated deck [kg]
-    distrust : reasons not to trust the calibration
-    assembly : before the calibration
-    """
-
-    name: str
+    name: str  # joints and model, as "welds rigid"; "deck" for the deck itself
+    # why it could not be made or fitted, in one sentence; then nothing else is known
     refused: str = ""
+    # fitted, held_out: Q before and after the calibration
     fitted: Scores = field(default_factory=Scores)
     held_out: Scores = field(default_factory=Scores)
+    # of ln(model/test) of the paired frequencies before and after [%]
     frequency_rms: tuple[float | None, float | None] = (None, None)
-    mass: float | None = None
-    distrust: tuple[str, ...] = ()
-    assembly: Assembly | None = None
+    mass: float | None = None  # of the calibrated deck [kg]
+    distrust: tuple[str, ...] = ()  # reasons not to trust the calibration
+    assembly: Assembly | None = None  # before the calibration
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -27,45 +27,31 @@ MatchedBy = Literal["grid", "place", "nearest", "base", "table", "missing"]
 
 @dataclass(frozen=True, eq=False)
 class MatchedDof:
-    """One output or input, and how it was found.
-
-    Attributes
-    ----------
-    matched_by : "grid" (its number is a grid of the deck), "place" (a grid is at its place in the
-        recording), "nearest" (on the nearest shell or grid), "base", "table" (a row of the given
-        table), or "missing"
-    grid, place : one of them, [m]; neither where it is missing or the base
-    distance : between the recording's place and the deck's [m], nan where one is unknown
-    axis : (3,) unit vector, basic frame; None: the surface's normal
-    mass : of the sensor, where a table says so [kg]
-    """
+    """One output or input, and how it was found."""
 
     label: str
     role: Role
+    # "grid" (its number is a grid of the deck), "place" (a grid is at its place in the recording),
+    # "nearest" (on the nearest shell or grid), "base", "table" (a row of the given table), or
+    # "missing"
     matched_by: MatchedBy
+    # grid, place: one of them, [m]; neither where it is missing or the base
     grid: int | None = None
     place: np.ndarray | None = None
+    # between the recording's place and the deck's [m], nan where one is unknown
     distance: float = np.nan
-    axis: np.ndarray | None = None
-    mass: float = 0.0
+    axis: np.ndarray | None = None  # (3,) unit vector, basic frame; None: the surface's normal
+    mass: float = 0.0  # of the sensor, where a table says so [kg]
 
 
 @dataclass(frozen=True, eq=False)
 class NodesOnDeck:
-    """Nodes of a recording on a deck.
+    """Nodes of a recording on a deck."""
 
-    Attributes
-    ----------
-    row : (n,) int     of the grid, -1 where none is at the node
-    place : (n, 3)     of the recording [m], nan where it has none
-    unit : in which the places fit the deck
-    by_place : number of nodes that were found at a grid of another number
-    """
-
-    row: np.ndarray
-    place: np.ndarray
-    unit: str
-    by_place: int
+    row: np.ndarray  # (n,) int; of the grid, -1 where none is at the node
+    place: np.ndarray  # (n, 3) of the recording [m], nan where it has none
+    unit: str  # in which the places fit the deck
+    by_place: int  # number of nodes that were found at a grid of another number
 
 
 def matched(

@@ -168,22 +168,13 @@ def other_modes(
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Points of a file that the model has.
+    """Points of a file that the model has."""
 
-    Attributes
-    ----------
-    row : (n,) int         grid of the model, -1 for a place away from grids
-    free : MeasuredDofs    directions X, Y, Z of the places away from grids, in this order
-    axes : (n, 3, 3)       local axes of the file by row, basic frame
-    values : (n, 3, r)     translations of the file along them, nan where it has none
-    said : notes on how they were matched
-    """
-
-    row: np.ndarray
-    free: MeasuredDofs
-    axes: np.ndarray
-    values: np.ndarray
-    said: tuple[str, ...]
+    row: np.ndarray  # (n,) int; grid of the model, -1 for a place away from grids
+    free: MeasuredDofs  # directions X, Y, Z of the places away from grids, in this order
+    axes: np.ndarray  # (n, 3, 3) local axes of the file by row, basic frame
+    values: np.ndarray  # (n, 3, r) translations of the file along them, nan where it has none
+    said: tuple[str, ...]  # notes on how they were matched
 
     def own(self, model: Model, shapes: np.ndarray) -> np.ndarray:
         """Translations of the model's modes (n_free_dofs, k) along the file's axes (n, 3, k)."""

@@ -32,18 +32,12 @@ class PartDistance:
 
 @dataclass(frozen=True, eq=False)
 class ScanComparison:
-    """Distance of every shell's face to the scan.
+    """Distance of every shell's face to the scan."""
 
-    Attributes
-    ----------
-    off : (m,)            | distance of the shell's middle to the scan - t/2 | [m], nan: not scanned
-    parts : tuple         those scanned, the best covered first
-    alignment : Alignment or None   what brought the scan onto the model
-    """
-
+    # (m,) | distance of the shell's middle to the scan - t/2 | [m], nan: not scanned
     off: np.ndarray
-    parts: tuple[PartDistance, ...]
-    alignment: Alignment | None
+    parts: tuple[PartDistance, ...]  # those scanned, the best covered first
+    alignment: Alignment | None  # what brought the scan onto the model, or None
 
 
 def compare_with_scan(

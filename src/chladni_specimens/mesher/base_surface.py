@@ -19,18 +19,11 @@ def ramp(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class CrownedSurface:
-    """Centre line and crown.
+    """Centre line and crown."""
 
-    Attributes
-    ----------
-    line : (4, n)      s, x, z [m] and slope φ from the vertical [rad] of the centre line
-    crown : (2,)       c = 1/2R at s = 0 and at s = height [1/m]
-    height : float     [m]
-    """
-
-    line: np.ndarray
-    crown: tuple[float, float]
-    height: float
+    line: np.ndarray  # (4, n) s, x, z [m] and slope φ from the vertical [rad] of the centre line
+    crown: tuple[float, float]  # (2,) c = 1/2R at s = 0 and at s = height [1/m]
+    height: float  # [m]
 
     @classmethod
     def of(

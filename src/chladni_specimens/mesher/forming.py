@@ -27,16 +27,10 @@ MOST_THINNING = 0.38  # thinning at which a sheet would tear
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Values on a regular planform grid.
+    """Values on a regular planform grid."""
 
-    Attributes
-    ----------
-    low : (2,)          y and s of the first value [m]
-    values : (n, m)
-    """
-
-    low: np.ndarray
-    values: np.ndarray
+    low: np.ndarray  # (2,) y and s of the first value [m]
+    values: np.ndarray  # (n, m)
 
     def at(self, plan: np.ndarray) -> np.ndarray:
         """Bilinear interpolation at planform points (k, 2); the value at the rim beyond it."""
@@ -77,22 +71,13 @@ def _normal(P: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
 
 @dataclass(frozen=True, eq=False)
 class Forming:
-    """Effect of forming on one part, over the planform.
+    """Effect of forming on one part, over the planform."""
 
-    Attributes
-    ----------
-    gauge : float          of the blank [m]
-    strength : float       a of this part
-    kappa : Field          curvature [1/m]
-    indicator : Field
-    paired : bool          left and right parts share the fields of y > 0
-    """
-
-    gauge: float
-    strength: float
-    kappa: Field
+    gauge: float  # of the blank [m]
+    strength: float  # a of this part
+    kappa: Field  # curvature [1/m]
     indicator: Field
-    paired: bool = False
+    paired: bool = False  # left and right parts share the fields of y > 0
 
     @classmethod
     def of(

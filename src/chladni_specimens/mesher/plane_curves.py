@@ -103,14 +103,9 @@ def stadium(a: Sequence[float], b: Sequence[float], radius: float) -> np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A closed line, dense enough to measure distances from it.
+    """A closed line, dense enough to measure distances from it."""
 
-    Attributes
-    ----------
-    points : (n, 2)   counter-clockwise, evenly spaced
-    """
-
-    points: np.ndarray
+    points: np.ndarray  # (n, 2) counter-clockwise, evenly spaced
     tree: "cKDTree" = field(repr=False)
 
     @classmethod

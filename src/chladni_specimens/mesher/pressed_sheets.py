@@ -22,22 +22,13 @@ MAIN, BASE, FOLD = 0, 1, 2  # zones: the sheet itself, base of the hem's U, its 
 
 @dataclass(frozen=True, eq=False)
 class PressedSheet:
-    """One pressing.
-
-    Attributes
-    ----------
-    name : str
-    plan : (n, 3)      y, s and depth of the nodes [m]
-    points : (n, 3)    places [m]
-    quads : (m, 4)     rows of points; a triangle repeats its third
-    zone : (m,)        MAIN, BASE or FOLD
-    """
+    """One pressing."""
 
     name: str
-    plan: np.ndarray
-    points: np.ndarray
-    quads: np.ndarray
-    zone: np.ndarray
+    plan: np.ndarray  # (n, 3) y, s and depth of the nodes [m]
+    points: np.ndarray  # (n, 3) places [m]
+    quads: np.ndarray  # (m, 4) rows of points; a triangle repeats its third
+    zone: np.ndarray  # (m,) MAIN, BASE or FOLD
 
     @property
     def area(self) -> np.ndarray:

@@ -67,14 +67,9 @@ def wall(start: float, width: float, depth: float, size: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Borders:
-    """Outline and window as evenly spaced points; both have `frame` pieces above the waist.
+    """Outline and window as evenly spaced points; both have `frame` pieces above the waist."""
 
-    Attributes
-    ----------
-    outline, window : (n, 2) closed, the frame's arc first, from the left (+y) over the top
-    frame : int
-    """
-
+    # outline, window: (n, 2) closed, the frame's arc first, from the left (+y) over the top
     outline: np.ndarray
     window: np.ndarray
     frame: int

@@ -36,20 +36,12 @@ OFF_STEP = 0.97  # pitch of the strings in mesh sizes, so that it differs from t
 
 @dataclass(frozen=True, eq=False)
 class TailgateFrame:
-    """The assembly under construction, with the sheets that the joints connect.
-
-    Attributes
-    ----------
-    skin : Skin
-    assembly : Assembly
-    sheets : dict of PressedSheet
-    rows : dict of (n,) int   rows of ``assembly.shells`` of each sheet
-    """
+    """The assembly under construction, with the sheets that the joints connect."""
 
     skin: Skin
     assembly: Assembly
     sheets: dict[str, PressedSheet]
-    rows: dict[str, np.ndarray]
+    rows: dict[str, np.ndarray]  # (n,) int; rows of ``assembly.shells`` of each sheet
 
     def surface(self, name: str, zone: int = MAIN) -> ShellSurface:
         """The shells of one zone of a sheet."""

@@ -21,31 +21,22 @@ class Axis:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FunctionSet:
-    """58: a function of a response dof and a reference dof.
+    """58: a function of a response dof and a reference dof."""
 
-    Attributes
-    ----------
-    function : 1 time, 4 FRF, 5 transmissibility, 6 coherence, ...
-    response, reference : (node, direction -6 to 6)
-    names : of the entities (parts of a structure, points) of response and reference; "" for none
-    due : how many values the head says there are
-    x, y : (n,)
-    abscissa, ordinate, denominator : Axis
-    title : first line of its head
-    number : of the dataset in the file, from 1
-    """
-
-    function: int
+    function: int  # 1 time, 4 FRF, 5 transmissibility, 6 coherence, ...
+    # response, reference: (node, direction -6 to 6)
     response: tuple[int, int]
     reference: tuple[int, int]
-    due: int
+    due: int  # how many values the head says there are
+    # x, y: (n,)
     x: np.ndarray
     y: np.ndarray
     abscissa: Axis
     ordinate: Axis
     denominator: Axis
-    title: str = ""
-    number: int = 0
+    title: str = ""  # first line of its head
+    number: int = 0  # of the dataset in the file, from 1
+    # of the entities (parts of a structure, points) of response and reference; "" for none
     names: tuple[str, str] = ("", "")
 
 

@@ -21,20 +21,13 @@ from .free_ids import FreeIds
 
 @dataclass(frozen=True, eq=False)
 class AddedElements:
-    """Elements that another assembly has in addition to those of the deck.
+    """Elements that another assembly has in addition to those of the deck."""
 
-    Attributes
-    ----------
-    after : the other assembly
-    rest : ``after`` without the added beams, and without the parts of which they alone are
-    beams : rows of these beams in ``after``
-    own : positions of these parts in ``after``
-    """
-
-    after: Assembly
+    after: Assembly  # the other assembly
+    # ``after`` without the added beams, and without the parts of which they alone are
     rest: Assembly
-    beams: np.ndarray
-    own: tuple[int, ...]
+    beams: np.ndarray  # rows of these beams in ``after``
+    own: tuple[int, ...]  # positions of these parts in ``after``
 
     def cards(self, before: Assembly, units: Units, free: FreeIds) -> Iterator[Card]:
         """All of them; elements are numbered from the first id that is free.

@@ -16,23 +16,15 @@ from .coordinate_systems import Frames
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """A deck being converted.
-
-    Attributes
-    ----------
-    ids : (n,) int       points by increasing id, grids and scalar points
-    places : (n, 3)      basic coordinates in the deck's own unit of length
-    axes : (n, 3, 3) or None   displacement frames
-    scalar : (n,) bool   scalar points
-    """
+    """A deck being converted."""
 
     deck: Deck
     scale: Units  # from the deck's numbers to SI, PARAM,WTMASS included
     frames: Frames
-    ids: np.ndarray
-    places: np.ndarray
-    axes: np.ndarray | None
-    scalar: np.ndarray
+    ids: np.ndarray  # (n,) int; points by increasing id, grids and scalar points
+    places: np.ndarray  # (n, 3) basic coordinates in the deck's own unit of length
+    axes: np.ndarray | None  # (n, 3, 3) displacement frames
+    scalar: np.ndarray  # (n,) bool; scalar points
 
     def rows(self, cards: Cards, ids: np.ndarray, ground: bool = False) -> np.ndarray:
         """Rows of point ids (n, ...) of the cards; 0 is the ground (-1) where allowed.

@@ -18,24 +18,16 @@ _ARITHMETIC = np.arange(80)
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """The lines of a file that hold cards.
+    """The lines of a file that hold cards."""
 
-    Attributes
-    ----------
-    number : (m,) int    line numbers from 0
-    text : (m, 80) uint8 upper case, comments blanked
-    tokens : dict        of the free-field lines: their fields, the name first
-    free, large, follows : (m,) bool   commas; 16-column fields; a continuation
-    size : (m,) int      fields, a multiple of 8, or 4 where large
-    """
-
-    number: np.ndarray
-    text: np.ndarray
-    tokens: dict[int, list[bytes]]
+    number: np.ndarray  # (m,) int; line numbers from 0
+    text: np.ndarray  # (m, 80) uint8; upper case, comments blanked
+    tokens: dict[int, list[bytes]]  # of the free-field lines: their fields, the name first
+    # free, large, follows: (m,) bool; commas; 16-column fields; a continuation
     free: np.ndarray
     large: np.ndarray
     follows: np.ndarray
-    size: np.ndarray
+    size: np.ndarray  # (m,) int; fields, a multiple of 8, or 4 where large
 
 
 def tables(source: Source, file: int, files: tuple[Path, ...]) -> dict[str, Cards]:

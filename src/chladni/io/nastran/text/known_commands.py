@@ -72,22 +72,13 @@ _FLOW: Final = frozenset((*SUBCASES, *_EXECUTIVE, *_TITLES, "OUTPUT", "ECHOON", 
 
 @dataclass(frozen=True)
 class Command:
-    """One command, its continuation lines joined.
+    """One command, its continuation lines joined."""
 
-    Attributes
-    ----------
-    where : file:line on which it begins
-    name : in full where it is acted upon, else as it is written, upper case
-    rest : what stands behind its name, upper case
-    text : as it is written
-    plots : it stands in the language of plots, behind OUTPUT(XYPLOT) or the like
-    """
-
-    where: str
-    name: str
-    rest: str
-    text: str
-    plots: bool = False
+    where: str  # file:line on which it begins
+    name: str  # in full where it is acted upon, else as it is written, upper case
+    rest: str  # what stands behind its name, upper case
+    text: str  # as it is written
+    plots: bool = False  # it stands in the language of plots, behind OUTPUT(XYPLOT) or the like
 
     @property
     def described(self) -> str:

@@ -42,18 +42,12 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class DeckFiles:
-    """All files of a deck.
+    """All files of a deck."""
 
-    Attributes
-    ----------
-    sources : the deck's own file first, then what it includes, depth first
-    control : (file:line, text) of executive and case control, includes in place
-    begins : position of the file with BEGIN BULK; -1: there is none, all is bulk data
-    """
-
-    sources: tuple[Source, ...]
+    sources: tuple[Source, ...]  # the deck's own file first, then what it includes, depth first
+    # (file:line, text) of executive and case control, includes in place
     control: tuple[tuple[str, str], ...]
-    begins: int
+    begins: int  # position of the file with BEGIN BULK; -1: there is none, all is bulk data
 
 
 def sources(path: Path) -> DeckFiles:

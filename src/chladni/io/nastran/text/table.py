@@ -15,25 +15,15 @@ _BEYOND = 1e60  # no number of a structure in any units is larger; products of t
 
 @dataclass(frozen=True, eq=False)
 class Cards:
-    """Cards of one name, fields one after another.
-
-    Attributes
-    ----------
-    text : (N,) bytes       fields after the name, stripped, upper case, card after card
-    start : (n + 1,) int    where each card's fields begin in ``text``
-    file : (n,) int         position of the file in ``Deck.sources``
-    lines : (m,) int        line numbers (from 1) of the cards, card after card
-    line_start : (n + 1,)   where each card's lines begin in ``lines``
-    files : paths of all files of the deck, for messages
-    """
+    """Cards of one name, fields one after another."""
 
     name: str
-    text: np.ndarray
-    start: np.ndarray
-    file: np.ndarray
-    lines: np.ndarray
-    line_start: np.ndarray
-    files: tuple[Path, ...] = ()
+    text: np.ndarray  # (N,) bytes; fields after the name, stripped, upper case, card after card
+    start: np.ndarray  # (n + 1,) int; where each card's fields begin in ``text``
+    file: np.ndarray  # (n,) int; position of the file in ``Deck.sources``
+    lines: np.ndarray  # (m,) int; line numbers (from 1) of the cards, card after card
+    line_start: np.ndarray  # (n + 1,) where each card's lines begin in ``lines``
+    files: tuple[Path, ...] = ()  # paths of all files of the deck, for messages
 
     def __len__(self) -> int:
         return len(self.file)
