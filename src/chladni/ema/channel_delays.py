@@ -74,7 +74,11 @@ def _consistent_poles(frf: FRF, found: Identified) -> np.ndarray:
     """Poles within the band of all channels, else of the channel whose own fit leaves least."""
     best = found
     if found.chi > CONSISTENT:
-        for o in _candidates(frf)[:TRIED]:
+        at_drive = {i for i, _, _ in drive_points(frf)}
+        noise = (noise_of(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300)).mean(axis=2)
+        each = np.median(noise, axis=0)
+        likely = sorted(range(len(frf.outputs)), key=lambda o: (o not in at_drive, each[o]))
+        for o in likely[:TRIED]:
             one = frf.sel(outputs=[frf.outputs[o]])
             try:
                 alone = identify(one, found.band, use=screening_lines(one))
@@ -86,14 +90,6 @@ def _consistent_poles(frf: FRF, found: Identified) -> np.ndarray:
                 break
     sure = best.frequency_sd < 0.02 * best.frequency
     return np.asarray(best.poles[best.inside & sure])
-
-
-def _candidates(frf: FRF) -> list[int]:
-    """Outputs at a drive point first, then by their noise."""
-    at_drive = {i for i, _, _ in drive_points(frf)}
-    noise = (noise_of(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300)).mean(axis=2)
-    each = np.median(noise, axis=0)
-    return sorted(range(len(frf.outputs)), key=lambda o: (o not in at_drive, each[o]))
 
 
 def _delay(

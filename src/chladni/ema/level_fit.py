@@ -120,7 +120,10 @@ def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
             [(x[0] + np.log(ratio / f)) / s_f, np.log(np.maximum(zeta, 1e-9) / z) / s_z]
         )
 
-    low, high = _bounds(element, signed)
+    # bounds of θ: logarithms of positive parameters; signed ones without a logarithm
+    ends = np.array([n.bounds for n in element.numbers]).reshape(-1, 2)
+    low = np.where(signed, -ends[:, 1] / 2, np.log(np.where(signed, 1.0, ends[:, 0])))
+    high = np.where(signed, ends[:, 1], np.log(ends[:, 1]))
     head = [float(np.log(f[0])), float(np.log(z.min()))]
     starts = [np.where(signed, x, np.log(np.abs(x))) if x else np.zeros(0)
               for x in element.starts()]  # fmt: skip
@@ -140,13 +143,6 @@ def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
         element, float(np.exp(best.x[0])), float(np.exp(best.x[1])), values(best.x[2:]), sd,
         largest, float(2 * best.cost), 2 * len(a),
     )  # fmt: skip
-
-
-def _bounds(element: Element, signed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of θ: logarithms of positive parameters; signed ones without a logarithm."""
-    ends = np.array([n.bounds for n in element.numbers]).reshape(-1, 2)
-    low = np.where(signed, -ends[:, 1] / 2, np.log(np.where(signed, 1.0, ends[:, 0])))
-    return low, np.where(signed, ends[:, 1], np.log(ends[:, 1]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -205,7 +205,8 @@ def _lines(
     The spread of every level includes the uncertainty of the lowest one.
     """
     omega, y, variance = _modal_lines(first, mode, one, noise, pole, j)
-    top = _about_peak(np.abs(y))
+    size = np.abs(y)
+    top = np.argsort(-size)[: max(3, int((size > ABOUT * size.max()).sum()))]
     omega, y, variance = omega[top], y[top], variance[top]
     R = first.residues[mode, :, j]
     power = float((np.abs(R) ** 2).sum())
@@ -272,12 +273,6 @@ def _modal_lines(
     H = (frf.values[near] - evaluate(rest, s))[:, :, j] / s[:, None] ** DERIVATIVES[first.quantity]
     R = first.residues[mode, :, j]
     return s.imag, H @ R.conj(), (noise[near][:, :, j] / q) @ np.abs(R) ** 2
-
-
-def _about_peak(size: np.ndarray) -> np.ndarray:
-    """Positions of the lines within ABOUT of the largest, three at least."""
-    order = np.argsort(-size)
-    return np.asarray(order[: max(3, int((size > ABOUT * size.max()).sum()))])
 
 
 def _scatter(amplitude: np.ndarray, each: np.ndarray, sd: np.ndarray) -> float:

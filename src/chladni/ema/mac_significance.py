@@ -55,7 +55,11 @@ def likeness(
     whole, there = (_mac(phi[at, model], psi[at]) for at in (slice(None), seen))
     half = half_chance = float("nan")
     if whole < POOR:
-        half, half_chance = _best_half_with_chance(phi, psi, model)
+        unit = phi / np.maximum(np.linalg.norm(phi, axis=0), 1e-300)
+        drawn = unit @ np.random.default_rng(0).normal(size=(phi.shape[1], DRAWS))
+        half = float(best_half(phi[:, model], psi[:, None])[0])
+        reached = best_half(phi[:, model], drawn) >= half
+        half_chance = float((1 + reached.sum()) / (1 + DRAWS))
     channels = effective_channels(phi[seen])
     return Likeness(
         mac=whole,
@@ -117,14 +121,3 @@ def best_half(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
     above = (phi @ kept) ** 2
     below = ((phi**2) @ left) * (kept**2).sum(axis=0)
     return np.minimum(above / np.maximum(below, 1e-300), 1.0)
-
-
-def _best_half_with_chance(
-    phi: np.ndarray, psi: np.ndarray, model: int, seed: int = 0
-) -> tuple[float, float]:
-    """The best half's MAC, and how often that of a random mixture of model modes reaches it."""
-    unit = phi / np.maximum(np.linalg.norm(phi, axis=0), 1e-300)
-    drawn = unit @ np.random.default_rng(seed).normal(size=(phi.shape[1], DRAWS))
-    found = float(best_half(phi[:, model], psi[:, None])[0])
-    reached = best_half(phi[:, model], drawn) >= found
-    return found, float((1 + reached.sum()) / (1 + DRAWS))

@@ -10,10 +10,7 @@ import numpy as np
 from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solve
 from .pole_selection import Rule
 
-ABOVE, BELOW = (
-    (1.06, 1.2, 1.45),
-    (1.1, 1.5, 4.0),
-)  # times, or under, an end of the band: begun there
+ABOVE, BELOW = (1.06, 1.2, 1.45), (1.1, 1.5, 4.0)  # times, or under, an end of the band: begun
 STEPS = 8  # of polishing once one is taken out
 
 

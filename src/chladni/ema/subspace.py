@@ -46,7 +46,8 @@ def subspace(data: PoleData, order: int) -> Subspace:
 
     ``data`` may be combinations of channels (``few_channels``): poles are common to all.
     """
-    s, y = data.s, np.where(data.w > 0, data.y, 0) * _even(data)
+    w = np.sqrt((data.w**2).mean(axis=0))  # gives every channel the same noise
+    s, y = data.s, np.where(data.w > 0, data.y, 0) * (w / max(float(w.max(initial=0.0)), 1e-300))
     f = np.abs(s)
     alpha = float(np.sqrt(f.min() * f.max()))
     g = data.common / np.sqrt((data.common**2).mean())
@@ -59,9 +60,3 @@ def subspace(data: PoleData, order: int) -> Subspace:
     R = np.asarray(np.linalg.qr(np.concatenate([W, G], axis=1), mode="r"))
     U, sigma, _ = np.linalg.svd(R[q:, q:].T, full_matrices=False)
     return Subspace(U[:, :order], sigma[:order], n_o, alpha)
-
-
-def _even(data: PoleData) -> np.ndarray:
-    """Factors (n_c,) that give every channel the same noise."""
-    w = np.sqrt((data.w**2).mean(axis=0))
-    return w / max(float(w.max(initial=0.0)), 1e-300)

@@ -66,18 +66,13 @@ def overloaded(record: TimeRecord) -> dict[str, int]:
     signals = np.concatenate([record.force, record.response], axis=1)
     found = {}
     for c, name in enumerate(record.channels):
-        hit = sum(_clipped(x) for x in signals[:, c])
+        hit = sum(any(_flat_top(side) for side in (x, -x)) for x in signals[:, c])
         if hit:
             found[name] = hit
     return found
 
 
 _STEPS = 4.0  # in quantisation steps: the top of a parabola, three samples wide, falls 2.8
-
-
-def _clipped(x: np.ndarray) -> bool:
-    """Return True if a signal (n,) was cut at its largest or smallest value."""
-    return any(_flat_top(side) for side in (x, -x))
 
 
 def _flat_top(x: np.ndarray) -> bool:

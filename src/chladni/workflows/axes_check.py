@@ -42,7 +42,10 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     declared, _, _ = _fit(case, found, model, ways)
     turned = [ways[:, order] for order in list(permutations(range(3)))[1:]]
     others = [(_where_declared(ways, turned_one), turned_one) for turned_one in turned]
-    others.append(("across the surface", _across(case, ways)))
+    # surface normals with the declared sign; the declared direction off the surface
+    normal = surface_normals(case.assembly, case.outputs)
+    normal *= np.where((normal * ways).sum(axis=1) < -LEANS, -1.0, 1.0)[:, None]
+    others.append(("across the surface", np.where(normal.any(axis=1, keepdims=True), normal, ways)))
     fits = [(_fit(case, found, model, turned_one), said) for said, turned_one in others]
     (total, pairs, mean), said = max(fits, key=lambda one: one[0][0])
     beaten = total >= BETTER * declared or (mean > SURE and total * MOST > declared)
@@ -65,13 +68,6 @@ def _where_declared(ways: np.ndarray, others: np.ndarray) -> str:
     """Describe in words which axes replace which declared ones."""
     differ = sorted({(a, b) for a, b in zip(_axes(ways), _axes(others), strict=True) if a != b})
     return ", ".join(f"along {other} where {said} is declared" for said, other in differ)
-
-
-def _across(case: Case, ways: np.ndarray) -> np.ndarray:
-    """Return surface normals with the declared sign; the declared direction off the surface."""
-    normal = surface_normals(case.assembly, case.outputs)
-    normal *= np.where((normal * ways).sum(axis=1) < -LEANS, -1.0, 1.0)[:, None]
-    return np.where(normal.any(axis=1, keepdims=True), normal, ways)
 
 
 def _fit(

@@ -29,10 +29,7 @@ from .given_case import Source
 from .loaded_model import DeckModels, Model, as_model, opened, similar_names
 
 Side = Sequence[str] | MeasuredDofs  # outputs, or inputs
-MOST_DOFS, MOST_NAMED = (
-    1200,
-    12,
-)  # dofs a deck may ask for at once; loaded ones taken in their stead
+MOST_DOFS, MOST_NAMED = 1200, 12  # dofs a deck may ask for; loaded ones taken in their stead
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,20 +74,15 @@ def frf(
     if damping < 0:
         raise LabelError(f"damping = {damping:g}; a ratio is 0 or more")
     if frequency is not None:
-        frequency = _lines(frequency)
+        lines = np.asarray(frequency, float)
+        if lines.ndim != 1 or not len(lines) or not (np.isfinite(lines) & (lines >= 0)).all():
+            raise ShapeError(
+                "argument frequency takes a list of one or more frequencies [Hz], 0 or more"
+            )
+        frequency = lines
     found_in = opened(source, units)
     found = _responses(found_in, to, by, frequency, damping, progress)
     return replace(found, origin=found_in)
-
-
-def _lines(frequency: np.ndarray) -> np.ndarray:
-    """Return frequencies [Hz] as a list of at least one; ShapeError for others."""
-    lines = np.asarray(frequency, float)
-    if lines.ndim != 1 or not len(lines) or not (np.isfinite(lines) & (lines >= 0)).all():
-        raise ShapeError(
-            "argument frequency takes a list of one or more frequencies [Hz], 0 or more"
-        )
-    return lines
 
 
 def _responses(

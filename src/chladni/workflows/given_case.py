@@ -37,7 +37,8 @@ def given_case(
             return make_case(source, recording, words=words)
         source = load_case(source)
     if isinstance(source, Case):
-        extra = [*(["recording"] if _any(recording) else []), *words]
+        none = isinstance(recording, tuple | list) and not recording
+        extra = [*([] if none else ["recording"]), *words]
         if extra:
             raise FileError(
                 f"{source.path} says everything itself; leave out {', '.join(extra)}, or give the "
@@ -73,7 +74,3 @@ def _changed(source: Model | DeckModels) -> Assembly | None:
         return None
     own = assembly(source.deck, source.units)
     return source.assembly if changes(source.deck, own, source.assembly, source.units) else None
-
-
-def _any(recording: object) -> bool:
-    return not (isinstance(recording, tuple | list) and not recording)

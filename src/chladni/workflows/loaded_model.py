@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     from ..case import Case
 
 
-LEAST_MODES = (
-    7  # modes; they separate six rigid motions of a free structure from the first elastic mode
-)
+LEAST_MODES = 7  # separate six rigid motions of a free structure from the first elastic mode
 SOURCES = "the path of a deck or case, what chladni.load or load_case returned, or an Assembly"
 
 

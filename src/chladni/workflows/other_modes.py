@@ -156,12 +156,15 @@ def other_modes(
     phi, psi = at.own(model, modal.shapes[:, near])[held], values[held]
     f_model, f_other = modal.frequency[near], read.frequency[elastic]
     M = mac(phi, psi)
+    made = model.assembly
+    seen = [made.shells.nodes, made.beams.nodes, *(s.nodes for s in made.solids)]
+    drawn = np.unique(np.concatenate([nodes.ravel() for nodes in seen]))
     return OtherModes(
         path, f_other, f_model,
         tuple((np.flatnonzero(elastic) + 1).tolist()), tuple((np.flatnonzero(near) + 1).tolist()),
         M, pair(f_model, f_other, M), _in_span(phi, psi, f_model, f_other),
-        len(at.values), int(held.sum()), at.drawn(model.assembly, values),
-        _whole(model.assembly, at.row[at.row >= 0]),
+        len(at.values), int(held.sum()), at.drawn(made, values),
+        bool(np.isin(drawn, at.row[at.row >= 0]).all()),
         (*model.notes, *_notes(model, read, at, elastic)), origin=model,
     )  # fmt: skip
 
@@ -245,12 +248,6 @@ def _in_span(
         if close.any():
             out[k] = subspace_mac(psi[:, k : k + 1], phi[:, close])[0]
     return out
-
-
-def _whole(made: Assembly, rows: np.ndarray) -> bool:
-    seen = [made.shells.nodes, made.beams.nodes, *(s.nodes for s in made.solids)]
-    drawn = np.unique(np.concatenate([nodes.ravel() for nodes in seen]))
-    return bool(np.isin(drawn, rows).all())
 
 
 def _notes(model: Model, read: PunchModes, at: _Points, elastic: np.ndarray) -> list[str]:

@@ -47,9 +47,8 @@ def screened_by_model(
     """
     frf = case.frfs[0]
     lines = case.lines(frf.frequency) if use is None else use
-    alone = screened(
-        case.recordings[0], found, case.recordings[1:], _places(case), use, alone=False
-    )
+    places = dict(zip(case.outputs.labels, case.outputs.points, strict=True))
+    alone = screened(case.recordings[0], found, case.recordings[1:], places, use, alone=False)
     if masses := _masses(case, frf, lines, model):
         return alone.with_more(masses, [Check("given masses", "check them", False)])
     return against_model(
@@ -93,10 +92,6 @@ def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Fi
 def in_pounds(deck: float, weighed: float) -> bool:
     """Return True if the weighed mass equals the deck's [kg] when read as pounds."""
     return deck > 0 and abs(np.log(deck / (POUND * weighed))) < NEAR_POUND
-
-
-def _places(case: Case) -> dict[str, np.ndarray]:
-    return dict(zip(case.outputs.labels, case.outputs.points, strict=True))
 
 
 def screened_prepared(

@@ -55,7 +55,9 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
             f"--units, one of {', '.join(UNITS)}"
         )
     size, mass = _size_and_mass(made, read_in)
-    ranked = sorted((_misfit(pairs, size, mass, u), k, u) for k, u in enumerate(UNITS.values()))
+    ranked = sorted(
+        (_off_materials(pairs, u) + _odd(size, mass, u), k, u) for k, u in enumerate(UNITS.values())
+    )
     (best, _, units), (second, *_) = ranked[:2]
     E, rho = pairs[0]
     if best > NEAR_DECADES:
@@ -133,11 +135,6 @@ def _materials(made: Assembly, read_in: Units) -> list[tuple[float, float]]:
         for m in found
         if (E := modulus_of(m)) > 0 and m.rho > 0
     ]
-
-
-def _misfit(pairs: list[tuple[float, float]], size: float, mass: float, u: Units) -> float:
-    """Decades from known materials, median of the parts; one more for an odd size or mass each."""
-    return _off_materials(pairs, u) + _odd(size, mass, u)
 
 
 def _off_materials(pairs: list[tuple[float, float]], u: Units) -> float:
