@@ -60,7 +60,11 @@ def ensemble(
     rng = np.random.default_rng(0)
     for k in range(FULL):
         progress(f"random model {k + 1} of {FULL} for the basis", (k + 1) / (FULL + 2))
-        blocks.append(_solved(built, effects, random(rng, len(effects), spread), 1.1 * f_max))
+        drawn = with_thickness(built, effects, random(rng, len(effects), spread))
+        shapes = normal_modes(drawn.system, band=1.1 * f_max).shapes
+        if len(shapes) != len(built.system.dofs):
+            raise ModelError("a part's thickness changed which degrees of freedom are free")
+        blocks.append(shapes)
     basis = orthonormal(built.system.M, blocks, kept=modal.shapes.shape[1])
     return Ensemble(reduce(groups, basis), effects, int(rigid_modes(modal).sum()))
 
@@ -68,17 +72,6 @@ def ensemble(
 def random(rng: np.random.Generator, n_parts: int, spread: float) -> np.ndarray:
     """Log factors of the parts' thickness, normal and clipped at two standard deviations."""
     return spread * rng.standard_normal(n_parts).clip(-CLIP, CLIP)
-
-
-def _solved(
-    built: Structure, effects: tuple[PartScale, ...], x: np.ndarray, f_max: float
-) -> np.ndarray:
-    """Mode shapes of a model drawn at x, up to f_max."""
-    drawn = with_thickness(built, effects, x)
-    shapes = normal_modes(drawn.system, band=f_max).shapes
-    if len(shapes) != len(built.system.dofs):
-        raise ModelError("a part's thickness changed which degrees of freedom are free")
-    return shapes
 
 
 def with_thickness(built: Structure, effects: tuple[PartScale, ...], x: np.ndarray) -> Structure:

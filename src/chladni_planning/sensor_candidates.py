@@ -114,7 +114,9 @@ def find_sensor_candidates(
         "not flat": int((~smooth & grid).sum()),
         "near an edge, fold or joint": int((smooth & ~clear & grid).sum()),
     }
-    clear &= grid | ~_has_one(every, clear)
+    has_one = np.zeros(int(every.nodes.max()) + 1, bool)
+    has_one[every.nodes[clear & every.is_grid, 0]] = True
+    clear &= grid | ~has_one[every.nodes].any(axis=1)
     if not clear.any():
         raise ModelError(
             f"no place of the surface is flat within {1e3 * SMALLER[-1] * foot:.2g} mm and as far "
@@ -206,13 +208,6 @@ def _every(assembly: Assembly, seen: Surface, sheet: np.ndarray) -> _Every:
     )
 
 
-def _has_one(every: _Every, clear: np.ndarray) -> np.ndarray:
-    """True where a corner of the shell around a place is a clear grid (n,)."""
-    grids = np.zeros(int(every.nodes.max()) + 1, bool)
-    grids[every.nodes[clear & every.is_grid, 0]] = True
-    return grids[every.nodes].any(axis=1)
-
-
 def _flat(
     seen: Surface, sheet: np.ndarray, every: _Every, foot: float, flat: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -285,18 +280,13 @@ def _reachable(
             break
         for side, free in zip((1, -1), lift, strict=True):
             n = side * normals[k]
-            start, sights = points[k] + 0.25 * foot * n, _sights(n)
+            t, b = tangents(n)
+            tilted = [np.cos(TILT) * n + np.sin(TILT) * s for s in (t, -t, b, -b)]
+            start, sights = points[k] + 0.25 * foot * n, np.array([n, *tilted])
             if free[k] and blocking.clear(start, sights):
                 out[k], straight[k] = side, blocking.clear(start, sights[:1])
                 break
     return out, straight
-
-
-def _sights(n: np.ndarray) -> np.ndarray:
-    """Five lines of sight: along the normal and tilted to four sides (5, 3)."""
-    t, b = tangents(n)
-    tilted = [np.cos(TILT) * n + np.sin(TILT) * s for s in (t, -t, b, -b)]
-    return np.array([n, *tilted])
 
 
 @dataclass(frozen=True, eq=False)

@@ -196,8 +196,9 @@ def plan_test(
         _, draws = drawn(models, basis, r, settings.draws, settings.spread, settings.seed)
         draws = draws[:, :, aimed]
     ranked, log_det = _layout(draws, mounts, settings)
+    near = too_near(mounts.points, max(settings.spacing, 1e-9))
     layout, moves = with_visible_modes(
-        phi[:, :r], ranked, largest, floor=settings.floor, rules=_near(mounts, settings)
+        phi[:, :r], ranked, largest, floor=settings.floor, rules=Rules(near=near)
     )
     progress("shaker and cords", 0.8)
     f, zeta, seen = modal.frequency, modal.damping, phi[layout, :r]
@@ -311,12 +312,6 @@ def _labels(ids: np.ndarray, directions: np.ndarray) -> list[str]:
     ]
 
 
-def _near(mounts: Mount, settings: PlanSettings) -> Rules:
-    """Rules that sensors keep their distance and a grid has one sensor at most."""
-    near = too_near(mounts.points, max(settings.spacing, 1e-9))
-    return Rules(near=near)
-
-
 def _layout(
     phi: np.ndarray, mounts: Mount, settings: PlanSettings
 ) -> tuple[np.ndarray, dict[str, float]]:
@@ -337,15 +332,10 @@ def _layout(
         )
     if settings.spacing == 0 and c.rows.shape[0] == 1:
         layouts = {"pivoted QR": qr_ranking(c.rows[0])[: settings.sensors], **layouts}
-    ranked = deletion(c, settings.sensors, rules=_only(best, len(c))).ranked
+    forbidden = np.ones(len(c), bool)
+    forbidden[best] = False
+    ranked = deletion(c, settings.sensors, rules=Rules(forbidden=forbidden)).ranked
     return ranked, {name: value("D", c.fisher(k)) for name, k in layouts.items()}
-
-
-def _only(kept: np.ndarray, n: int) -> Rules:
-    """Rules that forbid all candidates except the kept ones."""
-    forbidden = np.ones(n, bool)
-    forbidden[kept] = False
-    return Rules(forbidden=forbidden)
 
 
 def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int, float], ...]:

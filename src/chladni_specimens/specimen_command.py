@@ -75,7 +75,10 @@ def run(
     from chladni.io.nastran import write_assembly
 
     system = unit_system(units)
-    build = _builder(name)
+    known = {"tailgate": _tailgate, "panel": _panel, "box": _box, "plate": _plate}
+    if name not in known:
+        raise LabelError(f"no specimen {name!r}; there are {', '.join(known)}")
+    build = known[name]
     with started("specimen", Path(name), out, adds=True) as job:
         job.progress("meshing", 0.0)
         values = dict(_setting(text) for text in settings or [])
@@ -148,13 +151,6 @@ def _setting(text: str) -> tuple[str, Any]:
         return key.strip(), ast.literal_eval(value.strip())
     except (ValueError, SyntaxError):
         return key.strip(), value.strip()
-
-
-def _builder(name: str) -> Callable[[float | None, dict[str, Any]], FormedSpecimen]:
-    known = {"tailgate": _tailgate, "panel": _panel, "box": _box, "plate": _plate}
-    if name not in known:
-        raise LabelError(f"no specimen {name!r}; there are {', '.join(known)}")
-    return known[name]
 
 
 def _tailgate(size: float | None, values: dict[str, Any]) -> FormedSpecimen:

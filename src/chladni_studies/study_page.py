@@ -220,7 +220,9 @@ def _pictures(
     )
     files.append((path.name, "results over parameters"))
     still = Picture(path, "Dots: samples; dashed: the deck's own values.")
-    return [*blocks, _points(page, found, still)]
+    at = _share(page, found)
+    data = {"x": at[found.names[0]], "y": at[_drawn(found)[0]]}
+    return [*blocks, page.live("responses", "cloud", data, [still], still.caption)]
 
 
 def _share(page: Page, found: ParameterStudy) -> dict[str, int]:
@@ -243,13 +245,6 @@ def _lines(page: Page, found: ParameterStudy, still: Picture) -> Block:
     text = f"Draw a box over an axis to keep the samples within it.{few} {still.caption}"
     data = {"axes": axes, "by": at[results[0]]}
     return page.live("parallel", "parallel", data, [still], text)
-
-
-def _points(page: Page, found: ParameterStudy, still: Picture) -> Block:
-    """One column over another, any of them."""
-    at = _share(page, found)
-    data = {"x": at[found.names[0]], "y": at[_drawn(found)[0]]}
-    return page.live("responses", "cloud", data, [still], still.caption)
 
 
 def _with_unit(name: str, unit: str) -> str:

@@ -56,7 +56,12 @@ def of_effect(
     if request.parts is not None:
         raise request.refused(f'{kind.name} is an effect; write "{kind.name} at GRID=LOW:HIGH"')
     if grid is not None:
-        effect = _at(request, kind, grid, assembly)
+        where = _surroundings(assembly, None)  # one with a direction acts across sheet or beam
+        if not issubclass(kind.effect, MovableAttachment) or kind.effect.traits.own_dofs:
+            raise _refused(request, kind)
+        if grid not in where.grids.grids:
+            raise request.refused(f"grid {grid} is on no shell and no beam of the deck")
+        effect: Effect = kind.effect.near(where, where.grids.position(grid))
     else:
         effect = _placed(request, kind, assembly, case)
     scale, unit = _scale(effect.parameters[0].unit, units)
@@ -64,16 +69,6 @@ def of_effect(
     free = FreeParameter(kind.name, kind.name, () if grid is None else (str(grid),))
     name = kind.name if grid is None else f"{kind.name} at {grid}"
     return VariedEffect(name, free, 0.0, low, high, unit, request.log, effect)
-
-
-def _at(request: VaryText, kind: Family, grid: int, assembly: Assembly) -> Effect:
-    """The effect at a grid; one with a direction acts across the sheet or beam."""
-    where = _surroundings(assembly, None)
-    if not issubclass(kind.effect, MovableAttachment) or kind.effect.traits.own_dofs:
-        raise _refused(request, kind)
-    if grid not in where.grids.grids:
-        raise request.refused(f"grid {grid} is on no shell and no beam of the deck")
-    return kind.effect.near(where, where.grids.position(grid))
 
 
 def _placed(request: VaryText, kind: Family, assembly: Assembly, case: Case | None) -> Effect:

@@ -175,7 +175,7 @@ def _distributed(
             waiting, counted, ahead = [suspects.pop()], np.inf, 1
         if time.monotonic() - counted > _COUNTED:
             counted = time.monotonic()
-            ahead = _AHEAD * _threads(client)
+            ahead = _AHEAD * max(1, sum(_workers_of(client).values()))
         while waiting and len(running) < ahead:
             k = waiting.pop()
             future = client.submit(_on_worker, held, k, X[k], pure=False)
@@ -200,11 +200,6 @@ def _wait(ready: Any, client: Any, report: Callable[[str], None]) -> None:
             looked, said = time.monotonic(), not _workers_of(client)
             if said:
                 report(NO_WORKER)
-
-
-def _threads(client: Any) -> int:
-    """Present number of threads of the cluster, at least one."""
-    return max(1, sum(_workers_of(client).values()))
 
 
 def _workers_of(client: Any) -> dict[str, int]:

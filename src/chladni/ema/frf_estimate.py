@@ -99,7 +99,12 @@ def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()
             "smooth; use H1, H2 or Hv"
         )
     if settings.method == "LPM" and kind not in ("sine", "multisine"):
-        found = _by_polynomials(record, kind)
+        frf, averages = local_polynomial(record)  # leakage is fitted, not windowed
+        said = (
+            f"{kind}: local polynomials (LPM) over {len(record.force)} whole blocks of "
+            f"{record.duration:.3g} s; the leakage is fitted, no window"
+        )
+        found = FrfEstimate(frf, kind, "LPM", averages, notes=(said,))
     else:
         road = {"hammer": _hammer, "burst": _burst, "random": _random, "sine": _sine,
                 "multisine": _multisine}[kind]  # fmt: skip
@@ -289,16 +294,6 @@ def _multisine(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
     frf, averages, said = of_periods(record, settings.method)
     note = f"{len(record.force)} periods of {record.duration:.3g} s, no window; {said}"
     return FrfEstimate(frf, "multisine", settings.method, averages, notes=(note,))
-
-
-def _by_polynomials(record: TimeRecord, kind: Excitation) -> FrfEstimate:
-    """Local polynomials over the spectra of whole blocks: leakage is fitted, not windowed."""
-    frf, averages = local_polynomial(record)
-    said = (
-        f"{kind}: local polynomials (LPM) over {len(record.force)} whole blocks of "
-        f"{record.duration:.3g} s; the leakage is fitted, no window"
-    )
-    return FrfEstimate(frf, kind, "LPM", averages, notes=(said,))
 
 
 def _sine(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:

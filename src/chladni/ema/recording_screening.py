@@ -131,22 +131,17 @@ def other_readings(frf: FRF, strong: Identified, use: np.ndarray | None) -> list
     """
     if frf.quantity not in QUANTITIES or strong.chi <= POOR:
         return []
-    some, lines = _few(frf, strong, use)
+    f, (low, high) = frf.frequency, strong.band
+    kept = np.flatnonzero((f >= low) & (f <= high) & (True if use is None else use))
+    kept = kept[:: -(-len(kept) // FEW_LINES) or 1]
+    loud = np.sort(np.argsort(-_rms(frf))[:FEW_CHANNELS])
+    some, lines = frf.sel(outputs=[frf.outputs[k] for k in loud]), np.isin(np.arange(len(f)), kept)
 
     def modes(of: FRF) -> Identified:
         return strong_modes(identify(of, strong.band, use=lines))
 
     read = {error: modes(mapped(some, error.mend)) for error in _otherwise(frf)}
     return other_reading(modes(some), read)
-
-
-def _few(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[FRF, np.ndarray]:
-    """The loudest channels of a recording and lines in the band: enough to compare readings."""
-    f, (low, high) = frf.frequency, strong.band
-    kept = np.flatnonzero((f >= low) & (f <= high) & (True if use is None else use))
-    kept = kept[:: -(-len(kept) // FEW_LINES) or 1]
-    loud = np.sort(np.argsort(-_rms(frf))[:FEW_CHANNELS])
-    return frf.sel(outputs=[frf.outputs[k] for k in loud]), np.isin(np.arange(len(f)), kept)
 
 
 def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[Finding], Check]:

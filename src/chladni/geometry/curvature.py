@@ -48,7 +48,11 @@ def curvature(points: np.ndarray, nodes: np.ndarray) -> Curvature:
         np.add.at(at_nodes, T[:, k], area[:, None, None] * tensor)
         np.add.at(weight, T[:, k], area)
     at_nodes /= np.maximum(weight, 1e-30)[:, None, None]
-    return _principal(at_nodes, normal)
+    basis = np.stack(tangents(normal), axis=1)
+    values = np.linalg.eigvalsh(basis @ at_nodes @ basis.swapaxes(1, 2))
+    larger = np.abs(values).argmax(axis=1)
+    rows = np.arange(len(values))
+    return Curvature(values[rows, larger], values[rows, 1 - larger], normal)
 
 
 def _tensors(x: np.ndarray, normal: np.ndarray, cross: np.ndarray) -> np.ndarray:
@@ -65,14 +69,6 @@ def _tensors(x: np.ndarray, normal: np.ndarray, cross: np.ndarray) -> np.ndarray
     s = np.linalg.solve(AtA, np.einsum("mki,mk->mi", A, right)[..., None])[..., 0]
     S = np.stack([s[:, :2], s[:, 1:]], axis=1)  # (m, 2, 2): e f / f g
     return basis.swapaxes(1, 2) @ S @ basis
-
-
-def _principal(tensor: np.ndarray, normal: np.ndarray) -> Curvature:
-    basis = np.stack(tangents(normal), axis=1)
-    values = np.linalg.eigvalsh(basis @ tensor @ basis.swapaxes(1, 2))
-    larger = np.abs(values).argmax(axis=1)
-    rows = np.arange(len(values))
-    return Curvature(values[rows, larger], values[rows, 1 - larger], normal)
 
 
 def part_curvature(assembly: Assembly) -> np.ndarray:

@@ -51,7 +51,9 @@ def point_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
     Zero at a point without cells.
     """
-    a, (point, cell) = vector_areas(points, cells), _corners(cells)
+    real = np.ones(cells.shape, bool)
+    real[:, 3] = cells[:, 3] != cells[:, 2]  # the repeated corner of a triangle counts once
+    a, point, cell = vector_areas(points, cells), cells[real], np.nonzero(real)[0]
     first = np.full(len(points), len(cells))
     np.minimum.at(first, point, cell)
     own, lead = a[cell], a[first[point]]
@@ -61,13 +63,6 @@ def point_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     area = _at_points(point, np.linalg.norm(own, axis=1), len(points))
     most = np.einsum("ni,ni->n", unit(total), plain)
     return unit(total) * np.where(most < -EVEN * area, -1.0, 1.0)[:, None]
-
-
-def _corners(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Point and cell of every corner; the repeated corner of a triangle counts once."""
-    real = np.ones(cells.shape, bool)
-    real[:, 3] = cells[:, 3] != cells[:, 2]
-    return cells[real], np.nonzero(real)[0]
 
 
 def _at_points(point: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:

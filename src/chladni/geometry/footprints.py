@@ -128,7 +128,7 @@ class _Footprints:
 
         place = self.points[hung] if isinstance(hung, int | np.integer) else hung
         near = self._shells_of(rows)
-        whole = near[self._holds(near, rows)]
+        whole = near[np.array([set(rows) <= set(self.cells[s].tolist()) for s in near], bool)]
         if len(whole):
             pieces = self._piece[whole[0]]
             middle = self.points[self.pieces[pieces]].mean(axis=1)
@@ -142,7 +142,3 @@ class _Footprints:
         aim = (at + at.mean(axis=0)) / 2
         found = np.unique(grids[cKDTree(self.points[grids]).query(aim)[1]])
         return tuple(found.tolist()) if len(found) >= FEWEST else tuple(rows)
-
-    def _holds(self, shells: np.ndarray, rows: Sequence[int]) -> np.ndarray:
-        """Mask of the shells with all these grids (k,)."""
-        return np.array([set(rows) <= set(self.cells[s].tolist()) for s in shells], bool)

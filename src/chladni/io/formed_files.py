@@ -92,7 +92,13 @@ def _meshio(path: Path) -> Any:
 
     said = io.StringIO()
     if path.suffix.lower() == ".xdmf":
-        _refuse_data_outside(path)
+        # HDF5 is named from the folder of the XDMF, binary files from the current one
+        with suppress(ElementTree.ParseError):  # meshio says so
+            for item in ElementTree.parse(path).iter("DataItem"):
+                name, form = (item.text or "").strip(), item.get("Format")
+                if form in ("HDF", "Binary"):
+                    folder = path.parent if form == "HDF" else Path()
+                    refuse_outside(folder / name.split(":")[0], f"{path}: ")
     try:
         with redirect_stdout(said), redirect_stderr(said):
             return meshio.read(path)
@@ -102,19 +108,6 @@ def _meshio(path: Path) -> Any:
     except (*DAMAGED, meshio.ReadError, CorruptionError) as error:
         why = f"there is no {error}" if isinstance(error, KeyError) else str(error)
         raise FileError(f"{path} cannot be read as a mesh: {why}") from error
-
-
-def _refuse_data_outside(path: Path) -> None:
-    """Refuse the files of numbers of an XDMF that lie outside of the case.
-
-    HDF5 files are named from the folder of the XDMF; binary ones meshio opens from the current one.
-    """
-    with suppress(ElementTree.ParseError):  # meshio says so
-        for item in ElementTree.parse(path).iter("DataItem"):
-            name, form = (item.text or "").strip(), item.get("Format")
-            if form in ("HDF", "Binary"):
-                folder = path.parent if form == "HDF" else Path()
-                refuse_outside(folder / name.split(":")[0], f"{path}: ")
 
 
 def _formed_of(path: Path, mesh: Any, unit: Units) -> FormedMesh:

@@ -159,10 +159,15 @@ def other_modes(
     made = model.assembly
     seen = [made.shells.nodes, made.beams.nodes, *(s.nodes for s in made.solids)]
     drawn = np.unique(np.concatenate([nodes.ravel() for nodes in seen]))
+    in_span = np.zeros(len(f_other))
+    for k, f in enumerate(f_other):
+        close = np.abs(f_model / f - 1) < CLOSE
+        if close.any():
+            in_span[k] = subspace_mac(psi[:, k : k + 1], phi[:, close])[0]
     return OtherModes(
         path, f_other, f_model,
         tuple((np.flatnonzero(elastic) + 1).tolist()), tuple((np.flatnonzero(near) + 1).tolist()),
-        M, pair(f_model, f_other, M), _in_span(phi, psi, f_model, f_other),
+        M, pair(f_model, f_other, M), in_span,
         len(at.values), int(held.sum()), at.drawn(made, values),
         bool(np.isin(drawn, at.row[at.row >= 0]).all()),
         (*model.notes, *_notes(model, read, at, elastic)), origin=model,
@@ -237,17 +242,6 @@ def _axes(made: Assembly, recording: Recording | None, node: int, row: int) -> n
     if recording is not None and node in recording.nodes:
         return np.asarray(recording.axes.get(node, np.eye(3)))
     return np.eye(3) if made.axes is None else made.axes[row]
-
-
-def _in_span(
-    phi: np.ndarray, psi: np.ndarray, f_model: np.ndarray, f_other: np.ndarray
-) -> np.ndarray:
-    out = np.zeros(len(f_other))
-    for k, f in enumerate(f_other):
-        close = np.abs(f_model / f - 1) < CLOSE
-        if close.any():
-            out[k] = subspace_mac(psi[:, k : k + 1], phi[:, close])[0]
-    return out
 
 
 def _notes(model: Model, read: PunchModes, at: _Points, elastic: np.ndarray) -> list[str]:

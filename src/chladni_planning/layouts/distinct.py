@@ -62,7 +62,9 @@ def distinct(
         before = now
         for i in kept[~checked.fixed[kept]].tolist():
             rest = kept[kept != i]
-            others = _open(c, checked, kept, i)
+            held = np.zeros(len(c), bool)
+            held[kept] = True
+            others = np.flatnonzero(_joinable(checked, held, i))
             if not len(others):
                 continue
             after = _joined(c, rest, others) - WORTH * pairs.excess(rest, others, ceiling)
@@ -72,13 +74,6 @@ def distinct(
         if now <= before:
             break
     return kept
-
-
-def _open(c: Candidates, rules: Rules, kept: np.ndarray, i: int) -> np.ndarray:
-    """Candidates that may take the place of sensor i."""
-    mask = np.zeros(len(c), bool)
-    mask[kept] = True
-    return np.flatnonzero(_joinable(rules, mask, i))
 
 
 def _joined(c: Candidates, rest: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -122,15 +122,10 @@ def bonded_plates(d: Numbers, h: float) -> Assembly:
     edge = 0.004  # the layer ends a little inside
     x = stops([L1 - lap + edge, L1 - edge], 1.2 * h)
     y = stops([side + edge, side + W2 - edge], 1.2 * h)
-    corners = _layer(x, y, t1 / 2, t1 / 2 + glue)
+    base = rectangle("", (0, 0, t1 / 2), x, y)
+    lower = base.points[base.cells]
+    corners = np.concatenate([lower, lower + np.array([0, 0, glue])], axis=1)
     sheets = (ShellSurface.of(a, "lower"), ShellSurface.of(a, "upper"))
     return hexahedra(
         a, corners, sheets, material=EPOXY, name="adhesive", kind="adhesive", reach=0.01
     )[0]
-
-
-def _layer(x: np.ndarray, y: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Corners (n, 8, 3) of bricks over the lines x and y between two heights [m]."""
-    base = rectangle("", (0, 0, low), x, y)
-    lower = base.points[base.cells]
-    return np.concatenate([lower, lower + np.array([0, 0, high - low])], axis=1)

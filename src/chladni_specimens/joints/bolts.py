@@ -224,20 +224,15 @@ def grip(
     k[:, 0] = stiffness
     none = np.zeros_like(k)
     ids = next_id(assembly) + np.arange(len(places))
-    new = Bushes(ids, np.column_stack(ends), _frames(directions), places, k, none, none)
+    e = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    u, v = tangents(e)
+    new = Bushes(ids, np.column_stack(ends), np.stack([e, u, v], axis=1), places, k, none, none)
     names = (surfaces[0].name, surfaces[1].name)
     joints = tuple(
         Joint("grip", tuple(p), names, (int(i),), float(d))
         for p, i, d in zip(places.tolist(), ids, far, strict=True)
     )
     return replace(assembly, bushes=_joined(assembly.bushes, new)), joints
-
-
-def _frames(directions: np.ndarray) -> np.ndarray:
-    """Frames (k, 3, 3) whose first axis is the direction."""
-    e = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    u, v = tangents(e)
-    return np.stack([e, u, v], axis=1)
 
 
 def along_line(line: np.ndarray, per_length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -272,7 +267,12 @@ def hem(
     """
     inner = ShellSurface.of(assembly, sheets[0])
     edge = followed(np.asarray(edge, dtype=float), pitch)
-    line = _inboard(inner, edge, inset)
+    tangent, _ = along_line(edge, 1.0)  # the bead lies inboard, along the surface
+    side = np.cross(inner.closest_points(edge).normal, tangent)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    left, right = (inner.closest_points(edge + s * inset * side) for s in (1, -1))
+    sign = np.where(left.distance.sum() <= right.distance.sum(), 1.0, -1.0)
+    line = inner.closest_points(edge + sign * inset * side).place
     assembly, joints = adhesive_bead(
         assembly,
         line,
@@ -289,13 +289,3 @@ def hem(
     direction, k = along_line(edge, grip_stiffness)
     assembly, grips = grip(assembly, edge, direction, k, sheets, reach=reach)
     return assembly, joints + grips
-
-
-def _inboard(surface: ShellSurface, edge: np.ndarray, inset: float) -> np.ndarray:
-    """The edge moved into the sheet along its surface."""
-    tangent, _ = along_line(edge, 1.0)
-    side = np.cross(surface.closest_points(edge).normal, tangent)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    left, right = (surface.closest_points(edge + s * inset * side) for s in (1, -1))
-    sign = np.where(left.distance.sum() <= right.distance.sum(), 1.0, -1.0)
-    return surface.closest_points(edge + sign * inset * side).place

@@ -74,13 +74,14 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
     if frf is not None and averages:
         frf = with_variance(frf, averages)
         uff.notes.append(f"{path.name}: its noise is that of the stated {averages:g} averages")
+    turned = {n: uff.systems[s] for n, s in uff.turned.items() if s in uff.systems}
     return Recording(
         name=path.name,
         frf=frf,
         poles=_poles(uff) if alone and not responses(uff.functions) else None,
         shapes=_shapes(uff),
         nodes=uff.nodes,
-        axes=_axes(uff),
+        axes={n: A for n, A in turned.items() if not np.allclose(A, np.eye(3), atol=1e-6)},
         elements=tuple(uff.elements),
         functions=tuple(uff.functions),
         time=time,
@@ -343,12 +344,6 @@ _TAKE = {
     2420: _take_systems,
 }
 _SILENT = frozenset({151, 1858})  # header; channel settings that come with every function
-
-
-def _axes(uff: UffAccumulator) -> dict[int, np.ndarray]:
-    """The nodes whose directions are not those of the global axes."""
-    turned = {n: uff.systems[s] for n, s in uff.turned.items() if s in uff.systems}
-    return {n: A for n, A in turned.items() if not np.allclose(A, np.eye(3), atol=1e-6)}
 
 
 def _poles(uff: UffAccumulator) -> PoleTable | None:

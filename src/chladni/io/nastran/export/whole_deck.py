@@ -105,12 +105,8 @@ def _shells(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
         values += [angle[k], s.offset[k] / units.length or None, *[None] * (6 - n)]
         if own[k]:
             values += t[k, :n].tolist()
-        yield [_SHELL[three], *_tail(values)]
-
-
-def _tail(values: list[Value]) -> list[Value]:
-    """Reals as floats, so that none is written as an integer."""
-    return [float(v) if isinstance(v, np.floating) else v for v in values]
+        # reals as floats, so that none is written as an integer
+        yield [_SHELL[three], *(float(v) if isinstance(v, np.floating) else v for v in values)]
 
 
 def _solids(assembly: Assembly, ids: Ids) -> Iterator[Card]:

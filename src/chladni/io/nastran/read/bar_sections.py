@@ -89,8 +89,13 @@ def _shape(card: Cards) -> tuple[Profile, float]:
 def _library(kind: str) -> Callable[[Context, Materials, Cards, int], BeamSection]:
     def read(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:
         p, nsm = _shape(card)
-        if kind == "beam":
-            _refuse_taper(card, 9, SHAPES[card.words(4)[0].decode("latin-1")][1] + 1)
+        if kind == "beam":  # end A, then stations of SO, X/XB and as many fields; blanks repeat A
+            count = SHAPES[card.words(4)[0].decode("latin-1")][1] + 1
+            own = np.nan_to_num(card.block(9, count, np.nan)[0])
+            k = 9 + count
+            while card.words(k)[0] in STATION:
+                _refuse_unlike(card, card.block(k + 2, count, np.nan)[0], own)
+                k += 2 + count
         values = (p.area, p.I1, p.I2, p.I12, p.J)
         return _section(ctx, materials, card, values, p.shear, nsm, kind)
 
@@ -98,18 +103,6 @@ def _library(kind: str) -> Callable[[Context, Materials, Cards, int], BeamSectio
 
 
 STATION = (b"YES", b"YESA", b"NO")  # SO: stress output at a station along the beam
-
-
-def _refuse_taper(card: Cards, first: int, count: int) -> None:
-    """Refuse a PBEAML whose dimensions or mass at another station are not those of end A.
-
-    End A has ``count`` fields from ``first``, each station SO, X/XB and as many; blanks repeat A.
-    """
-    own = np.nan_to_num(card.block(first, count, np.nan)[0])
-    k = first + count
-    while card.words(k)[0] in STATION:
-        _refuse_unlike(card, card.block(k + 2, count, np.nan)[0], own)
-        k += 2 + count
 
 
 def _refuse_unlike(card: Cards, there: np.ndarray, own: np.ndarray) -> None:

@@ -67,7 +67,8 @@ def refuse_loose(model: Assembly, source: str) -> None:
     """
     label = components(model)
     _refuse_loose_masses(model, label, source)
-    stiff = _with_elements(model, label)
+    groups = [model.shells.nodes, model.beams.nodes, *(s.nodes for s in model.solids)]
+    stiff = sorted({int(k) for nodes in groups for k in np.unique(label[nodes[:, 0]])})
     if len(stiff) < 2:
         return
     held = set(label[model.supports[:, 0]].tolist()) | _grounded(label, model.springs, model.bushes)
@@ -95,12 +96,6 @@ def _refuse_loose_masses(model: Assembly, label: np.ndarray, source: str) -> Non
                 f"{source}: mass {model.masses.ids[k]} is on grid {model.ids[rows[k]]}, which is "
                 "not connected to the rest; remove or tie it"
             )
-
-
-def _with_elements(model: Assembly, label: np.ndarray) -> list[int]:
-    """Components that hold shells, solids or beams, the largest first."""
-    groups = [model.shells.nodes, model.beams.nodes, *(s.nodes for s in model.solids)]
-    return sorted({int(k) for nodes in groups for k in np.unique(label[nodes[:, 0]])})
 
 
 def _grounded(label: np.ndarray, *joints: Scalars | Bushes) -> set[int]:

@@ -45,13 +45,9 @@ def _dloads(
                 if part not in simple:
                     there = ", ".join(map(str, sorted(simple)[:8])) or "none"
                     raise cards.refuse(i, f"there is no RLOAD1 or RLOAD2 {part}; there are {there}")
-                found += [_scaled(e, factor) for e in simple[part]]
+                found += [replace(e, amplitude=e.amplitude * factor) for e in simple[part]]
             out[sid] = tuple(found)
     return out
-
-
-def _scaled(e: Excitation, factor: float) -> Excitation:
-    return replace(e, amplitude=e.amplitude * factor)
 
 
 def _rload(
@@ -140,13 +136,9 @@ def _areas(ctx: Context) -> dict[int, Dofs]:
                 if axis[j]:
                     key = (row, j + (4 if turn else 1))
                     total[key] = total.get(key, 0.0) + float(value * unit * axis[j])
-        out[sid] = _dofs(total)
+        keys = np.array(list(total), np.int64).reshape(-1, 2)
+        out[sid] = keys[:, 0], keys[:, 1], np.array(list(total.values()))
     return out
-
-
-def _dofs(total: dict[tuple[int, int], float]) -> Dofs:
-    keys = np.array(list(total), np.int64).reshape(-1, 2)
-    return keys[:, 0], keys[:, 1], np.array(list(total.values()))
 
 
 def _static_into(ctx: Context, areas: dict[int, Dofs], loads: dict[int, Load]) -> None:

@@ -49,13 +49,6 @@ def _turned(Q: np.ndarray, angle: float) -> np.ndarray:
     return T @ Q @ T.T
 
 
-def _transverse(ply: Ply, k: int) -> float:
-    """Transverse shear modulus of a ply along laminate axis k."""
-    c, s = np.cos(np.radians(ply.angle)), np.sin(np.radians(ply.angle))
-    G = ply.material.transverse()
-    return float(G[0, 0] * (c, s)[k] ** 2 + G[1, 1] * (s, c)[k] ** 2)
-
-
 def _shear_modulus(plies: list[Ply], z: np.ndarray, E: np.ndarray, k: int) -> float:
     """Mean modulus of equal shear energy: 1/(G t) = ∫ g²/G dz / D², g = -∫ E (z - z̄) dz.
 
@@ -71,7 +64,9 @@ def _shear_modulus(plies: list[Ply], z: np.ndarray, E: np.ndarray, k: int) -> fl
         a, b = z[j] - neutral, z[j + 1] - neutral
         x = (a + b) / 2 + (b - a) / 2 * points
         g = g0 - E[j] * (x**2 - a**2) / 2
-        G = _transverse(ply, k)
+        c, s = np.cos(np.radians(ply.angle)), np.sin(np.radians(ply.angle))
+        plane = ply.material.transverse()
+        G = float(plane[0, 0] * (c, s)[k] ** 2 + plane[1, 1] * (s, c)[k] ** 2)
         if G > 0:
             flexibility += (b - a) / 2 * (weights @ g**2) / G
         g0 -= E[j] * (b**2 - a**2) / 2

@@ -5,17 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....model.assembly import Bushes, Masses, Scalars, concatenated
-from ....units import Units
 from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context
 
 Values = dict[int, tuple[float, float]]
-
-
-def _work(scale: Units, component: np.ndarray, scalar: np.ndarray) -> np.ndarray:
-    """Unit of length per unit of each dof: the scale of a translation, 1 for a rotation."""
-    return np.where((component > 3) & ~scalar, 1.0, scale.length)
 
 
 def _pairs(ctx: Context, names: tuple[str, ...], unit: float, damped: bool) -> list[Scalars]:
@@ -56,7 +50,7 @@ def _scalars(
 ) -> Scalars:
     """K u_a u_b is work: the unit of K depends on what the two dofs are."""
     nodes, component, scalar = ends
-    unit = _work(ctx.scale, component, scalar)
+    unit = np.where((component > 3) & ~scalar, 1.0, ctx.scale.length)
     unit = np.where(nodes < 0, unit[:, ::-1], unit)
     return Scalars(cards.integers(1), nodes, component, value / (unit[:, 0] * unit[:, 1]), loss)
 
@@ -170,7 +164,11 @@ def _conm2(ctx: Context, cards: Cards) -> Masses:
     x = np.where((cid == -1)[:, None], x - ctx.places[node], x) * L
     inertia = _inertia(cards)
     _no_negative(cards, inertia)
-    _refuse_bodiless(cards, inertia)
+    if np.any(bad := no_body(inertia)[1]):
+        i = int(np.argmax(bad))
+        J = [f"{x:g}" for x in np.linalg.eigvalsh(inertia[i])]
+        why = f"no body has its inertia: of the principal moments {J[2]} exceeds {J[0]} + {J[1]}"
+        raise cards.refuse(i, why)
     inertia *= ctx.scale.inertia * L**2
     x = np.einsum("ni,nij->nj", x, T)
     inertia = np.einsum("nia,nij,njb->nab", T, inertia, T)
@@ -196,15 +194,6 @@ def no_body(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     J_1, J_2, J_3 = np.linalg.eigvalsh(inertia).T
     unlike = J_3 > (1 + _TWO_DIGITS) * (J_1 + J_2)
     return unlike, unlike & (J_1 > _GIVEN * J_3)
-
-
-def _refuse_bodiless(cards: Cards, inertia: np.ndarray) -> None:
-    """Refuse three moments of inertia that no body has together; fewer than three are noted."""
-    if np.any(bad := no_body(inertia)[1]):
-        i = int(np.argmax(bad))
-        J = [f"{x:g}" for x in np.linalg.eigvalsh(inertia[i])]
-        why = f"no body has its inertia: of the principal moments {J[2]} exceeds {J[0]} + {J[1]}"
-        raise cards.refuse(i, why)
 
 
 def one_sided_inertia(deck: Deck) -> Iterator[str]:

@@ -25,7 +25,9 @@ def selected(deck: Deck, kind: str, subcase: int | None = None) -> tuple[int, ..
     chosen = _chosen(deck, kind, subcase)
     there = _sets(deck, kind)
     if not chosen:
-        tops = _tops(deck, kind, there)
+        added = _additions(deck, kind)
+        inside = {s for parts in added.values() for s in parts}
+        tops = sorted((there | set(added)) - inside)
         if deck.case.present or not tops:
             return ()
         if len(tops) > 1:
@@ -78,13 +80,6 @@ def _additions(deck: Deck, kind: str) -> dict[int, list[int]]:
         chain = " -> ".join(map(str, ring[::-1]))
         raise cards.refuse(list(added).index(ring[0]), f"the set joins itself ({chain})") from None
     return added
-
-
-def _tops(deck: Deck, kind: str, there: set[int]) -> list[int]:
-    """Sets that no addition contains."""
-    added = _additions(deck, kind)
-    inside = {s for parts in added.values() for s in parts}
-    return sorted((there | set(added)) - inside)
 
 
 def _resolved(deck: Deck, kind: str, chosen: int, there: set[int]) -> tuple[int, ...]:

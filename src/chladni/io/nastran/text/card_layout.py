@@ -64,7 +64,10 @@ def _classified(source: Source) -> _Lines:
     at = (text[dollar] == _DOLLAR).argmax(axis=1)
     text[dollar] = np.where(_ARITHMETIC >= at[:, None], _BLANK, text[dollar])
     keep = (text != _BLANK).any(axis=1)
-    keep &= ~_skipped(text)
+    names = np.ascontiguousarray(text[:, :8]).view("S8").ravel()
+    names = np.strings.rstrip(names) if len(names) else names
+    keep &= np.cumsum(names == b"SKIPON") <= np.cumsum(names == b"SKIPOFF")
+    keep &= ~np.isin(names, (b"SKIPON", b"SKIPOFF"))
     for include in source.includes:
         keep &= (origin < include.first) | (origin >= include.past)
     number = np.flatnonzero(keep)
@@ -72,15 +75,6 @@ def _classified(source: Source) -> _Lines:
     commas = np.flatnonzero((text[:, :72] == _COMMA).any(axis=1))
     tokens = {int(i): free_fields(t) for i in commas if is_free(t := raw[number[i]])}
     return _formats(origin[number], text, tokens)
-
-
-def _skipped(text: np.ndarray) -> np.ndarray:
-    """Lines (m,) from a SKIPON to its SKIPOFF, both included."""
-    names = np.ascontiguousarray(text[:, :8]).view("S8").ravel()
-    names = np.strings.rstrip(names) if len(names) else names
-    return (np.cumsum(names == b"SKIPON") > np.cumsum(names == b"SKIPOFF")) | np.isin(
-        names, (b"SKIPON", b"SKIPOFF")
-    )
 
 
 def _formats(number: np.ndarray, text: np.ndarray, tokens: dict[int, list[bytes]]) -> _Lines:

@@ -87,20 +87,16 @@ class _CaseReading:
             self.cases.append(_Case(int(found[1])))
             self.stepped = None
         elif name == "STEP" and _ID.match(rest) and self.cases:
-            self._step()
+            if self.stepped is not None:  # several steps are a subcase each (SOL 400)
+                self.cases.append(self.stepped.copy())
+            else:
+                self.stepped = self.cases[-1].copy()
         elif name == "PARAM" and (found := _PARAM.match(rest)):
             self.parameters[found[1]] = found[2]
         else:
             if name == "AUTOSPC" and command.value:
                 self.parameters["AUTOSPC"] = command.value
             (self.cases[-1] if self.cases else self.common).add(command, self.sets)
-
-    def _step(self) -> None:
-        """A subcase of several steps is a subcase for each (SOL 400)."""
-        if self.stepped is not None:
-            self.cases.append(self.stepped.copy())
-        else:
-            self.stepped = self.cases[-1].copy()
 
 
 class _Case:

@@ -235,7 +235,12 @@ def _read(path: Path, prefix: str) -> bytes:
         raise FileError(f"{prefix}{path} is a device or a pipe, not a file")
     try:
         refuse_large(path)
-        data = _decoded(path.read_bytes())
+        data = path.read_bytes()
+        if code := _UTF16.get(data[:2]) or _utf16_unmarked(data[:400]):
+            data = data.decode(code, "replace").lstrip("\ufeff").encode("utf-8")
+        data = data.replace(BOM, b"")
+        if b"\0" in data:  # it pads lines or the end of a file
+            data = _PADDING.sub(b"", data).replace(b"\0", b" ")
     except OSError as error:
         raise FileError(f"{prefix}{path} cannot be read: {error.strerror}") from None
     if len(_NO_TEXT.findall(data, 0, 4096)) > 8:
@@ -243,14 +248,6 @@ def _read(path: Path, prefix: str) -> bytes:
     if re.match(rb"\s*-1\s*\n\s*\d+", data):
         raise FileError(f"{prefix}{path} is a universal file, not a Nastran deck")
     return data
-
-
-def _decoded(data: bytes) -> bytes:
-    """Without byte order mark, UTF-16 and the NUL that pads lines or the end of a file."""
-    if code := _UTF16.get(data[:2]) or _utf16_unmarked(data[:400]):
-        data = data.decode(code, "replace").lstrip("\ufeff").encode("utf-8")
-    data = data.replace(BOM, b"")
-    return _PADDING.sub(b"", data).replace(b"\0", b" ") if b"\0" in data else data
 
 
 def _utf16_unmarked(head: bytes) -> str:
