@@ -51,13 +51,7 @@ def observability_gramian(
 def _stable(
     frequency: np.ndarray, damping: np.ndarray, phi: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Angular frequencies [rad/s] and damping of a system that decays.
-
-    Raises
-    ------
-    ShapeError
-        If shapes and frequencies disagree, or a mode is rigid or undamped.
-    """
+    """Angular frequencies [rad/s] and damping of a system that decays."""
     omega = 2 * np.pi * np.asarray(frequency, dtype=float)
     zeta = np.broadcast_to(np.asarray(damping, dtype=float), omega.shape)
     if np.ndim(phi) != 2 or np.shape(phi)[1] != len(omega):

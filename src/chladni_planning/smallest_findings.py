@@ -29,11 +29,6 @@ def smallest_findings(
     layout : a table of sensors, or ``plan.json``
     band : to be measured [Hz]
     noise : of |H|, at every compared line
-
-    Raises
-    ------
-    FileError
-        If the model has no unit system or no shells, or the file is not a layout.
     """
     if not model.unit:
         raise FileError(f"{model.source}: smallest findings need the unit system (--units)")

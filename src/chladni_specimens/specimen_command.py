@@ -184,13 +184,7 @@ def _box(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
 
 
 def _affordable(area: float, h: float) -> None:
-    """Refuse elements so small that nobody waits for the mesh, let alone for its modes.
-
-    Raises
-    ------
-    ModelError
-        Naming the size that is small enough.
-    """
+    """Refuse elements so small that nobody waits for the mesh, let alone for its modes."""
     if not h > 0 or area / h**2 > MOST_SHELLS:
         least = 1e3 * (abs(area) / MOST_SHELLS) ** 0.5
         raise ModelError(
@@ -223,13 +217,7 @@ def _sized(key: str, size: float | None, values: dict[str, Any]) -> dict[str, An
 
 
 def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
-    """``build`` with these settings.
-
-    Raises
-    ------
-    LabelError, ModelError
-        If there is no such setting, or a value has the wrong kind.
-    """
+    """``build`` with these settings."""
     known = settings_of(build)
     if wrong := [key for key in values if key not in known]:
         hint = did_you_mean(wrong[0], known)

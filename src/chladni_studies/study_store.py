@@ -96,11 +96,6 @@ def opened_store(
     identity : identity of the study, by the words that an error message uses
     made : provenance for the record: files and their hashes, versions
     X : (n, d)   values of the parameters ``names``
-
-    Raises
-    ------
-    FileError
-        If the folder holds anything else, another study, or is in use.
     """
     make_folder(folder)
     begun = folder / BEGUN
@@ -142,13 +137,7 @@ def _refuse_another(begun: Path, identity: dict[str, Any]) -> None:
 
 
 def finished(path: Path, n: int) -> tuple[dict[int, dict[str, Any]], int]:
-    """Rows of the finished samples by number, and their bytes; an incomplete last line is dropped.
-
-    Raises
-    ------
-    FileError
-        If any other line is damaged.
-    """
+    """Rows of finished samples by number, and their bytes; an incomplete last line is dropped."""
     if not path.exists():
         return {}, 0
     data = path.read_bytes()

@@ -87,11 +87,6 @@ def of_parts(
 
     Plain numbers are in the deck's own units, as in its cards; per cent are of the deck's own
     value.
-
-    Raises
-    ------
-    FileError, LabelError
-        One sentence that names the text, its error and the alternatives.
     """
     free = free_parameter(_section(request, assembly), assembly, deck)
     if request.grid is not None or free.field not in FIELDS:

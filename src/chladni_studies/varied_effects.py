@@ -46,11 +46,6 @@ def of_effect(
     """The variation of an effect over a range, at a grid or at the place in the test of a case.
 
     Numbers are in the deck's own units, as in its cards.
-
-    Raises
-    ------
-    FileError
-        One sentence that names the text, its error and the alternatives.
     """
     kind, grid = family(request.name), request.grid
     if request.parts is not None:

@@ -50,11 +50,6 @@ class VaryText:
         ----------
         scale : factor on a plain number
         nominal : the deck's own value; None where it has none, and 0 may be an end
-
-        Raises
-        ------
-        FileError
-            If an end is not a number, a share has no value to refer to, or the range is empty.
         """
         if nominal is None and "%" in self.low + self.high:
             raise self.refused("the deck has no value there, so a share is not possible")
@@ -87,11 +82,6 @@ def vary_text(text: str) -> VaryText:
 
     >>> vary_text("K of PBUSH 7 = 10:1e4:log").parts
     'PBUSH 7'
-
-    Raises
-    ------
-    FileError
-        If the text has no known form.
     """
     found = _FORM.fullmatch(text)
     if not found:

@@ -27,13 +27,7 @@ _COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, 
 
 
 def refuse_many(workers: int) -> None:
-    """Refuse impossible numbers of local processes.
-
-    Raises
-    ------
-    FileError
-        If the number is below one, or above ``MOST_PER_CORE`` a core.
-    """
+    """Refuse impossible numbers of local processes."""
     if workers < 1:
         raise FileError(f"workers = {workers}; at least one is needed")
     if workers > MOST_PER_CORE * cores():
@@ -76,13 +70,7 @@ def results(
 
 @contextmanager
 def _local_cluster(workers: int) -> Iterator[Any]:
-    """A client of processes of this machine, one thread each; one that ends is started again.
-
-    Raises
-    ------
-    FileError
-        If workers end in their start again and again.
-    """
+    """A client of processes of this machine, one thread each; one that ends is started again."""
     from distributed import Client, LocalCluster
 
     options = {"threads_per_worker": 1, "memory_limit": None, "dashboard_address": None}

@@ -226,13 +226,7 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _finite(options: dict[str, Any]) -> dict[str, Any]:
-    """The options of a command, unchanged.
-
-    Raises
-    ------
-    FileError
-        If one holds ``nan`` or ``inf``, which Python takes for numbers.
-    """
+    """The options of a command, unchanged."""
     for name, value in options.items():
         numbers = value if isinstance(value, list) else [value]
         for x in (x for x in numbers if isinstance(x, float) and not math.isfinite(x)):

@@ -46,13 +46,7 @@ def run(
 
 
 def _deck(source: Path, allow: tuple[str, ...], out: Path | None) -> None:
-    """The table of a deck's cards: which are read, passed over, not understood.
-
-    Raises
-    ------
-    AccuracyError
-        After the table is written, if the deck is refused.
-    """
+    """The table of a deck's cards: which are read, passed over, not understood."""
     with started("check", source, out) as job:
         found = check_deck(source, allow)
         job.json("check.json", asdict(found))

@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 
 
 def folder_named(text: str) -> Path:
-    """A folder by its name; an empty one would be the current folder.
-
-    Raises
-    ------
-    typer.BadParameter
-        If the name is empty.
-    """
+    """A folder by its name; an empty one would be the current folder."""
     if not text.strip():
         raise typer.BadParameter("the name is empty; give a folder")
     return Path(text)
@@ -171,13 +165,7 @@ def place_of(command: str, source: Path, out: Path | None) -> Path:
 
 
 def opened(source: Path) -> "Case":
-    """The case of a folder or a case.toml.
-
-    Raises
-    ------
-    FileError
-        If it is no case.
-    """
+    """The case of a folder or a case.toml."""
     from ..case import load_case
     from ..workflows.loaded_model import is_case
 

@@ -120,13 +120,6 @@ def deviation(model: FRF, test: FRF) -> np.ndarray:
     """δ = log₁₀(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in); Echaniz Granado 2015, (4).
 
     Logarithmic, so an anti-resonance counts like a resonance.
-
-    Raises
-    ------
-    ShapeError
-        If labels, quantity or frequencies differ.
-    LabelError
-        If a channel is zero somewhere.
     """
     names = [(frf.outputs, frf.inputs, frf.quantity) for frf in (model, test)]
     if names[0] != names[1] or model.values.shape != test.values.shape:

@@ -76,15 +76,7 @@ def refuse_unknown(settings: EstimateSettings) -> None:
 
 
 def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()) -> FrfEstimate:
-    """Estimate FRFs by the method that suits the excitation.
-
-    Raises
-    ------
-    FileError
-        If the recording is too short for it, or holds no excitation.
-    LabelError
-        If excitation or method have no such name.
-    """
+    """Estimate FRFs by the method that suits the excitation."""
     refuse_unknown(settings)
     if not record.force.any():
         raise FileError("the inputs are zero throughout, so nothing was excited")

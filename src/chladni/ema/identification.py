@@ -154,13 +154,7 @@ def _covariance(
 def kept_lines(
     frf: FRF, band: tuple[float, float] | None = None, use: np.ndarray | None = None
 ) -> np.ndarray:
-    """Select the spectral lines for the identification (n_f,) bool.
-
-    Raises
-    ------
-    FileError
-        If they are too few.
-    """
+    """Select the spectral lines for the identification (n_f,) bool."""
     keep = frf.frequency > 0
     if band is not None:
         keep &= (band[0] <= frf.frequency) & (frf.frequency <= band[1])

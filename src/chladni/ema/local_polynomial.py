@@ -18,11 +18,6 @@ def local_polynomial(record: TimeRecord) -> tuple[FRF, float]:
 
     Each block has a leakage T of its own, the FRF is common to all. Coherence is 1 less the noise
     over the power of the response; the second result is the degrees of freedom of the variance.
-
-    Raises
-    ------
-    FileError
-        If there are fewer lines than unknowns.
     """
     b, n_in, n = record.force.shape
     U, Y = (np.fft.rfft(x) / n for x in (record.force, record.response))

@@ -27,13 +27,7 @@ def is_periodic(record: TimeRecord) -> bool:
 
 
 def of_periods(record: TimeRecord, method: Estimator) -> tuple[FRF, float, str]:
-    """Estimate the FRF at the driven lines; return averages and a sentence on the other lines too.
-
-    Raises
-    ------
-    FileError
-        If there is more than one input, or too few lines are driven.
-    """
+    """Estimate the FRF at the driven lines; return averages and a sentence on the others too."""
     from scipy.ndimage import maximum_filter1d
 
     if len(record.inputs) > 1:

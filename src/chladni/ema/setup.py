@@ -186,13 +186,7 @@ class TestSetup:
     accuracy: SensorAccuracy = SensorAccuracy()
 
     def sensor(self, label: str, role: Role = "output") -> Sensor:
-        """The sensor (or exciter) of this label.
-
-        Raises
-        ------
-        LabelError
-            If there is none; the message lists the known ones.
-        """
+        """The sensor (or exciter) of this label."""
         among = self.outputs if role == "output" else self.inputs
         for sensor in among:
             if sensor.label == label:

@@ -152,13 +152,7 @@ def collinearity(psi: np.ndarray) -> np.ndarray:
 
 
 def modal_model(identified: Identified) -> ModalModel:
-    """Real modes over the measured dofs, for MAC and synthesis.
-
-    Raises
-    ------
-    LabelError
-        If an output is no single component (412:n), or there is no drive point to scale by.
-    """
+    """Real modes over the measured dofs, for MAC and synthesis."""
     found = shapes(identified)
     if not found.scaled:
         raise LabelError(

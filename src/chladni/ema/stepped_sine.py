@@ -20,13 +20,7 @@ SAME = 1e-4  # dwells this near in frequency are repeats
 
 
 def demodulated(record: TimeRecord) -> tuple[FRF, np.ndarray, tuple[str, ...]]:
-    """FRF with its variance, harmonic distortion of every output (n_f, n_out), notes.
-
-    Raises
-    ------
-    FileError
-        If there is more than one input, or fewer than five dwells are found.
-    """
+    """FRF with its variance, harmonic distortion of every output (n_f, n_out), notes."""
     if len(record.inputs) > 1:
         raise FileError("a stepped sine drives one input at a time; give each a file of its own")
     rows = []

@@ -17,11 +17,6 @@ def check_surface(points: np.ndarray, cells: np.ndarray) -> None:
     ----------
     points : (n, 3)   [m]
     cells : (m, k) int rows of points
-
-    Raises
-    ------
-    ModelError
-        With the first of them, counted from 0 as mesh files do.
     """
     for k in np.flatnonzero(~(np.abs(points) < FARTHEST).all(axis=1))[:1]:
         place = ", ".join(f"{x:g}" for x in points[k])

@@ -24,13 +24,7 @@ def grid_normals(assembly: Assembly, rows: np.ndarray) -> np.ndarray:
 
 
 def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
-    """Unit normals of the surface at grids (k,) by id: (k, 3).
-
-    Raises
-    ------
-    LabelError
-        If a grid is not on a surface.
-    """
+    """Unit normals of the surface at grids (k,) by id: (k, 3)."""
     normals = grid_normals(assembly, assembly.rows(ids))
     if np.any(bare := ~normals.any(axis=1)):
         raise LabelError(

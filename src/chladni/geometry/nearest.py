@@ -154,13 +154,7 @@ class ShellSurface:
         return ClosestPoints(shell[best // 2], *(v[best] for v in rows))
 
     def within(self, closest: ClosestPoints, places: np.ndarray, reach: float) -> None:
-        """Refuse places farther than `reach` from the surface.
-
-        Raises
-        ------
-        ModelError
-            If a place is farther; the message names the worst place and its distance.
-        """
+        """Refuse places farther than `reach` from the surface."""
         worst = int(closest.distance.argmax())
         if closest.distance[worst] > reach:
             x, y, z = 1e3 * np.atleast_2d(places)[worst]
@@ -295,13 +289,7 @@ def _in_line(x: np.ndarray) -> bool:
 
 
 def nearest_parts(assembly: Assembly, places: np.ndarray, reach: float) -> list[tuple[int, int]]:
-    """Ids of the two parts nearest to each place.
-
-    Raises
-    ------
-    ModelError
-        If fewer than two parts are within reach; the message names the place.
-    """
+    """Ids of the two parts nearest to each place."""
     present = np.unique(assembly.shells.part)
     surfaces = [
         ShellSurface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present

@@ -55,13 +55,6 @@ def align(
     parts : names of the parts in the formed mesh; default all with shells
     points : three or more places on the formed mesh and on the structure, (k, 3) each [m]
     allow_mirror : accept a reflection if it fits far better than any motion
-
-    Raises
-    ------
-    ModelError
-        If only the mirror image fits.
-    AccuracyError
-        If nothing fits: the residual stays above 5 % of the mesh's extent.
     """
     rows = _rows(assembly, parts)
     target = ShellSurface.of(assembly, rows)

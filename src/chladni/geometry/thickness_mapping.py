@@ -115,11 +115,6 @@ def map_thickness(
         Largest distance of a partner [m]; default a third of the median shell size, 1.5 to 6 mm.
     facing : float
         Least |cos| between the normals of partners.
-
-    Raises
-    ------
-    ModelError
-        If no part of the formed mesh belongs to any part of the assembly.
     """
     reach = default_reach(assembly) if reach is None else reach
     sources = _sources(assembly, formed, pairs, reach, facing)

@@ -33,11 +33,6 @@ def thickness_of_scan(assembly: Assembly, points: np.ndarray, cells: np.ndarray)
 
     ``distance_95`` of a part is the distance of its shells from the middle of the sheet. Shells
     without two faces keep their thickness.
-
-    Raises
-    ------
-    ModelError
-        If less than ``LEAST_COVERED`` of the area lies between two faces of the scan.
     """
     shells = assembly.shells
     at, normal = samples(assembly.points, shells.nodes)

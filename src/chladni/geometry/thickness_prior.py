@@ -57,13 +57,7 @@ def features(assembly: Assembly) -> np.ndarray:
 
 
 def learn(assembly: Assembly, parts: tuple[str, ...] = ()) -> ThinningModel:
-    """Fit the model to the parts of an assembly with mapped thickness.
-
-    Raises
-    ------
-    ModelError
-        If fewer than three parts have a thickness other than their gauge.
-    """
+    """Fit the model to the parts of an assembly with mapped thickness."""
     X, y = features(assembly), 1 - assembly.thickness() / gauge(assembly)
     weight = shell_area(assembly)
     named = [assembly.part(p) for p in parts] or np.unique(assembly.shells.part).tolist()

@@ -229,14 +229,7 @@ def _section_thickness(blocks: list[_Block]) -> dict[int, float]:
 
 
 def read_keyword(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
-    """Nodes, shells and their thickness of an LS-DYNA keyword file, in SI.
-
-    Raises
-    ------
-    FileError
-        Naming file and line where a number cannot be read, a node is missing or a shell has no
-        thickness.
-    """
+    """Nodes, shells and their thickness of an LS-DYNA keyword file, in SI."""
     path, unit = Path(path), units_named(units)
     blocks = list(_blocks(path))
     ids, places = _nodes(blocks)

@@ -11,13 +11,7 @@ _PIECE = 1 << 20  # characters read at a time
 
 
 def encoding_of(path: Path) -> str:
-    """Encoding in which a whole file can be read.
-
-    Raises
-    ------
-    FileError
-        If it holds a byte that is a character neither in UTF-8 nor in CP1252.
-    """
+    """Encoding in which a whole file can be read."""
     with path.open("rb") as file:
         if file.read(2) in _MARKS:
             return "utf-16"

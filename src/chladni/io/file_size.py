@@ -33,13 +33,7 @@ def lies_within(path: Path, folder: Path) -> bool:
 
 
 def refuse_outside(path: Path, prefix: str = "") -> None:
-    """Refuse a file that lies outside of the folder of the case that is read.
-
-    Raises
-    ------
-    FileError
-        With the word that lets it in.
-    """
+    """Refuse a file that lies outside of the folder of the case that is read."""
     folder = _within.get()
     if folder is not None and not lies_within(path, folder):
         raise FileError(f"{prefix}{path} {LEADS_OUT}")
@@ -52,13 +46,7 @@ LEADS_OUT = (
 
 
 def most_gigabytes() -> float:
-    """The limit, which the environment may raise.
-
-    Raises
-    ------
-    FileError
-        If what the environment says is no number.
-    """
+    """The limit, which the environment may raise."""
     text = os.environ.get(OVERRIDE, "")
     try:
         return real_number(text) if text else LARGEST
@@ -72,11 +60,6 @@ def refuse_large(path: Path, size: int | None = None, what: str = "holds") -> No
     Parameters
     ----------
     size : in bytes, where it is not the file's own
-
-    Raises
-    ------
-    FileError
-        With the variable that lets the file in.
     """
     refuse_outside(path)
     limit = most_gigabytes()

@@ -9,13 +9,7 @@ _HERE = Path(__file__).resolve().parents[1]
 
 
 def mesh_path(name: str) -> Path:
-    """Path of a reference mesh, whether installed (wheel) or in a checkout (editable).
-
-    Raises
-    ------
-    FileError
-        If there is none of this name; the sentence lists those there are.
-    """
+    """Path of a reference mesh, whether installed (wheel) or in a checkout (editable)."""
     folders = (_HERE / "meshes", _HERE.parents[1] / "meshes")
     for folder in folders:
         if (folder / name).is_file():

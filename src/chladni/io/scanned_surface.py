@@ -42,13 +42,7 @@ class ScannedSurface:
 
 
 def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
-    """A scan whose coordinates are in units of ``length`` [m].
-
-    Raises
-    ------
-    FileError
-        If the file is of another kind, cannot be read or holds no triangle with an area.
-    """
+    """A scan whose coordinates are in units of ``length`` [m]."""
     from trimesh import Trimesh, load_mesh
 
     if path.suffix.lower() not in SUFFIXES:

@@ -29,11 +29,6 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
 
     Measured shapes are compared with the model's along the declared axes. The comparison is
     repeated for the five other orders of X, Y and Z, and for the normals of the surface.
-
-    Raises
-    ------
-    FileError
-        If other axes fit better; the sentence names them.
     """
     found = found.sel(firm(found))
     if len(case.outputs.labels) < OUTPUTS or not found.order:

@@ -83,13 +83,7 @@ def draft(
     weighed: float | None = None,
     allow: Sequence[str] = (),
 ) -> CaseDraft:
-    """Read the files, guess what they do not state, and list what is missing.
-
-    Raises
-    ------
-    FileError
-        If a file cannot be read, its name is not printable, or the unit system is ambiguous.
-    """
+    """Read the files, guess what they do not state, and list what is missing."""
     for path in (deck, *recordings):
         if not str(path).isprintable():
             raise FileError(

@@ -144,11 +144,6 @@ def layout_places(
     ----------
     path : a table of sensors, or ``plan.json``
     driven : labels as 12:+Z, 12:n or base:+Z in place of its inputs
-
-    Raises
-    ------
-    FileError, LabelError
-        If the file is not a layout, or a place is not on the model.
     """
     if not path.is_file():
         raise FileError(f"no file {path}{similar_names(path)}")

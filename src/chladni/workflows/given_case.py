@@ -21,13 +21,7 @@ Source = Case | Model | DeckModels | Assembly | Deck | str | Path
 def given_case(
     source: Source, recording: Measured | Sequence[Measured] = (), words: CaseWords | None = None
 ) -> Case:
-    """Resolve the arguments of a call into a case.
-
-    Raises
-    ------
-    FileError, LabelError, ModelError
-        One sentence that names the argument, the offender and the alternatives.
-    """
+    """Resolve the arguments of a call into a case."""
     words = {} if words is None else words
     if isinstance(source, str | Path):
         source = Path(source)

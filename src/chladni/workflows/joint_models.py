@@ -82,11 +82,6 @@ def joint_models(
     Parameters
     ----------
     source, recording, progress, words : as in :func:`chladni.calibrate`
-
-    Raises
-    ------
-    FileError, LabelError, ModelError
-        One sentence that names the argument (or file and line), the offender and the alternatives.
     """
     case = given_case(source, recording, words)
     if len(states(case.recordings)) > 1 and ("test", "use") not in case.given:

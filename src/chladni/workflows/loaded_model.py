@@ -152,13 +152,6 @@ def opened(
     ----------
     units : of a deck; everything else has its own, and no others may be named
     allow : cards of the deck at a path to leave out although they carry stiffness
-
-    Raises
-    ------
-    ArgumentError
-        If it is something else.
-    FileError
-        If there is no such file, it is neither a deck nor a case, or has other units.
     """
     found: Case | Model | DeckModels
     if isinstance(source, str | Path):
@@ -215,13 +208,7 @@ def model_in_si(
     units: str | Units | None = None,
     allow: Sequence[str] = (),
 ) -> tuple[Model, str]:
-    """Convert to a model in SI, with a sentence where the unit system of a deck was guessed.
-
-    Raises
-    ------
-    FileError
-        If several unit systems fit the materials of the deck, or none does.
-    """
+    """Convert to a model in SI, with a sentence where the unit system of a deck was guessed."""
     found = opened(source, units, allow)
     if not isinstance(found, Model | DeckModels) or found.units is not None:
         return as_model(found, command), ""

@@ -34,13 +34,7 @@ def undone(case: Case, screening: Screening, before: tuple[Finding, ...]) -> Cas
 def mending(
     case: Case, search: Callable[[Case, tuple[Finding, ...]], T]
 ) -> tuple[T, tuple[Finding, ...]]:
-    """Search a case, its faults undone one after another; return the faults too.
-
-    Raises
-    ------
-    RecordingAtFault
-        If a fault cannot be undone; those that were are in its screening.
-    """
+    """Search a case, its faults undone one after another; return the faults too."""
     faults: tuple[Finding, ...] = ()
     while True:
         try:

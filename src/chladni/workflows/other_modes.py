@@ -77,11 +77,6 @@ def read_modes(path: Path) -> tuple[PunchModes, Recording | None]:
     Returns
     -------
     Modes, and the recording of a universal file with the places and axes of its nodes.
-
-    Raises
-    ------
-    FileError
-        If it is another kind of file, or holds no shapes.
     """
     if not path.is_file():
         raise FileError(f"no file {path}{similar_names(path)}")

@@ -25,13 +25,7 @@ def nothing_measured(case: Case) -> FileError:
 
 
 def question_of(case: Case) -> Question:
-    """Build the question of a case.
-
-    Raises
-    ------
-    FileError
-        If the recordings hold neither FRFs nor poles, or the deck's unit system cannot be right.
-    """
+    """Build the question of a case."""
     refuse_other_units(case)
     frfs = case.frfs
     poles = [r.poles for r in case.recordings if r.poles is not None]

@@ -33,13 +33,7 @@ class ReadyCase:
 
 
 def refuse_without_effects(case: Case) -> None:
-    """Refuse a deck without parts for the effects.
-
-    Raises
-    ------
-    FileError
-        If it has neither shells nor beams.
-    """
+    """Refuse a deck without parts for the effects."""
     if not len(case.assembly.shells) + len(case.assembly.beams):
         raise FileError(
             f"{case.path}: the deck has neither shells nor beams, but the effects of diagnose act "
@@ -59,14 +53,6 @@ def ready(
     fitted : False if nothing will be fitted: a long recording is then identified from the lines
         that its screening needs, and the error of the mesh is left out
     undone : faults of the recording that were mapped away already
-
-    Raises
-    ------
-    RecordingAtFault
-        If the recording shows a fault that a fit cannot compensate; for a calibration only if a map
-        undoes it.
-    FileError, LabelError, ModelError
-        If nothing can be compared.
     """
     if diagnosing:
         refuse_without_effects(case)

@@ -46,11 +46,6 @@ def compare_with_scan(
     """Distances of the sheets' faces from a scan, which may be brought onto the model first.
 
     A scanner sees the outside of a sheet: half the thickness from the middle the shells stand for.
-
-    Raises
-    ------
-    FileError
-        If the model has no shells, or the scan lies nowhere near them.
     """
     if not len(assembly.shells):
         raise FileError("the model has no shells to compare with a scan")

@@ -42,11 +42,6 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
     ----------
     made : the deck as it was read
     read_in : in which system; a deck read without one counts as SI
-
-    Raises
-    ------
-    FileError
-        If it has no material with a modulus and a density, or none is usual in any system.
     """
     pairs = _materials(made, read_in)
     if not pairs:
@@ -69,13 +64,7 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
 
 
 def doubt_of_units(made: Assembly, source: str, units: Units) -> str:
-    """A sentence against the unit system a bare deck was read in; '' where nothing speaks so.
-
-    Raises
-    ------
-    FileError
-        If its materials are known ones in another system and in no way in this one.
-    """
+    """A sentence against the unit system a bare deck was read in; '' where nothing speaks so."""
     pairs, (size, mass) = _materials(made, units), _size_and_mass(made, units)
     seen = f"in {units.name} {_seen(size, mass, units)}"
     if pairs and _off_materials(pairs, units) > NEAR_DECADES:

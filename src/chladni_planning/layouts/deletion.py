@@ -85,13 +85,7 @@ def deletion(
 
 
 def start(c: Candidates, n_sensors: int, rules: Rules | None) -> tuple[np.ndarray, Rules]:
-    """Candidates (n,) bool from which deletion starts, and the rules as masks.
-
-    Raises
-    ------
-    ShapeError
-        If there are fewer sensors than modes, or more than candidates, or the rules forbid it.
-    """
+    """Candidates (n,) bool from which deletion starts, and the rules as masks."""
     if not max(c.fewest, 1) <= n_sensors <= len(c):
         raise ShapeError(
             f"{n_sensors} sensors cannot distinguish {c.unknowns} modes among {len(c)} candidates"

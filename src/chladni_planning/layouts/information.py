@@ -157,13 +157,7 @@ def _positive(noise: np.ndarray, n: int) -> np.ndarray:
 
 
 def positions_of(kept: np.ndarray, n: int) -> np.ndarray:
-    """Positions (m,) int of a mask or a list of positions.
-
-    Raises
-    ------
-    LabelError
-        If a position is not one of 0 ... n - 1.
-    """
+    """Positions (m,) int of a mask or a list of positions."""
     kept = np.asarray(kept)
     if kept.dtype == bool:
         if kept.shape != (n,):

@@ -199,14 +199,7 @@ def keyed(keys: np.ndarray, n_sensors: int, rules: Rules) -> np.ndarray:
 
 
 def thinned(rules: Rules, worth: np.ndarray, n_sensors: int) -> np.ndarray:
-    """A large set (n,) bool without forbidden or too near places; places of higher worth stay.
-
-    Raises
-    ------
-    ShapeError
-        If fewer than ``n_sensors`` are left by either packing: highest worth first, or fewest
-        neighbours first.
-    """
+    """A large set (n,) bool without forbidden or too near places; places of higher worth stay."""
     allowed = ~rules.forbidden
     if rules.near is None:
         return allowed

@@ -13,13 +13,7 @@ SizeField = Callable[[np.ndarray], np.ndarray]  # planform (n, 2) -> required si
 
 
 def loops(nodes: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
-    """Closed free edges of a mesh (k, 2 or 3), the longest first.
-
-    Raises
-    ------
-    ModelError
-        If an edge does not close: the mesh is not a sheet.
-    """
+    """Closed free edges of a mesh (k, 2 or 3), the longest first."""
     following: dict[int, list[int]] = {}
     for a, b in free_edges(nodes).tolist():
         following.setdefault(a, []).append(b)

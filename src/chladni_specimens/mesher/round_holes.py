@@ -38,11 +38,6 @@ def bored(
 
     The error of the hole's place is at most half a diagonal in cells smaller than four radii, and
     two radii in larger ones.
-
-    Raises
-    ------
-    ModelError
-        If neither a cell nor a node of the sheet near the place can take the hole.
     """
     options = [*_cells(sheet, place, radius), *_nodes(sheet, place, radius)]
     options = options or _cells(sheet, place, radius, _TIGHT)

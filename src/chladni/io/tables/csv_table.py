@@ -115,13 +115,7 @@ class CsvTable:
 
 
 def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -> CsvTable:
-    """A CSV file with these columns, in any order; ``optional`` None: any others may stand there.
-
-    Raises
-    ------
-    FileError
-        If the file, a column or a cell is missing, or a column is unknown.
-    """
+    """A CSV file with these columns in any order; ``optional`` None: any others may stand there."""
     if not path.is_file():
         near = (
             difflib.get_close_matches(path.name, files_next_to(path), 3, 0.4)

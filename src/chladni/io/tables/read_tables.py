@@ -44,11 +44,6 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     """Contents of a file, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat.
 
     A CSV, NPZ or MAT holds FRFs, poles (CSV) or time data; WAV holds time data.
-
-    Raises
-    ------
-    FileError
-        One sentence about what is wrong with the file.
     """
     path = Path(path)
     ending = path.suffix.lower()

@@ -44,11 +44,6 @@ def read_layout(path: Path, driven: Sequence[Sensor] = ()) -> tuple[Sensor, ...]
     """Sensors and exciters of a table, or of ``plan.json``: its sensors and its shakers.
 
     ``driven`` takes the place of the exciters.
-
-    Raises
-    ------
-    FileError
-        If it is neither, or names no exciter or no sensor.
     """
     found = _planned(path) if path.suffix.lower() == ".json" else read_sensors(path)
     if driven:
@@ -73,13 +68,7 @@ def exciter(label: str, where: str) -> Sensor:
 
 
 def with_input(path: Path, label: str) -> str:
-    """The text of a table of sensors that names nothing that drives, and a row that does.
-
-    Raises
-    ------
-    FileError
-        If the table cannot be read, or names what drives already.
-    """
+    """The text of a table of sensors that names nothing that drives, and a row that does."""
     if named_already := [s.label for s in read_sensors(path) if s.role == "input"]:
         raise FileError(
             f"{path} already names inputs ({', '.join(named_already)}); remove them, or leave out "

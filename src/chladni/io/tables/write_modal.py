@@ -38,11 +38,6 @@ def write_state_space(path: str | Path, modes: Identified) -> Path:
 
     ``control.ss(A, B, C, D)`` of python-control and MATLAB's ``ss(A, B, C, D)`` take them as they
     are; outputs are in the recording's quantity, SI.
-
-    Raises
-    ------
-    LabelError
-        If the quantity has no state space, or the suffix is another.
     """
     system = realised(modes, modes.quantity)  # type: ignore[arg-type]
     arrays = {

@@ -25,13 +25,7 @@ Read = tuple[TimeRecord, list[str]]
 
 
 def read_wav(path: Path) -> Read:
-    """A WAV of any width; its numbers are shares of full scale, so a table of channels is needed.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or no table of channels stands beside it.
-    """
+    """A WAV of any width; its numbers are shares of full scale: a table of channels is needed."""
     from scipy.io import wavfile
 
     _refuse_cut(path)
@@ -80,13 +74,7 @@ def _refuse_cut(path: Path) -> None:
 
 
 def mat_variables(path: Path) -> dict[str, Any]:
-    """Variables of a MAT of MATLAB 4 to 7, axes of length one left out.
-
-    Raises
-    ------
-    FileError
-        If it is of version 7.3, or is damaged.
-    """
+    """Variables of a MAT of MATLAB 4 to 7, axes of length one left out."""
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import MatReadError
 
@@ -181,13 +169,7 @@ def _dof(text: str) -> str:
 
 
 def read_time_csv(path: Path) -> Read:
-    """Columns ``time_s``, if need be ``block``, and one a channel, headed ``412:+Z [m/s^2]``.
-
-    Raises
-    ------
-    FileError
-        With the line of what is no number, or the head that says no unit.
-    """
+    """Columns ``time_s``, if need be ``block``, and one a channel, headed ``412:+Z [m/s^2]``."""
     cut = delimiter(path)
     head = [cell.strip() for cell in first_line(path).split(cut)]
     try:

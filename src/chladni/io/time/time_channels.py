@@ -39,11 +39,6 @@ def assembled(
     """The record in SI, and notes of how it was read.
 
     Without any force it has no inputs: motions or sound that die away, or go on.
-
-    Raises
-    ------
-    FileError
-        If a unit is not known, or there is no output, or outputs differ in kind.
     """
     parts: dict[str, list[tuple[TimeChannel, Quantity | None, float]]] = {"input": [], "output": []}
     for k, channel in enumerate(channels):
@@ -123,11 +118,6 @@ def from_arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[TimeRecord, l
     ``rate`` (or fs, sampling_rate, dt, t); ``force`` and ``acceleration`` (velocity, displacement),
     each (n,), (channels, n) or (blocks, channels, n), with ``inputs`` and ``outputs`` as labels; or
     ``data`` with ``labels``, ``units`` and, if need be, ``roles``. The longest axis is time.
-
-    Raises
-    ------
-    FileError
-        If rate or signals are missing, or an array is not one of these.
     """
     only_known(name, list(arrays))
     rest = {k.lower(): v for k, v in arrays.items()}
@@ -154,13 +144,7 @@ def is_time(names: Sequence[str]) -> bool:
 
 
 def only_known(name: str, names: Sequence[str]) -> None:
-    """Refuse arrays that nobody reads, before they are unpacked.
-
-    Raises
-    ------
-    FileError
-        Naming them and those that are known.
-    """
+    """Refuse arrays that nobody reads, before they are unpacked."""
     if unknown := [n for n in names if n.lower() not in (*_AXES, *_MORE, *BY_NAME)]:
         raise FileError(
             f"{name}: unknown array {', '.join(unknown)}; known of time data are rate, fs, dt, t; "
@@ -184,13 +168,7 @@ def _rate(name: str, rest: dict[str, np.ndarray]) -> float:
 
 
 def rate_of(name: str, t: np.ndarray) -> float:
-    """Samples per second of an even axis of times (n,) [s].
-
-    Raises
-    ------
-    FileError
-        If it is not even to a thousandth of a step.
-    """
+    """Samples per second of an even axis of times (n,) [s]."""
     if len(t) < 2 or not np.isfinite(t).all():
         raise FileError(f"{name}: its time axis has {len(t)} samples")
     step = (t[-1] - t[0]) / (len(t) - 1)

@@ -40,13 +40,6 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
     path : file
     quantity : of the FRFs (receptance, mobility, accelerance, transmissibility) where the file
         does not say it, or says it wrongly.
-
-    Raises
-    ------
-    FileError
-        One sentence with file and dataset number: missing, truncated or empty file, not-a-number,
-        frequency axes that differ, records that repeat each other, an abscissa that is no
-        frequency, values in volts.
     """
     path = Path(path)
     uff, records = UffAccumulator(path), list[FunctionSet]()

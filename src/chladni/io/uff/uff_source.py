@@ -30,11 +30,6 @@ def readable(path: Path) -> Iterator[Path]:
     are put into columns 1 to 6, with no blanks behind them. Lines that end in a carriage return
     alone, Fortran's D exponents and those of three digits are mended. The numbers of binary records
     are never touched.
-
-    Raises
-    ------
-    FileError
-        If there is no such file, it is no universal file, or its last dataset has no end.
     """
     if not path.is_file():
         near = sorted(p.name for p in path.parent.glob("*.u*") if p.is_file())[:6]

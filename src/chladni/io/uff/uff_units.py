@@ -100,13 +100,7 @@ def ratio(label: str) -> tuple[str | None, float | None, float | None]:
 
 
 def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
-    """Quantity and SI factor of an FRF record: unit labels first, then data types and dataset 164.
-
-    Raises
-    ------
-    FileError
-        If a unit is not known, or the label and the data type contradict each other.
-    """
+    """Quantity and SI factor of an FRF: unit labels first, then data types and dataset 164."""
     typed = _RESPONSE.get(record.ordinate.kind)
     motion_below = record.denominator.kind in _RESPONSE
     if record.function == 5 or (typed and motion_below):
@@ -132,13 +126,7 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
 
 
 def hertz(record: FunctionSet, where: str) -> np.ndarray:
-    """The abscissa as frequencies [Hz]; of revolutions only where they are said to be a frequency.
-
-    Raises
-    ------
-    FileError
-        If it is something else (a speed, an order, a time), or in a unit that is not known.
-    """
+    """The abscissa as frequencies [Hz]; revolutions only where they are said to be a frequency."""
     kind, text = record.abscissa.kind, plain(record.abscissa.unit).strip("()")
     needed = f"a function of frequency has data type {_FREQUENCY} and is in Hz, kHz, rad/s or rpm"
     is_frequency = kind == _FREQUENCY or (kind in (0, 1) and text not in _SPEED)
@@ -153,13 +141,7 @@ def hertz(record: FunctionSet, where: str) -> np.ndarray:
 
 
 def check_calibrated(record: FunctionSet, where: str) -> None:
-    """Refuse what a front end measured but nobody calibrated.
-
-    Raises
-    ------
-    FileError
-        If the ordinate or its denominator is in volts, counts or a charge.
-    """
+    """Refuse what a front end measured but nobody calibrated."""
     for axis in (record.ordinate, record.denominator):
         if any(_ELECTRICAL.fullmatch(part) for part in re.split(r"[^a-zμ]", plain(axis.unit))):
             raise FileError(

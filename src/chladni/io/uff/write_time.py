@@ -20,13 +20,7 @@ def write_time_uff(
     nodes: Mapping[int, np.ndarray] | None = None,
     title: str = "NONE",
 ) -> None:
-    """All channels of all blocks, inputs first; SI.
-
-    Raises
-    ------
-    FileError
-        If the record is of a moving base, which has no force to tell inputs by.
-    """
+    """All channels of all blocks, inputs first; SI."""
     if record.quantity == "transmissibility":
         raise FileError(f"time data of {record.quantity} cannot be written as a universal file")
     write_sets(path, nodes or {}, title, _records(record, title))

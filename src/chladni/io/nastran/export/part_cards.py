@@ -127,13 +127,7 @@ def _material(m: Material, as_shear: bool, id: int, units: Units) -> list[str]:
 
 
 def material_card(m: Material, id: int, units: Units) -> list[Value]:
-    """MAT1 or MAT8 as (name, field, field, ...).
-
-    Raises
-    ------
-    ModelError
-        If the material is anisotropic: MAT2 stands with its users.
-    """
+    """MAT1 or MAT8 as (name, field, field, ...)."""
     p, rho = units.stress, m.rho / units.density or None
     if isinstance(m, Isotropic):
         G = None if m.G is None else m.G / p

@@ -59,11 +59,6 @@ def refuse_loose(model: Assembly, source: str) -> None:
 
     A component with elements passes if it is the largest such, or is held: by a support, or by
     a spring to the ground.
-
-    Raises
-    ------
-    ModelError
-        Naming the loose component's parts and one of its grids.
     """
     label = components(model)
     _refuse_loose_masses(model, label, source)

@@ -27,13 +27,7 @@ class Context:
     scalar: np.ndarray  # (n,) bool; scalar points
 
     def rows(self, cards: Cards, ids: np.ndarray, ground: bool = False) -> np.ndarray:
-        """Rows of point ids (n, ...) of the cards; 0 is the ground (-1) where allowed.
-
-        Raises
-        ------
-        FileError
-            If a grid does not exist; the sentence names the card and the grid.
-        """
+        """Rows of point ids (n, ...) of the cards; 0 is the ground (-1) where allowed."""
         if not len(self.ids):
             raise FileError(f"{self.deck.path}: there is no GRID")
         at = np.minimum(np.searchsorted(self.ids, ids), len(self.ids) - 1)

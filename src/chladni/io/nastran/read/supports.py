@@ -16,11 +16,6 @@ def selected(deck: Deck, kind: str, subcase: int | None = None) -> tuple[int, ..
 
     The subcase asked for selects, else the first that looks for modes, else the first that selects
     any; where there is no case control the only set of the deck is taken.
-
-    Raises
-    ------
-    FileError
-        If nothing is selected and the deck has several sets; the sentence lists them.
     """
     chosen = _chosen(deck, kind, subcase)
     there = _sets(deck, kind)
@@ -58,13 +53,7 @@ def _sets(deck: Deck, kind: str) -> set[int]:
 
 
 def _additions(deck: Deck, kind: str) -> dict[int, list[int]]:
-    """{set: the sets it joins} of SPCADD or MPCADD.
-
-    Raises
-    ------
-    FileError
-        If a set joins nothing, or itself by whatever way.
-    """
+    """{set: the sets it joins} of SPCADD or MPCADD."""
     cards = deck[f"{kind}ADD"]
     added = {int(s): id_list(cards, i, 2) for i, s in enumerate(cards.unique())}
     there = _sets(deck, kind) if len(cards) else set()
