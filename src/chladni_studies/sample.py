@@ -83,7 +83,7 @@ def _computed(study: StudyModel, values: np.ndarray) -> tuple[dict[str, float], 
     f, mac = study.modes.found_in(made.modes)
     columns = {f"f{k + 1}_hz": float(value) for k, value in enumerate(f)}
     columns |= {f"mac{k + 1}": float(value) for k, value in enumerate(mac)}
-    columns[mass_column(model)] = float(mass_properties(assembly)[0])
+    columns["mass_kg" if model.unit else "mass"] = float(mass_properties(assembly)[0])
     frf = None
     if study.case is not None and study.test is not None:
         frf, q, _ = scored(study.case, made, study.test)
@@ -99,11 +99,6 @@ def solved(model: Model, count: int, reach: float) -> Modelled:
         return model.solved(reach)
     modal: ModalModel = model.normal_modes(count)
     return Modelled(model.structure, modal, float(modal.frequency[-1]))
-
-
-def mass_column(model: Model) -> str:
-    """Name of the mass column; without a unit for a bare deck without a unit system."""
-    return "mass_kg" if model.unit else "mass"
 
 
 def wished(settings: StudySettings, model: Model, made: Modelled) -> FRF:

@@ -56,7 +56,8 @@ def sensitivity(
     slope, r2, standardised = none, np.nan, none
     if good.sum() > d + 1 and np.ptp(y[good]) > SIGNIFICANT * np.abs(y[good]).max():
         slope, r2 = _power_law(X[good], y[good])
-        standardised = _standardised(U[good], y[good])
+        A, b = U[good] - U[good].mean(axis=0), y[good] - y[good].mean()
+        standardised = np.linalg.lstsq(A, b, rcond=None)[0] * A.std(axis=0) / b.std()
         held |= _indices(y, U, good, sampler, block)
     elif good.sum() > d + 1:
         slope = standardised = np.zeros(d)
@@ -77,12 +78,6 @@ def _power_law(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
         return np.full(d, np.nan), np.nan
     slope, *_ = np.linalg.lstsq(A, b, rcond=None)
     return slope, float(1 - ((b - A @ slope) ** 2).sum() / (b**2).sum())
-
-
-def _standardised(U: np.ndarray, y: np.ndarray) -> np.ndarray:
-    A, b = U - U.mean(axis=0), y - y.mean()
-    slope, *_ = np.linalg.lstsq(A, b, rcond=None)
-    return slope * A.std(axis=0) / b.std()
 
 
 def _indices(

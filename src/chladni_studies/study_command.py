@@ -1,7 +1,6 @@
 """``chladni study``: parameters of a model sampled, on this machine or on a cluster."""
 
 import sys
-from pathlib import Path
 from typing import Annotated, cast
 
 import typer
@@ -27,7 +26,7 @@ from chladni.progress import Progress
 from chladni.report.result_json import to_json
 from chladni.workflows.loaded_model import is_case
 
-from .parameter_study import ParameterStudy, study
+from .parameter_study import study
 from .study_settings import StudySettings
 from .study_store import write_samples
 from .workers import NO_WORKER
@@ -92,11 +91,6 @@ def run(
             source, vary or (), settings, out=place, workers=workers, scheduler=scheduler,
             units=units, allow=allow or (), progress=progress,
         )  # fmt: skip
-    _written(source, place, found)
-
-
-def _written(source: Path, place: Path, found: ParameterStudy) -> None:
-    """Write the page, the tables and study.json next to the samples."""
     from .study_page import study_page
     from .study_tables import write_netcdf
 

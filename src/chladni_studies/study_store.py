@@ -56,7 +56,7 @@ class StudyStore:
                 values=frf.values, frequency_hz=frf.frequency, outputs=np.array(frf.outputs),
                 inputs=np.array(frf.inputs), quantity=np.array(frf.quantity),
             )  # fmt: skip
-            write_arrays(self.frf_path(result.number), arrays, self.held)
+            write_arrays(self.folder / FRFS / f"{result.number:06d}.npz", arrays, self.held)
         row = row_of(result, values)
         line = json.dumps(row, ensure_ascii=False, allow_nan=False) + "\n"
         self.file.write(line.encode())
@@ -64,10 +64,6 @@ class StudyStore:
         os.fsync(self.file.fileno())
         self.rows[result.number] = row
         return row
-
-    def frf_path(self, number: int) -> Path:
-        """Path of the whole response of a sample."""
-        return self.folder / FRFS / f"{number:06d}.npz"
 
 
 def write_samples(path: Path, table: Mapping[str, list[Any]]) -> Path:
@@ -108,17 +104,13 @@ def opened_store(
         if begun.exists():
             _refuse_another(begun, identity)
         else:
-            write_text(folder / DESIGN, design_text(names, X))
+            design = [["sample", *names], *([k, *x] for k, x in enumerate(X.tolist()))]
+            write_text(folder / DESIGN, csv_text(design))
             write_json(begun, {"identity": identity, **made})
         rows, good = finished(folder / ROWS, len(X))
         with held.open(ROWS, "ab") as file:
             file.truncate(good)
             yield StudyStore(folder, rows, file, held, notes)
-
-
-def design_text(names: list[str], X: np.ndarray) -> str:
-    """The design as CSV, with all digits of every number."""
-    return csv_text([["sample", *names], *([k, *x] for k, x in enumerate(X.tolist()))])
 
 
 def _refuse_another(begun: Path, identity: dict[str, Any]) -> None:

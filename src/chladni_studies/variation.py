@@ -125,11 +125,8 @@ def _nominal(assembly: Assembly, free: FreeParameter, si: bool) -> tuple[float, 
     values = values_of(assembly, free)
     if np.ptp(values) > _SAME * abs(values[0]) or values[0] == 0:
         return 1.0, "of the deck's"
-    return float(values[0]), (_unit(assembly, free) if si else "deck units")
-
-
-def _unit(assembly: Assembly, free: FreeParameter) -> str:
-    return "N m/rad" if free.field == "K" and _turns(assembly, free) else UNITS[free.field]
+    turns = free.field == "K" and _turns(assembly, free)
+    return float(values[0]), ("deck units" if not si else "N m/rad" if turns else UNITS[free.field])
 
 
 def _turns(assembly: Assembly, free: FreeParameter) -> bool:

@@ -45,8 +45,9 @@ def drawn():
 
 def chi2(delta, error):
     """δᵀ C⁺ δ of a complex deviation (n_s, n_out, n_in), and the rank of its covariance C."""
-    each = [error.own * (np.arange(3) == o)[:, None] for o in range(3)]
-    V = np.concatenate([*each, error.common]).reshape(-1, delta.size).T
+    own, common = error
+    each = [own * (np.arange(3) == o)[:, None] for o in range(3)]
+    V = np.concatenate([*each, common]).reshape(-1, delta.size).T
     V, r = (
         np.concatenate([V.real, V.imag]),
         np.concatenate([delta.real.ravel(), delta.imag.ravel()]),

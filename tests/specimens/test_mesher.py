@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from chladni.errors import ModelError
 from chladni.geometry.cells import corner_quality, edges_of
-from chladni_specimens.mesher.flat_regions import fill, grid, strip, ticks
+from chladni_specimens.forms.mesh_pieces import stops
+from chladni_specimens.mesher.flat_regions import fill, grid, strip
 from chladni_specimens.mesher.graded import graded, loops
 from chladni_specimens.mesher.matching import augment
 from chladni_specimens.mesher.plane_curves import (
@@ -82,7 +83,7 @@ def test_fill_names_a_border_too_close_to_itself():
 
 
 def test_strip_and_grid():
-    points, quads = grid(ticks([0, 1, 1.4], 0.2), ticks([0, 0.5], 0.25))
+    points, quads = grid(stops([0, 1, 1.4], 0.2), stops([0, 0.5], 0.25))
     assert area(points, quads).sum() == pytest.approx(0.7)
     assert area(points, quads).min() > 0
     with pytest.raises(ModelError, match="give as many"):

@@ -112,7 +112,7 @@ def application(only: str | None = None) -> typer.Typer:
         pretty_exceptions_enable=False,
     )
     app.callback()(_version)
-    for name, command in _offered().items():
+    for name, command in commands().items():
         if only not in (None, name) and isinstance(command, str):
             if said := _said_by_source(command):
                 app.command(name, short_help=said)(_version)
@@ -125,25 +125,14 @@ def application(only: str | None = None) -> typer.Typer:
     return app
 
 
-def commands() -> dict[str, ModuleType]:
-    """All commands by name: those of this package, then those of installed packages.
+def commands() -> dict[str, str | ModuleType]:
+    """Commands by name: of this distribution by module, which is not loaded; of others loaded.
 
     A package adds a command by an entry point, without any change of chladni::
 
         [project.entry-points."chladni.commands"]
         fatigue = "my_package.fatigue_command"
-
-    Raises
-    ------
-    ExtensionError
-        If an installed package offers a command that cannot be used.
     """
-    offered = _offered().items()
-    return {name: import_module(m) if isinstance(m, str) else m for name, m in offered}
-
-
-def _offered() -> dict[str, str | ModuleType]:
-    """Commands by name: of this distribution by module, which is not loaded; of others loaded."""
     here = [e for e in entry_points(group=GROUP) if e.dist and e.dist.name == "chladni"]
     own: dict[str, str | ModuleType] = {name: f"{__package__}.{name}" for name in BUILT_IN}
     own |= {entry.name: entry.value for entry in sorted(here, key=lambda e: e.name)}

@@ -1,7 +1,6 @@
 """``chladni calibrate``: calibration parameters alone, no new physics."""
 
 from functools import partial
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -35,18 +34,13 @@ def run(
     if variants and sample:
         raise typer.BadParameter("--sample draws for one model; leave out --variants")
     if variants:
-        _variants(source, out)
+        from ..report.joint_models_page import joint_models_page
+        from ..report.result_json import to_json
+        from ..workflows.joint_models import joint_models
+
+        with started("calibrate", source, out) as job:
+            found = joint_models(opened(source), progress=job.progress)
+            job.json("variants.json", to_json(found))
+            job.show(joint_models_page(job.folder, found))
     else:
         diagnosed("calibrate", source, out, partial(calibrate, sample=sample))
-
-
-def _variants(source: Path, out: Path | None) -> None:
-    """Calibrate the deck with every model of its joints."""
-    from ..report.joint_models_page import joint_models_page
-    from ..report.result_json import to_json
-    from ..workflows.joint_models import joint_models
-
-    with started("calibrate", source, out) as job:
-        found = joint_models(opened(source), progress=job.progress)
-        job.json("variants.json", to_json(found))
-        job.show(joint_models_page(job.folder, found))

@@ -2,11 +2,11 @@
 
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -176,15 +176,8 @@ def opened(source: Path) -> "Case":
     return load_case(source)
 
 
-class Diagnosing(Protocol):
-    """A workflow from a case to a diagnosis."""
-
-    def __call__(self, source: "Case", *, progress: Progress) -> "DiagnosisResult":
-        """Diagnose or calibrate."""
-
-
 def diagnosed(
-    command: str, source: Path, out: Path | None, workflow: Diagnosing
+    command: str, source: Path, out: Path | None, workflow: Callable[..., "DiagnosisResult"]
 ) -> "DiagnosisResult":
     """Diagnose or calibrate a case into a folder and say the verdict.
 

@@ -7,7 +7,7 @@ standard deviation. A factor on the axis leaves H of this form: no recording sho
 no model whose stiffness is free.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,17 +25,13 @@ TRIALS, STEPS = 37, 10  # shifts, and steps of a fit
 LINES, CHANNELS = 500, 16  # to compare on: they show a shift of a few lines as well as all
 
 
-@dataclass(frozen=True)
-class AxisShift:
-    """Recorded less true frequency [Hz], its standard deviation, the fall of χ² over the noise."""
-
-    shift: float
-    sd: float
-    gain: float
-
-
-def axis_shift(frf: FRF, found: Identified, use: np.ndarray | None = None) -> AxisShift | None:
+def axis_shift(
+    frf: FRF, found: Identified, use: np.ndarray | None = None
+) -> tuple[float, float, float] | None:
     """Estimate the shift of the axis; None where the poles do not fit the recording.
+
+    It is recorded less true frequency [Hz], with its standard deviation and the fall of χ² over the
+    noise.
 
     Poles move with the axis, and residues are fitted again. This profile is smooth, and its fall
     is at most that of a whole fit, which is made at its lowest value. Poles below half of the
@@ -72,7 +68,7 @@ def axis_shift(frf: FRF, found: Identified, use: np.ndarray | None = None) -> Ax
     noise = max(1.0, whole[1][1] ** 2)
     zero = min(fitted(0.0, each, STEPS)[0] for each in sets)
     gain = (zero - fitted(best, p, STEPS)[0]) / noise
-    return AxisShift(best, float(np.sqrt(2 * noise / rise)) * h, gain)
+    return best, float(np.sqrt(2 * noise / rise)) * h, gain
 
 
 def _price(data: PoleData) -> float:
@@ -89,17 +85,15 @@ def axis_check(
     off = axis_shift(frf, found, use)
     if off is None:
         return [], Check(name, "the identified modes do not fit the recording", None)
-    said = f"{off.shift:.2g} Hz from zero, ± {1.96 * off.sd:.2g}"
-    spacing = float(np.diff(frf.frequency).min())
-    if abs(off.shift) < max(SURE * off.sd, spacing) or off.gain < SURE**2:
+    shift, sd, gain = off
+    size, half = abs(shift), 1.96 * sd
+    said = f"{shift:.2g} Hz from zero, ± {half:.2g}"
+    if size < max(SURE * sd, float(np.diff(frf.frequency).min())) or gain < SURE**2:
         return [], Check(name, said)
-    size, sd = abs(off.shift), 1.96 * off.sd
-    way, mend = ("high", "subtract {} from") if off.shift > 0 else ("low", "add {} to")
+    way, mend = ("high", "subtract {} from") if shift > 0 else ("low", "add {} to")
     text = (
-        f"the frequency axis is {size:.3g} Hz too {way} (95 % interval {size - sd:.3g} to "
-        f"{size + sd:.3g}): without it χ² of the identified modes falls by {off.gain:.3g}."
+        f"the frequency axis is {size:.3g} Hz too {way} (95 % interval {size - half:.3g} to "
+        f"{size + half:.3g}): without it χ² of the identified modes falls by {gain:.3g}."
     )
     repair = f"{mend.format(f'{size:.3g} Hz')} all frequencies, or find why the axis is off"
-    return [Finding("frequency offset", text, "fault", (), repair, off.shift)], Check(
-        name, said, False
-    )
+    return [Finding("frequency offset", text, "fault", (), repair, shift)], Check(name, said, False)

@@ -88,14 +88,6 @@ def hinted_delay(identified: Identified) -> float:
     return fit.delay if hint and fit.before > HINTED * fit.after else 0.0
 
 
-def is_quarter_turn(identified: Identified) -> bool:
-    """Return True if the phases of the modal constants are 90 degrees from real."""
-    if identified.order < LEAST_MODES:
-        return False
-    fit = fitted_delay(np.abs(identified.poles), phases(identified))
-    return bool(fit.quarter and fit.after < QUARTER)
-
-
 def phase_checks(
     identified: Identified, corrected: Identified | None = None, delay: float = 0.0
 ) -> tuple[list[Finding], Check]:
@@ -117,8 +109,10 @@ def phase_checks(
         better = BETTER * max(rest.after, 1e-3) < before and corrected.chi < identified.chi
         if better and abs(whole) > SURE * rest.sd and abs(whole) * top > TURNED:
             found.append(_late(whole, rest.sd, top))
-    elif is_quarter_turn(identified):
-        found.append(_quarter(identified.quantity))
+    else:
+        fit = fitted_delay(np.abs(identified.poles), phases(identified))
+        if fit.quarter and fit.after < QUARTER:
+            found.append(_quarter(identified.quantity))
     return found, Check("phase of the modes", said, not found)
 
 

@@ -91,19 +91,14 @@ def comac(phi: np.ndarray, psi: np.ndarray, convention: Convention = "allemang")
     """
     if phi.shape != psi.shape:
         raise ShapeError(f"paired shapes must agree: {phi.shape} against {psi.shape}")
-    phi, psi = _aligned(phi, psi)
+    # the scale that makes ψ the least-squares image of φ, largest |φ| = 1
+    phi = phi / np.abs(phi).max(axis=0)
+    psi = psi * ((psi.conj() * phi).sum(0) / np.maximum(_power(psi, 0), 1e-300))
     if convention == "allemang":
         return _ratio(np.abs(phi * psi.conj()).sum(1) ** 2, _power(phi, 1) * _power(psi, 1))
     if convention == "enhanced":
         return _power(phi - psi, 1) / (2 * phi.shape[1])
     raise LabelError(f"no convention {convention!r}; there are allemang, enhanced")
-
-
-def _aligned(phi: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both with the scale that makes ψ the least-squares image of φ, largest |φ| = 1."""
-    phi = phi / np.abs(phi).max(axis=0)
-    factor = (psi.conj() * phi).sum(0) / np.maximum(_power(psi, 0), 1e-300)
-    return phi, psi * factor
 
 
 def wrapped(delta: np.ndarray) -> np.ndarray:

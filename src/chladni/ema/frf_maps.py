@@ -24,20 +24,6 @@ def _factor(frf: FRF, factor: str) -> FRF:
     return replace(frf, values=x * frf.values, variance=variance)
 
 
-def _quantity(frf: FRF, quantity: str) -> FRF:
-    """Read the same numbers as another quantity."""
-    return replace(frf, quantity=cast(Quantity, quantity))
-
-
-def _conjugated(frf: FRF) -> FRF:
-    return replace(frf, values=frf.values.conj())
-
-
-def _swapped_parts(frf: FRF) -> FRF:
-    """b + ia of a + ib, which is i times the conjugate."""
-    return replace(frf, values=1j * frf.values.conj())
-
-
 def _reversed(frf: FRF, label: str) -> FRF:
     """Turn the sign of one output."""
     sign = np.where(np.array(frf.outputs) == label, -1, 1)[:, None]
@@ -49,11 +35,6 @@ def _exchanged(frf: FRF, one: str, other: str) -> FRF:
     swap = {one: other, other: one}
     order = [swap.get(label, label) for label in frf.outputs]
     return replace(frf.sel(outputs=order), outputs=frf.outputs)
-
-
-def _phase_in_radians(frf: FRF) -> FRF:
-    """A phase in radians that was read as one in degrees: |H| e^(i 180/π arg H)."""
-    return _polar(frf, np.abs(frf.values), np.degrees(np.angle(frf.values)))
 
 
 def _polar(frf: FRF, magnitude: np.ndarray, phase: np.ndarray) -> FRF:
@@ -100,12 +81,14 @@ def _two_columns(decibels: bool, unit: float) -> Callable[[FRF], FRF]:
 _DEGREE = float(np.pi / 180)
 MAPS: dict[str, Callable[..., FRF]] = {
     "factor": _factor,
-    "quantity": _quantity,
-    "conjugated": _conjugated,
-    "swapped parts": _swapped_parts,
+    "quantity": lambda frf, quantity: replace(frf, quantity=cast(Quantity, quantity)),
+    "conjugated": lambda frf: replace(frf, values=frf.values.conj()),
+    "swapped parts": lambda frf: replace(frf, values=1j * frf.values.conj()),  # b + ia of a + ib
     "reversed": _reversed,
     "exchanged": _exchanged,
-    "phase in radians": _phase_in_radians,
+    "phase in radians": lambda frf: _polar(  # that were read as degrees
+        frf, np.abs(frf.values), np.degrees(np.angle(frf.values))
+    ),
     "decibels": _decibels,
     "decibels and degrees": _two_columns(True, _DEGREE),
     "decibels and radians": _two_columns(True, 1.0),

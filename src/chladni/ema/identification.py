@@ -37,7 +37,7 @@ class Identified:
     # frequency_sd, damping_sd: (r,) standard deviations [Hz], [-]
     frequency_sd: np.ndarray
     damping_sd: np.ndarray
-    relative_delta_chi2: np.ndarray  # (r,) rise of χ² without the pole, over what it must pay
+    relative_delta_chi2: np.ndarray  # (r,) rise of χ² without the pole, over its cost
     chi: float  # rms of the whitened residual (1: the noise is all that is left)
     # outputs, inputs, quantity: as in the recording
     outputs: tuple[str, ...]

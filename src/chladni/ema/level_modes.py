@@ -72,7 +72,7 @@ class ModeLevels:
     damping: np.ndarray
     damping_sd: np.ndarray
     # frequency_own, damping_own: (k,) of these the part that is a level's own: the rest moves all
-    # levels alike, for one level is the reference of all
+    # levels together, for one level is the reference of all
     frequency_own: np.ndarray
     damping_own: np.ndarray
     amplitude_sd: np.ndarray  # (k,) of the lines that were averaged [m]; 0 where all have one

@@ -7,8 +7,6 @@ slopes g_c, g_p has the variance |R⁻ᵀ g_c|² + hᴴ S⁻¹ h, h = g_p - Gᵀ
 Nonlinear Regression, section 5.1; the linear unknowns are eliminated).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg import solve_triangular
 
@@ -21,22 +19,14 @@ from .response_variance import frf_variance
 LN10 = np.log(10.0)
 
 
-@dataclass(frozen=True, eq=False)
-class EqualisedError:
-    """Error of an equalised response: d ln H per standard deviation of each identified number.
-
-    The error is the sum of all columns, each times an independent factor of unit variance.
-    """
-
-    # (k, n_s, n_out, n_in) a channel's own linear unknowns, independent between channels
-    own: np.ndarray
-    common: np.ndarray  # (m, n_s, n_out, n_in) the poles, one factor for all channels
-
-
 def equalised_error(
     identified: Identified, frf: FRF, s: np.ndarray, use: np.ndarray, averages: int = 1
-) -> EqualisedError:
-    """Columns of the error of the equalised response, to first order.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Error of the equalised response: d ln H per standard deviation of each identified number.
+
+    To first order it is the sum of all columns, each times an independent factor of unit variance.
+    The first (k, n_s, n_out, n_in) are of a channel's own linear unknowns, independent between
+    channels. The second (m, n_s, n_out, n_in) are of the poles, one factor for all channels.
 
     Parameters
     ----------
@@ -70,15 +60,15 @@ def equalised_error(
         common.append(root.T @ (slopes / H - tied.T @ own[-1]))
     shape = len(s), *identified.lower.shape
     local, shared = (np.stack(z, axis=-1).reshape(-1, *shape) for z in (own, common))
-    return EqualisedError(local, shared)
+    return local, shared
 
 
 def equalised_noise(
     identified: Identified, frf: FRF, s: np.ndarray, use: np.ndarray, averages: int = 1
 ) -> np.ndarray:
     """E|Δ log10 H|² of the equalised response (n_s, n_out, n_in): all columns of its error."""
-    error = equalised_error(identified, frf, s, use, averages)
-    variance = sum((np.abs(z) ** 2).sum(axis=0) for z in (error.own, error.common))
+    columns = equalised_error(identified, frf, s, use, averages)
+    variance = sum((np.abs(z) ** 2).sum(axis=0) for z in columns)
     return np.asarray(variance / LN10**2)
 
 

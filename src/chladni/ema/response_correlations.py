@@ -135,7 +135,18 @@ def one_sided(
     """
     if functions[0].kind == "time":
         return _of_time(functions, band)
-    return _of_spectra(functions)
+    f = functions[0].x  # each spectrum becomes a correlation
+    step = _step(f)
+    n_f = round(float(f[-1]) / step) + 1
+    rows = np.zeros((n_f, len(functions)), complex)
+    rows[-len(f) :] = np.array([g.values for g in functions]).T
+    r = np.fft.irfft(rows, axis=0)
+    lags = len(r) // 2
+    rate = len(r) * step
+    H = _transformed(r[:lags, :, None], rate)
+    names = tuple(f"{g.output} {g.input}".strip() for g in functions)
+    made = FRF(H, np.fft.rfftfreq(lags, 1 / rate), names, ("responses",), "receptance")
+    return made, -np.log(DECAY) * rate / lags
 
 
 def _of_time(functions: Sequence[Function], band: tuple[float, float]) -> tuple[FRF, float]:
@@ -180,22 +191,6 @@ def _of_decays(
         "receptance",
     )  # fmt: skip
     return made, -np.log(DECAY) * rate / n
-
-
-def _of_spectra(functions: Sequence[Function]) -> tuple[FRF, float]:
-    """Convert each spectrum to a correlation and transform this one-sidedly."""
-    f = functions[0].x
-    step = _step(f)
-    n_f = round(float(f[-1]) / step) + 1
-    rows = np.zeros((n_f, len(functions)), complex)
-    rows[-len(f) :] = np.array([g.values for g in functions]).T
-    r = np.fft.irfft(rows, axis=0)
-    lags = len(r) // 2
-    rate = len(r) * step
-    H = _transformed(r[:lags, :, None], rate)
-    names = tuple(f"{g.output} {g.input}".strip() for g in functions)
-    made = FRF(H, np.fft.rfftfreq(lags, 1 / rate), names, ("responses",), "receptance")
-    return made, -np.log(DECAY) * rate / lags
 
 
 def _transformed(r: np.ndarray, rate: float) -> np.ndarray:

@@ -295,7 +295,8 @@ def _other_rows(
         likely = np.argsort(-misjudged[:, i])[:LIKELY]  # by the other channels
         near = [grid[k] for k in likely] + grid[:: max(1, len(grid) // 12)]
         own = float(misjudged[:, i].max())
-        others = _like(psi, int(i))
+        gap = ((psi - psi[i]) ** 2).sum(axis=1) / ((psi**2).sum(axis=1) + (psi[i] ** 2).sum())
+        others = np.flatnonzero((gap < COPY) & (np.arange(len(psi)) != i))  # nearly the same motion
         tried = [("copy", (phi[others], [labels[k] for k in others]))]
         tried += [("turned", model.turned(int(at[i])))] if model.turned else []
         tried += [("elsewhere", model.elsewhere(int(at[i])))] if model.elsewhere else []
@@ -304,12 +305,6 @@ def _other_rows(
                 words = (labels, psi, phi, int(i), kind, values, names, near, null, own)
                 out.append(_replaced(*words))
     return out
-
-
-def _like(psi: np.ndarray, i: int) -> np.ndarray:
-    """Find other channels with nearly the same motion."""
-    gap = ((psi - psi[i]) ** 2).sum(axis=1) / ((psi**2).sum(axis=1) + (psi[i] ** 2).sum())
-    return np.flatnonzero((gap < COPY) & (np.arange(len(psi)) != i))
 
 
 def _replaced(

@@ -12,6 +12,7 @@ import numpy as np
 from ..dynamics.frf import FRF
 from .finding import Check, Finding
 from .frf_estimate import excitation_of
+from .identification import DERIVATIVES
 from .time_record import TimeRecord
 
 CHANCE = 1e-6  # expected number of false alarms of one test in one recording
@@ -35,7 +36,6 @@ LEAST_BLOCKS = 6  # for two levels and their scatter
 GAIN = 1.25  # factor within a recording; a sensor's gain differs by percents
 SURE = 6.0  # standard deviations
 CALM = 0.3  # of that change may the other channels show
-_DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,13 @@ def signal_checks(record: TimeRecord, frf: FRF | None = None) -> tuple[list[Find
     ----------
     frf : estimated from the recording, for what a response has to be
     """
-    channels = _channels(record)
+    signals = np.concatenate([record.force, record.response], axis=1)
+    labels = (*record.inputs, *record.outputs)
+    drives = len(record.inputs)
+    channels = [
+        _Channel(name, label, signals[:, c], c < drives)
+        for c, (name, label) in enumerate(zip(record.channels, labels, strict=True))
+    ]
     found, checks = [], []
     for check in (dropouts, spikes, drifts):
         more, one = check(record, channels)
@@ -66,16 +72,6 @@ def signal_checks(record: TimeRecord, frf: FRF | None = None) -> tuple[list[Find
         found += more
         checks.append(one)
     return found, checks
-
-
-def _channels(record: TimeRecord) -> list[_Channel]:
-    signals = np.concatenate([record.force, record.response], axis=1)
-    labels = (*record.inputs, *record.outputs)
-    drives = len(record.inputs)
-    return [
-        _Channel(name, label, signals[:, c], c < drives)
-        for c, (name, label) in enumerate(zip(record.channels, labels, strict=True))
-    ]
 
 
 def dropouts(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Finding], Check]:
@@ -222,7 +218,7 @@ def drifts(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Findi
     record it would take it A (T / 3π)² away.
     """
     found, largest = [], 0.0
-    power = _DERIVATIVES.get(record.quantity, 0)
+    power = 0 if record.quantity == "transmissibility" else DERIVATIVES[record.quantity]
     for c in channels:
         x = c.x.ravel()
         every, T = max(1, len(x) // COARSE), len(x) / record.rate
@@ -293,8 +289,8 @@ def changed_gains(
     changes = [_change(log[:, o]) for o in range(log.shape[1])]
     for o, (at, change, sd) in enumerate(changes):
         label = record.outputs[o]
-        others = [_jump(log[:, j], at) for j in range(log.shape[1]) if j != o]
-        alike = max(map(abs, others), default=0.0)
+        jumps = np.abs(np.median(log[at:], axis=0) - np.median(log[:at], axis=0))
+        alike = float(np.delete(jumps, o).max(initial=0.0))
         factor = float(np.exp(abs(change)))
         if label in spoilt:
             continue
@@ -336,10 +332,6 @@ def _gains(record: TimeRecord, frf: FRF) -> tuple[np.ndarray, np.ndarray] | None
     g = np.abs((X.conj() * Y).sum(axis=2)) / own
     starts = np.arange(b * pieces) * m / record.rate
     return np.log(np.maximum(g, 1e-12)), starts
-
-
-def _jump(g: np.ndarray, at: int) -> float:
-    return float(np.median(g[at:]) - np.median(g[:at]))
 
 
 def _change(g: np.ndarray) -> tuple[int, float, float]:

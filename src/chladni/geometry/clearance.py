@@ -78,19 +78,14 @@ class _Sheets:
 
 def _sheets(assembly: Assembly) -> _Sheets:
     nodes, n = assembly.shells.nodes, len(assembly.points)
+    bodies = {tie.independent for tie in assembly.rigid if isinstance(tie, RigidBody)}
+    means = {tie.reference for tie in assembly.rigid if isinstance(tie, Average)}
     facet = shell_area(assembly)[:, None] * part_curvature(assembly) / 8
     return _Sheets(
         point_means(nodes, assembly.shells.thickness, n),
         point_means(nodes, facet, n),
-        assembly.points[joint_points(assembly)],
+        assembly.points[np.array(sorted(bodies | means), dtype=int)],
     )
-
-
-def joint_points(assembly: Assembly) -> np.ndarray:
-    """Rows of the points at which an RBE2 or RBE3 is attached to sheets."""
-    bodies = {tie.independent for tie in assembly.rigid if isinstance(tie, RigidBody)}
-    means = {tie.reference for tie in assembly.rigid if isinstance(tie, Average)}
-    return np.array(sorted(bodies | means), dtype=int)
 
 
 def gaps(

@@ -118,16 +118,12 @@ class _Footprints:
         on_shells = [self._first[r + 1] > self._first[r] for r in rows]
         return len(set(rows)) >= FEWEST and all(on_shells) and other not in rows
 
-    def _shells_of(self, rows: Sequence[int]) -> np.ndarray:
-        """Shells with any of the grids."""
-        found = [self._shell[self._first[r] : self._first[r + 1]] for r in rows]
-        return np.unique(np.concatenate(found))
-
     def _smaller(self, rows: Sequence[int], hung: int | np.ndarray) -> tuple[int, ...]:
         from scipy.spatial import cKDTree
 
         place = self.points[hung] if isinstance(hung, int | np.integer) else hung
-        near = self._shells_of(rows)
+        ranges = [self._shell[self._first[r] : self._first[r + 1]] for r in rows]
+        near = np.unique(np.concatenate(ranges))  # shells with any of the grids
         whole = near[np.array([set(rows) <= set(self.cells[s].tolist()) for s in near], bool)]
         if len(whole):
             pieces = self._piece[whole[0]]

@@ -33,7 +33,9 @@ class FormedMesh:
             )
         check_surface(self.points, self.cells)
         if not len(self.nodal):
-            object.__setattr__(self, "nodal", self._nodal())
+            object.__setattr__(
+                self, "nodal", point_means(self.cells, self.thickness, len(self.points))
+            )
         known = self.nodal[np.isfinite(self.nodal)]
         if len(known) and (known.min() <= 0 or known.max() > 0.05):
             raise ModelError(
@@ -42,10 +44,6 @@ class FormedMesh:
             )
         for name in ("points", "cells", "thickness", "nodal"):
             object.__setattr__(self, name, readonly(getattr(self, name)))
-
-    def _nodal(self) -> np.ndarray:
-        """Mean over the cells at each point."""
-        return point_means(self.cells, self.thickness, len(self.points))
 
     @property
     def area(self) -> np.ndarray:

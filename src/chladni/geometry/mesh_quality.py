@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from ..model.assembly import Assembly, Average, RigidBody
+from ..model.assembly import Assembly
 from .cells import components, corner_quality, directed_edges, edges_of
+from .connected_points import components as connected
 from .facets import cell_normals
 
 LEAST_SINE, MOST_ASPECT, MOST_WARP = 0.3, 20.0, 0.15
@@ -20,7 +19,6 @@ class ElementQuality:
     sine: np.ndarray  # least sine of a corner angle; 1 is best, a folded shell is negative
     aspect: np.ndarray  # longest side over shortest
     warp: np.ndarray  # distance of the corners from the mean plane over the mean side length
-    skew: np.ndarray  # 1 - |cos| of the angle between the mid-lines; 1 is square
 
 
 def element_quality(assembly: Assembly) -> ElementQuality:
@@ -32,14 +30,10 @@ def element_quality(assembly: Assembly) -> ElementQuality:
     normal = cell_normals(points, nodes)
     off = np.abs(np.einsum("nki,ni->nk", x - x.mean(axis=1, keepdims=True), normal)).max(axis=1)
     off[nodes[:, 2] == nodes[:, 3]] = 0.0
-    a, b = x[:, 1] + x[:, 2] - x[:, 0] - x[:, 3], x[:, 2] + x[:, 3] - x[:, 0] - x[:, 1]
-    size = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
-    cosine = np.abs((a * b).sum(axis=1)) / np.maximum(size, 1e-30)
     return ElementQuality(
         corner_quality(points, nodes),
         np.nanmax(sides, axis=1) / np.maximum(np.nanmin(sides, axis=1), 1e-12),
         off / np.nanmean(sides, axis=1),
-        1 - cosine,
     )
 
 
@@ -93,7 +87,7 @@ def check_mesh(assembly: Assembly) -> MeshCheck:
     """Shape, edges, normals and connection of every part with shells."""
     quality = element_quality(assembly)
     bad = (quality.sine < LEAST_SINE) | (quality.aspect > MOST_ASPECT) | (quality.warp > MOST_WARP)
-    piece = structure_pieces(assembly)
+    piece = connected(assembly)
     shells = assembly.shells
     main = np.bincount(piece[shells.nodes[:, 0]]).argmax() if len(shells) else 0
     parts, loose = [], []
@@ -132,27 +126,3 @@ def _part(
         branched,
         bool(np.isin(piece[nodes[:, 0]], piece[others]).all()),
     )
-
-
-def structure_pieces(assembly: Assembly) -> np.ndarray:
-    """Number of the connected piece each point belongs to, through elements and rigid links."""
-    pairs = [_chain(assembly.shells.nodes), _chain(assembly.beams.nodes)]
-    pairs += [_chain(s.nodes) for s in assembly.solids]
-    for family in (assembly.springs, assembly.bushes):
-        pairs.append(family.nodes[(family.nodes >= 0).all(axis=1)])
-    for tie in assembly.rigid:
-        if isinstance(tie, RigidBody):
-            pairs.append(np.array([(tie.independent, row) for row in tie.dependent]))
-        elif isinstance(tie, Average):
-            pairs.append(np.array([(tie.reference, row) for row, _, _ in tie.terms]))
-        else:
-            pairs.append(_chain(np.array([tie.nodes])))
-    a, b = np.vstack([p.reshape(-1, 2) for p in pairs]).astype(int).T
-    n = len(assembly.points)
-    graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
-    return connected_components(graph, directed=False)[1]
-
-
-def _chain(nodes: np.ndarray) -> np.ndarray:
-    """Pairs that link the nodes of each element."""
-    return np.stack([nodes[:, :-1], nodes[:, 1:]], axis=-1).reshape(-1, 2)

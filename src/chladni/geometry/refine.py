@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model.added_points import with_points
-from ..model.assembly import Assembly, Beams, Shells, picked
+from ..model.assembly import Assembly, Shells, concatenated, picked
 from .beam_lines import member_beams
 
 SAME_AXES = 1e-6  # of unit vectors: frames of neighbours that count as equal for supports
@@ -88,12 +88,7 @@ def _finer_beams(assembly: Assembly, sides: Middles) -> Assembly:
         offset[:, 1 - end] = half.offset.mean(axis=1)
         ids = half.ids + end * int(beams.ids.max())
         halves.append(replace(half, ids=ids, nodes=nodes, offset=offset, pins=pins))
-    return replace(grown, beams=_joined(others, *halves))
-
-
-def _joined(*groups: Beams) -> Beams:
-    columns = {name: [getattr(g, name) for g in groups] for name in vars(groups[0])}
-    return Beams(**{name: np.concatenate(every) for name, every in columns.items()})
+    return replace(grown, beams=concatenated(others, *halves))
 
 
 def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

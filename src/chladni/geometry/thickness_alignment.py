@@ -56,7 +56,9 @@ def align(
     points : three or more places on the formed mesh and on the structure, (k, 3) each [m]
     allow_mirror : accept a reflection if it fits far better than any motion
     """
-    rows = _rows(assembly, parts)
+    rows = np.arange(len(assembly.shells))
+    if parts:
+        rows = rows[np.isin(assembly.shells.part, [assembly.part(p) for p in parts])]
     target = ShellSurface.of(assembly, rows)
     x = assembly.points[assembly.shells.nodes[rows]].mean(axis=1)
     goal = _axes(x, shell_area(assembly)[rows])
@@ -89,12 +91,6 @@ def align(
             "may belong to another part or have another unit"
         )
     return Alignment(R, d, residual, use_mirror, mirror if use_mirror else proper)
-
-
-def _rows(assembly: Assembly, parts: Sequence[str]) -> np.ndarray:
-    if not parts:
-        return np.arange(len(assembly.shells))
-    return np.flatnonzero(np.isin(assembly.shells.part, [assembly.part(p) for p in parts]))
 
 
 def _sampled(formed: FormedMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -152,6 +148,8 @@ def _icp(
     steps: int,
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Trimmed point-to-plane ICP: min Σ (n·(ω x p + d - (q - p)))² over the nearest 80 %."""
+    from scipy.spatial.transform import Rotation
+
     residual = before = np.inf
     for _ in range(steps):
         p = source @ R.T + d
@@ -166,19 +164,9 @@ def _icp(
         n, gap = closest_points.normal[keep], closest_points.place[keep] - p[keep]
         A = np.column_stack([np.cross(p[keep], n), n])
         step = np.linalg.lstsq(A, np.einsum("ki,ki->k", n, gap), rcond=1e-10)[0]
-        turn = _rotation(step[:3])
+        turn = Rotation.from_rotvec(step[:3]).as_matrix()
         R, d = turn @ R, turn @ d + step[3:]
         if np.abs(step).max() < 1e-8 or abs(before - residual) < 1e-4 * residual:
             break
         before = residual
     return R, d, residual
-
-
-def _rotation(w: np.ndarray) -> np.ndarray:
-    """Rodrigues' rotation by the vector w."""
-    angle = np.linalg.norm(w)
-    if angle < 1e-15:
-        return np.eye(3)
-    x, y, z = w / angle
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K

@@ -175,19 +175,14 @@ def _at(lines: list[tuple[_Block, np.ndarray]], k: int) -> tuple[_Block, int]:
     raise IndexError(k)
 
 
-def _cards(block: _Block) -> int:
-    """Lines per element of a shell block."""
-    options = block.keyword.split("_")[2:]
-    return 1 + ("THICKNESS" in options or "BETA" in options) + ("OFFSET" in options)
-
-
 def _shells(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
     """(n, 6) id, part, four node ids and (n, 4) thickness, zero where the section's holds."""
     found, thickness, lines = [np.zeros((0, 6), np.int64)], [np.zeros((0, 4))], []
     for block in blocks:
         if not block.keyword.startswith("ELEMENT_SHELL") or not block.lines:
             continue
-        cards, (whole, real) = _cards(block), _WIDTHS[block.form]
+        options, (whole, real) = block.keyword.split("_")[2:], _WIDTHS[block.form]
+        cards = 1 + ("THICKNESS" in options or "BETA" in options) + ("OFFSET" in options)
         if len(block.lines) % cards:
             raise block.fault(-1, f"{len(block.lines)} lines are not {cards} per element")
         first = np.arange(0, len(block.lines), cards)

@@ -276,7 +276,7 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
 
 def _screened(state: Case, diagnosing: bool, progress: Progress) -> Screening | None:
     try:
-        return ready(with_sign_of_gain(state), diagnosing, progress, fitted=False).screening
+        return ready(with_sign_of_gain(state), diagnosing, progress, fitted=False)[2]
     except RecordingAtFault as fault:
         return fault.screening
 

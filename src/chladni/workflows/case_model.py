@@ -25,18 +25,28 @@ def model_frf(case: Case, model: Modelled, damping: float | np.ndarray, test: FR
     ratio, or one of each mode.
     """
     s, f = model.structure, test.frequency
-    modal = model.modes.with_damping(damping)
-    pick = case.outputs.rows(s).T.toarray()
-    load, with_base = case.inputs.loads(s).T.toarray(), case.outputs.moved_with_base(case.inputs)
-    shift = residual_shift(modal, f[-1])
+    H = receptances(model, damping, case.outputs.rows(s), case.inputs.loads(s), f)
+    if not case.inputs.base.any():
+        return FRF(H, f, test.outputs, test.inputs).to(test.quantity)
+    with_base = case.outputs.moved_with_base(case.inputs)
+    T = with_base - (2 * np.pi * f)[:, None, None] ** 2 * H
+    return FRF(T, f, test.outputs, test.inputs, "transmissibility")
+
+
+def receptances(
+    model: Modelled, damping: float | np.ndarray, outputs: sp.csr_array, inputs: sp.csr_array,
+    frequency: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Modal superposition and the static rest (n_f, n_out, n_in); rows over the free dofs."""
+    s, modal = model.structure, model.modes.with_damping(damping)
+    pick, load = outputs.T.toarray(), inputs.T.toarray()
+    shift = residual_shift(modal, frequency[-1])
     rest = residual_flexibility(s.system, modal, pick, load, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
-    H = coupled_receptance(modal, phi_o, phi_i, f, V=s.system.V, loss=loss, residual=rest)
-    if not case.inputs.base.any():
-        return FRF(H, f, test.outputs, test.inputs).to(test.quantity)
-    T = with_base - (2 * np.pi * f)[:, None, None] ** 2 * H
-    return FRF(T, f, test.outputs, test.inputs, "transmissibility")
+    return coupled_receptance(
+        modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest
+    )
 
 
 def cords(case: Case) -> list["Marker"]:

@@ -118,9 +118,8 @@ def _searched(
 ) -> Explained:  # fmt: skip
     """Fit the recording as it is; ``faults`` were undone already."""
     progress("identifying the recording", 0.0)
-    made_ready = ready(case, diagnosing, within(progress, 0.0, 0.1), undone=faults)
-    question, prepared = made_ready.question, made_ready.prepared
-    screening = made_ready.screening
+    stage = within(progress, 0.0, 0.1)
+    question, prepared, screening = ready(case, diagnosing, stage, undone=faults)
     if known:
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)

@@ -143,5 +143,5 @@ class DiagnosisResult(Result):
 class StateResult:
     """One state of an object, and its result."""
 
-    name: str  # of the state; beside it stand all keys of the state's own diagnosis
+    name: str  # of the state, together with all keys of the state's own diagnosis
     result: DiagnosisResult  # of this state

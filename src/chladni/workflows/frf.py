@@ -5,14 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..arguments import checked
 from ..case import Case
 from ..case.sensor_places import ROLES, placed, sensor_masses, weight_of_sensors
 from ..dofs import label, parse
-from ..dynamics.coupled import coupled_receptance
-from ..dynamics.frf import FRF, residual_flexibility, residual_shift, transfer
+from ..dynamics.frf import FRF, residual_flexibility, transfer
 from ..errors import FileError, LabelError, ShapeError
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, modelled
@@ -24,7 +22,7 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
-from .case_model import REACH, model_frf
+from .case_model import REACH, model_frf, receptances
 from .given_case import Source
 from .loaded_model import DeckModels, Model, as_model, opened, similar_names
 
@@ -93,8 +91,16 @@ def _responses(
         if frequency is None or not _labels(outputs):
             raise FileError("--input needs at least one --output, as --output 55:+Z")
         model = as_model(source)
-        found = _between(model, outputs, inputs, frequency, damping, progress)
-        return replace(found, notes=(*model.notes, *found.notes))
+        refuse_unknown(model, outputs, inputs)
+        progress("modes", 0.2)
+        made = model.solved(REACH * float(frequency[-1]))
+        progress("residual of higher modes", 0.6)
+        one = superposed(model, made, outputs, inputs, frequency, damping)
+        note = (
+            f"{len(made.modes)} modes up to {made.band:.4g} Hz were superposed with damping ratio "
+            f"{damping:.4g}; the contribution of higher modes was added as a static residual."
+        )
+        return FrequencyResponses((one,), (*model.notes, note))
     if isinstance(source, Case):
         return _of_recording(source, damping, progress)
     if isinstance(source, DeckModels):
@@ -161,23 +167,6 @@ def layout_places(
     return outputs, inputs
 
 
-def _between(
-    model: Model, outputs: Side, inputs: Side, frequency: np.ndarray,
-    damping: float, progress: Progress,
-) -> FrequencyResponses:  # fmt: skip
-    """Superpose modes up to ``REACH`` times the band; others contribute their static response."""
-    refuse_unknown(model, outputs, inputs)
-    progress("modes", 0.2)
-    made = model.solved(REACH * float(frequency[-1]))
-    progress("residual of higher modes", 0.6)
-    found = superposed(model, made, outputs, inputs, frequency, damping)
-    note = (
-        f"{len(made.modes)} modes up to {made.band:.4g} Hz were superposed with damping ratio "
-        f"{damping:.4g}; the contribution of higher modes was added as a static residual."
-    )
-    return FrequencyResponses((found,), (note,))
-
-
 def refuse_unknown(model: Model, outputs: Side, inputs: Side) -> None:
     """Refuse ends the model does not have, and a moving base together with other inputs."""
     bases = [text for text in _labels(inputs) if text.startswith("base:")]
@@ -198,17 +187,11 @@ def superposed(
         return _places_from_base(made, outputs, inputs, frequency, damping)
     if names_i[0].startswith("base:"):
         return _from_base(made, names_o, names_i, frequency, damping)
-    s, modal = made.structure, made.modes.with_damping(damping)
     pick, load = (
-        (side.rows(s) if isinstance(side, MeasuredDofs) else model.directions(side)).T.toarray()
+        side.rows(made.structure) if isinstance(side, MeasuredDofs) else model.directions(side)
         for side in (outputs, inputs)
     )
-    shift = residual_shift(modal, frequency[-1])
-    rest = residual_flexibility(s.system, modal, pick, load, shift=shift)
-    phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
-    loss = sp.csr_array(s.hysteretic().K.imag)
-    H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
-    return FRF(H, frequency, names_o, names_i)
+    return FRF(receptances(made, damping, pick, load, frequency), frequency, names_o, names_i)
 
 
 def _from_base(

@@ -96,8 +96,14 @@ def map_formed(
         after, thinning, guessed = _with_guess(after, {p.part for p in found.mapped.parts})
     progress("cards", 0.8)
     edits = tuple(changes(deck, before, after, model.units))
-    notes = (*model.notes, *found.said(), *_not_mapped(after, found, guessed))
-    return MappedDeck(before, after, found, edits, thinning, guessed, notes, origin=model)
+    known = {p.part for p in found.mapped.parts} | set(guessed or {})
+    present = [after.parts[k].name for k in np.unique(after.shells.part).tolist()]
+    notes = [*model.notes, *found.said()]
+    if left := [name for name in present if name not in known]:
+        notes.append(f"{', '.join(left)} received no thickness and keep that of the deck.")
+    if guessed is not None and not guessed:
+        notes.append("The file has every part, so no thickness was estimated.")
+    return MappedDeck(before, after, found, edits, thinning, guessed, tuple(notes), origin=model)
 
 
 def _with_guess(
@@ -116,17 +122,3 @@ def _with_guess(
         if rows[part == k].any()
     }
     return replace(made, shells=replace(made.shells, thickness=t)), thinning, spread
-
-
-def _not_mapped(
-    made: Assembly, found: FormedThickness, guessed: Mapping[str, float] | None
-) -> list[str]:
-    """Return sentences on the parts that the file does not contain."""
-    known = {p.part for p in found.mapped.parts} | set(guessed or {})
-    present = [made.parts[k].name for k in np.unique(made.shells.part).tolist()]
-    out = []
-    if left := [name for name in present if name not in known]:
-        out.append(f"{', '.join(left)} received no thickness and keep that of the deck.")
-    if guessed is not None and not guessed:
-        out.append("The file has every part, so no thickness was estimated.")
-    return out

@@ -3,8 +3,6 @@
 ``chladni check`` and ``chladni init`` ask the same, so that what they find in order is not refused.
 """
 
-from dataclasses import dataclass
-
 from ..case import Case
 from ..ema.finding import Finding, Screening
 from ..ema.screening_lines import screening_lines
@@ -23,15 +21,6 @@ from .screening_of_case import (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class ReadyCase:
-    """The question of one state of a case, prepared, and the screening of its recording."""
-
-    question: Question
-    prepared: Prepared
-    screening: Screening | None
-
-
 def refuse_without_effects(case: Case) -> None:
     """Refuse a deck without parts for the effects."""
     if not len(case.assembly.shells) + len(case.assembly.beams):
@@ -44,7 +33,7 @@ def refuse_without_effects(case: Case) -> None:
 def ready(
     case: Case, diagnosing: bool, progress: Progress = silent, fitted: bool = True,
     undone: tuple[Finding, ...] = (),
-) -> ReadyCase:  # fmt: skip
+) -> tuple[Question, Prepared, Screening | None]:  # fmt: skip
     """Identify the recording, build the reduced problem, screen; nothing is fitted.
 
     Parameters
@@ -72,4 +61,4 @@ def ready(
     if screening is not None and unmendable(screening):
         if diagnosing or mapped_away(case, screening, undone) is not None:
             raise RecordingAtFault(screening)
-    return ReadyCase(question, prepared, screening)
+    return question, prepared, screening

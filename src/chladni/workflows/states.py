@@ -12,7 +12,6 @@ from ..case import Case
 from ..case.recording_groups import of_state, states
 from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.joint_fit import JointFit, joint_fit
-from ..inference.result import CalibratedParameter
 from ..inference.written_hypothesis import as_written
 from ..parallel import one_blas_thread
 from ..progress import Progress, within
@@ -78,9 +77,14 @@ def _in_states(
     results = []
     for k, (name, one) in enumerate(zip(names, every, strict=True)):
         stage = within(progress, 0.8 + 0.2 * k / len(names), 0.8 + 0.2 * (k + 1) / len(names))
-        results.append(
-            StateResult(name, _said(build_result(one, diagnosing, stage), name, names, shared))
+        result = build_result(one, diagnosing, stage)
+        rest = ", ".join(repr(n) for n in names if n != name)
+        what = ", ".join(p.where for p in shared) or "nothing"
+        note = (
+            f"state {name!r} was fitted together with {rest}: {what} shared, effects belong to one "
+            "state"
         )
+        results.append(StateResult(name, replace(result, notes=(note, *result.notes))))
     first = results[0].result
     distrust = tuple(f"state {s.name!r}: {why}" for s in results for why in s.result.distrust)
     notes = (*first.notes, *by_state(results))
@@ -124,17 +128,3 @@ def _with(one: Explained, fit: HypothesisFit, changed: bool) -> Explained:
     if changed and found.verdict == "nothing missing":
         found = replace(found, verdict="calibration only")
     return replace(one, found=replace(found, plain=fit))
-
-
-def _said(
-    result: DiagnosisResult, name: str, names: tuple[str, ...],
-    shared: tuple[CalibratedParameter, ...],
-) -> DiagnosisResult:  # fmt: skip
-    """Add a note on the shared parameters to the result."""
-    rest = ", ".join(repr(n) for n in names if n != name)
-    what = ", ".join(p.where for p in shared) or "nothing"
-    note = (
-        f"state {name!r} was fitted together with {rest}: {what} shared, effects belong to one "
-        "state"
-    )
-    return replace(result, notes=(note, *result.notes))

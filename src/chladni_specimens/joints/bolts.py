@@ -2,18 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from chladni.errors import ModelError
-from chladni.geometry.cells import edges_of
 from chladni.geometry.facets import tangents
+from chladni.geometry.mesh_quality import free_edges
 from chladni.geometry.nearest import ShellChoice, ShellSurface
 from chladni.model.added_points import next_id, with_points
-from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody
+from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody, concatenated
 from chladni.model.properties import BeamSection, Isotropic
 
 from .builders import (
@@ -30,13 +29,6 @@ from .builders import (
 )
 
 _ALL = (1, 2, 3, 4, 5, 6)
-Family = TypeVar("Family", Beams, Masses, Bushes)
-
-
-def free_edges(nodes: np.ndarray) -> np.ndarray:
-    """Sides (k, 2) that belong to one cell only."""
-    sides, count = np.unique(edges_of(nodes), axis=0, return_counts=True)
-    return sides[count == 1]
 
 
 def rim(surface: ShellSurface, place: np.ndarray, radius: float) -> np.ndarray:
@@ -107,7 +99,9 @@ def screw(
     first = next_id(grown)
     spiders = tuple(_spider(first + k, centres[k], rims[k]) for k in range(2))
     grown = replace(grown, rigid=(*grown.rigid, *spiders))
-    grown = _with_bar(grown, first + 2, centres, _round_bar(material, diameter), name)
+    I = np.pi * diameter**4 / 64  # of a round bar
+    section = BeamSection(material, np.pi * diameter**2 / 4, I, I, 0.0, 2 * I)
+    grown = _with_bar(grown, first + 2, centres, section, name)
     bar = material.rho * np.pi * diameter**2 / 4 * float(np.linalg.norm(ends[1] - ends[0]))
     grown = with_masses(grown, centres, max(mass - bar, 0.0) / 2)
     far = max(float(f.distance[0]) for f in closest)
@@ -126,12 +120,6 @@ def _ends(a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return (a + b) / 2 + np.outer([-0.5e-3, 0.5e-3], axis)
 
 
-def _round_bar(material: Isotropic, d: float) -> BeamSection:
-    """Section of a round bar: A = π d²/4, I = π d⁴/64, J = 2 I."""
-    I = np.pi * d**4 / 64
-    return BeamSection(material, np.pi * d**2 / 4, I, I, 0.0, 2 * I)
-
-
 def _with_bar(
     assembly: Assembly, id_: int, nodes: np.ndarray, section: BeamSection, name: str
 ) -> Assembly:
@@ -146,12 +134,7 @@ def _with_bar(
         np.zeros((1, 2, 3)),
         np.zeros((1, 2, 6), bool),
     )
-    return replace(grown, beams=_joined(grown.beams, new))
-
-
-def _joined(old: Family, new: Family) -> Family:
-    """Two families of one kind as one."""
-    return type(old)(**{k: np.concatenate([getattr(old, k), getattr(new, k)]) for k in vars(old)})
+    return replace(grown, beams=concatenated(grown.beams, new))
 
 
 def with_masses(assembly: Assembly, rows: np.ndarray, mass: float | np.ndarray) -> Assembly:
@@ -160,7 +143,7 @@ def with_masses(assembly: Assembly, rows: np.ndarray, mass: float | np.ndarray) 
     matrix = np.zeros((len(rows), 6, 6))
     matrix[:, :3, :3] = np.broadcast_to(mass, len(rows))[:, None, None] * np.eye(3)
     ids = next_id(assembly) + np.arange(len(rows))
-    return replace(assembly, masses=_joined(assembly.masses, Masses(ids, rows, matrix)))
+    return replace(assembly, masses=concatenated(assembly.masses, Masses(ids, rows, matrix)))
 
 
 def accelerometers(assembly: Assembly, ids: Sequence[int], mass: float = 0.005) -> Assembly:
@@ -232,7 +215,7 @@ def grip(
         Joint("grip", tuple(p), names, (int(i),), float(d))
         for p, i, d in zip(places.tolist(), ids, far, strict=True)
     )
-    return replace(assembly, bushes=_joined(assembly.bushes, new)), joints
+    return replace(assembly, bushes=concatenated(assembly.bushes, new)), joints
 
 
 def along_line(line: np.ndarray, per_length: float) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from chladni.errors import ModelError
 from chladni.geometry.facets import tangents
 from chladni.geometry.nearest import ClosestPoints, ShellChoice, ShellSurface, nearest_parts
 from chladni.model.added_points import next_id, with_points
-from chladni.model.assembly import Assembly, Average, Solids
+from chladni.model.assembly import Assembly, Average, Solids, concatenated
 from chladni.model.properties import Isotropic, Part, Section, SolidSection
 
 from ..mesher.plane_curves import arc_length
@@ -60,11 +60,9 @@ def with_part(assembly: Assembly, name: str, section: Section) -> tuple[Assembly
 
 def _with_hexahedra(assembly: Assembly, ids: np.ndarray, nodes: np.ndarray, part: int) -> Assembly:
     """The assembly with these hexahedra added to its own, as one family."""
-    new = (ids, nodes, np.full(len(ids), part))
     old = [s for s in assembly.solids if s.nodes.shape[1] == 8]
     rest = tuple(s for s in assembly.solids if s.nodes.shape[1] != 8)
-    every = [[s.ids, s.nodes, s.part] for s in old] + [list(new)]
-    merged = Solids(*(np.concatenate(column) for column in zip(*every, strict=True)))
+    merged = concatenated(*old, Solids(ids, nodes, np.full(len(ids), part)))
     return replace(assembly, solids=(*rest, merged))
 
 

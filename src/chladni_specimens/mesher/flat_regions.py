@@ -7,7 +7,6 @@ image of its plane mesh under a height field.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -188,13 +187,3 @@ def strip(rows: Sequence[np.ndarray], *, closed: bool) -> tuple[np.ndarray, np.n
 def grid(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points and quads of the lattice with these ticks."""
     return strip([np.column_stack([x, np.full(len(x), v)]) for v in y], closed=False)
-
-
-def ticks(stops: Sequence[float], size: float) -> np.ndarray:
-    """The stops with every interval cut into pieces of about `size`.
-
-    >>> ticks([0.0, 1.0, 1.4], 0.5)
-    array([0. , 0.5, 1. , 1.4])
-    """
-    pieces = [np.linspace(a, b, max(1, round((b - a) / size)) + 1)[1:] for a, b in pairwise(stops)]
-    return np.concatenate([[stops[0]], *pieces])

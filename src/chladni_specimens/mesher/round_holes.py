@@ -52,15 +52,13 @@ def bored(
     cells, new = (_opened if best.node else _hollowed)(sheet, best, radius)
     plan = np.vstack([sheet.plan, np.column_stack([new, depth(new)])])
     points = np.vstack([sheet.points, surface(plan[len(sheet.plan) :])])
-    gone = np.any(sheet.quads == best.row, axis=1) if best.node else _only(sheet, best.row)
+    gone = np.arange(len(sheet.quads)) == best.row
+    if best.node:
+        gone = np.any(sheet.quads == best.row, axis=1)
     quads = np.vstack([sheet.quads[~gone], cells])
     zone = np.r_[sheet.zone[~gone], np.full(len(cells), MAIN)]
     made = replace(sheet, plan=plan, points=points, quads=quads, zone=zone)
     return (_without(made, best.row) if best.node else made), best.centre
-
-
-def _only(sheet: PressedSheet, row: int) -> np.ndarray:
-    return np.arange(len(sheet.quads)) == row
 
 
 def _cells(

@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..mesher.flat_regions import fill, grid, strip, ticks
+from ..forms.mesh_pieces import stops
+from ..mesher.flat_regions import fill, grid, strip
 from ..mesher.plane_curves import (
     Loop,
     arc_length,
@@ -268,8 +269,8 @@ def latch(skin: Skin) -> PressedSheet:
 def bracket(skin: Skin) -> PressedSheet:
     """Wiper motor bracket: a grid that follows its folds."""
     half, s0, s1 = skin.design.bracket
-    y = ticks([-half, -0.085, -0.067, 0.067, 0.085, half], skin.design.size)
-    s = ticks([s0, s0 + 0.017, s0 + 0.031, s1 - 0.034, s1 - 0.020, s1], skin.design.size)
+    y = stops([-half, -0.085, -0.067, 0.067, 0.085, half], skin.design.size)
+    s = stops([s0, s0 + 0.017, s0 + 0.031, s1 - 0.034, s1 - 0.020, s1], skin.design.size)
     out = Patches()
     out.add(grid(y, s), skin.bracket)
     return out.sheet(BRACKET, skin.at)

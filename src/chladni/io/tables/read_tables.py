@@ -125,7 +125,9 @@ def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, 
                 f"there are {', '.join(sorted(head))}"
             )
         return (Recording(name=path.name, poles=read_poles(path)),)
-    parts = _parts(head)
+    parts = _CARTESIAN
+    if "magnitude" in head:
+        parts = ("magnitude", next((k for k in _PHASE if k in head), "phase_deg"))
     table = read_table(path, (*_CHANNEL, *parts), _FRF_OPTIONAL)
     if quantity is None:
         raise FileError(f"{path.name} does not say its quantity: one of {_quantities()}")
@@ -145,13 +147,6 @@ def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, 
 
 
 _NUMERIC = ("coherence", "variance", "level")
-
-
-def _parts(head: set[str]) -> tuple[str, str]:
-    """The two columns that hold a response: its parts, or its magnitude and phase."""
-    if "magnitude" not in head:
-        return _CARTESIAN
-    return "magnitude", next((k for k in _PHASE if k in head), "phase_deg")
 
 
 def _responses(table: CsvTable, parts: tuple[str, str]) -> np.ndarray:

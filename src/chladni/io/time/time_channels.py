@@ -139,7 +139,7 @@ _MORE = ("inputs", "outputs", "data", "labels", "units", "roles")
 
 
 def is_time(names: Sequence[str]) -> bool:
-    """Whether arrays so called are time data: one says the rate."""
+    """True for names of time data: one says the rate."""
     return any(n.lower() in _AXES for n in names)
 
 

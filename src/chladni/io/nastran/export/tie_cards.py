@@ -11,11 +11,6 @@ from ..text.format import Card, Value
 from .numbering import Systems
 
 
-def has_equations(assembly: Assembly) -> bool:
-    """True where an MPC set is to be selected."""
-    return any(isinstance(t, Equation) for t in assembly.rigid)
-
-
 def bushes(
     assembly: Assembly, units: Units, ids: Iterator[int], properties: Iterator[int],
     systems: Systems, since: int = 0,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ....model.assembly import Assembly, Scalars, picked
+from ....model.assembly import Assembly, Equation, Scalars, picked
 from ....output import write_text
 from ....units import UNITS, Units
 from ....units import units as unit_system
@@ -59,7 +59,7 @@ def _head(assembly: Assembly, units: Units, count: int) -> Iterator[str]:
     yield from (*_CONTROL, "METHOD = 1")
     if len(assembly.supports):
         yield "SPC = 1"
-    if tie_cards.has_equations(assembly):
+    if any(isinstance(t, Equation) for t in assembly.rigid):
         yield "MPC = 1"
     yield "BEGIN BULK"
     yield from card("EIGRL", [1, None, None, count])

@@ -16,20 +16,13 @@ class Ply:
     angle: float
 
 
-@dataclass(frozen=True, eq=False)
-class Smeared:
-    """Equivalent moduli: Q_m = A/t, Q_b = 12 D/t³, Q_c = B/t², G (2, 2), density."""
+def smear(
+    plies: list[Ply],
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+    """A, B, D = ∫ Q̄ (1, z, z²) dz about the middle of the stack, as t, A/t, 12 D/t³, B/t², G, rho.
 
-    thickness: float
-    membrane: np.ndarray
-    bending: np.ndarray
-    coupling: np.ndarray
-    shear: np.ndarray
-    rho: float
-
-
-def smear(plies: list[Ply]) -> Smeared:
-    """A, B, D = ∫ Q̄ (1, z, z²) dz about the middle of the stack."""
+    G (2, 2) is of transverse shear.
+    """
     t = np.array([ply.thickness for ply in plies])
     z = np.concatenate([[0], np.cumsum(t)]) - t.sum() / 2
     Q = np.array([_turned(ply.material.plane_stress(), ply.angle) for ply in plies])
@@ -37,7 +30,7 @@ def smear(plies: list[Ply]) -> Smeared:
     T = float(t.sum())
     rho = float(sum(ply.material.rho * ply.thickness for ply in plies) / T)
     G = np.diag([_shear_modulus(plies, z, Q[:, k, k], k) for k in (0, 1)])
-    return Smeared(T, A / T, 12 * D / T**3, B / T**2, G, rho)
+    return T, A / T, 12 * D / T**3, B / T**2, G, rho
 
 
 def _turned(Q: np.ndarray, angle: float) -> np.ndarray:

@@ -23,7 +23,9 @@ def ties(ctx: Context, mpc: tuple[int, ...]) -> tuple[Tie, ...]:
             cards.unique()
             for i in range(len(cards)):
                 out.extend(read(ctx, cards, i))
-    out.extend(_equations(ctx, mpc))
+    for cards in ctx.deck.present("MPC"):  # SID G1 C1 A1 G2 C2 A2 - - G3 C3 A3...; Σ A q = 0
+        for k in np.flatnonzero(np.isin(cards.integers(1), mpc)):
+            out.append(_equation(ctx, cards.single(int(k))))
     return tuple(out)
 
 
@@ -314,13 +316,6 @@ _READERS = {
     "CRIGD3": _rbe1,
     "CRIGDR": _crigdr,
 }
-
-
-def _equations(ctx: Context, sets: tuple[int, ...]) -> Iterator[Equation]:
-    """MPC cards of the selected sets: SID G1 C1 A1 G2 C2 A2 - - G3 C3 A3...; Σ A q = 0."""
-    for cards in ctx.deck.present("MPC"):
-        for i in np.flatnonzero(np.isin(cards.integers(1), sets)):
-            yield _equation(ctx, cards.single(int(i)))
 
 
 def _equation(ctx: Context, card: Cards) -> Equation:

@@ -152,19 +152,19 @@ def _pcomp(ctx: Context, materials: Materials, card: Cards, pid: int) -> ShellSe
     lay = card.words(8)[0].decode("latin-1")
     if lay not in ("", "SYM", "MEM", "BEND", "SMEAR"):
         raise card.refuse(0, f"LAM {lay!r} is not understood; there are SYM, MEM, BEND, SMEAR")
-    smeared = smear(_plies(ctx, materials, card))
-    bent = smeared.membrane if lay == "SMEAR" else smeared.bending
-    coupled = np.abs(smeared.coupling).max() > 1e-9 * np.abs(smeared.membrane).max()
+    t, membrane, bending, coupling, shear, rho = smear(_plies(ctx, materials, card))
+    bent = membrane if lay == "SMEAR" else bending
+    coupled = np.abs(coupling).max() > 1e-9 * np.abs(membrane).max()
     keep = coupled and lay not in ("SMEAR", "MEM", "BEND")
     return ShellSection(
-        smeared.thickness,
-        None if lay == "BEND" else Anisotropic(smeared.membrane, rho=smeared.rho, id=pid),
-        None if lay == "MEM" else Anisotropic(bent, rho=smeared.rho, id=pid),
-        Anisotropic(np.zeros((3, 3)), smeared.shear, id=pid),
-        Anisotropic(smeared.coupling, id=pid) if keep else None,
+        t,
+        None if lay == "BEND" else Anisotropic(membrane, rho=rho, id=pid),
+        None if lay == "MEM" else Anisotropic(bent, rho=rho, id=pid),
+        Anisotropic(np.zeros((3, 3)), shear, id=pid),
+        Anisotropic(coupling, id=pid) if keep else None,
         shear_ratio=1.0,
         nonstructural=float(card.reals(3, 0.0)[0]) * ctx.scale.inertia / ctx.scale.length**2,
-        rigid_shear=not np.any(smeared.shear),
+        rigid_shear=not np.any(shear),
         damping=float(card.reals(7, 0.0)[0]),
     )
 

@@ -53,19 +53,6 @@ def read_op4(path: Path | str) -> dict[str, np.ndarray]:
     return {str(name): np.asarray(matrix) for name, matrix in held.items()}
 
 
-def _module(name: str) -> ModuleType:
-    try:
-        if name == "op2":
-            from pyyeti.nastran import op2 as module
-        else:
-            from pyyeti.nastran import op4 as module
-    except ImportError:
-        raise FileError(
-            f"reading {name.upper()} files needs pyYeti: pip install 'chladni[nastran]'"
-        ) from None
-    return module  # type: ignore[no-any-return]
-
-
 def _eigenvectors(module: ModuleType, path: Path | str) -> list[dict[str, Any]]:
     """Tables of real eigenvectors alone: tables that other programs write differently stay shut."""
     found = []
@@ -83,7 +70,15 @@ def _eigenvectors(module: ModuleType, path: Path | str) -> list[dict[str, Any]]:
 def _read(path: Path | str, kind: str, read: Callable[[ModuleType, Path | str], T]) -> T:
     if found := Path(path).is_file():
         refuse_large(Path(path))
-    module = _module(kind)
+    try:
+        if kind == "op2":
+            from pyyeti.nastran import op2 as module
+        else:
+            from pyyeti.nastran import op4 as module
+    except ImportError:
+        raise FileError(
+            f"reading {kind.upper()} files needs pyYeti: pip install 'chladni[nastran]'"
+        ) from None
     if not found:
         raise FileError(f"{path} does not exist")
     with warnings.catch_warnings():

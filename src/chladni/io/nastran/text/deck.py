@@ -68,18 +68,9 @@ def parsed_deck(path: Path | str, allow: Sequence[str] = ()) -> Deck:
     """A deck with all that stands in it, whether it is understood or not."""
     path = Path(path)
     files = sources(path)
-    cards = _cards(files.sources)
-    if not cards:
-        raise FileError(f"{path} has no bulk data")
-    case = case_control(files.control, sections=files.begins >= 0)
-    names, allowed = _names(files.sources), tuple(a.upper() for a in allow)
-    return Deck(path, files.sources, cards, case, names, max(files.begins, 0), allowed)
-
-
-def _cards(files: tuple[Source, ...]) -> dict[str, Cards]:
-    paths = tuple(s.path for s in files)
+    paths = tuple(s.path for s in files.sources)
     found: dict[str, list[Cards]] = {}
-    for k, source in enumerate(files):
+    for k, source in enumerate(files.sources):
         try:
             part = tables(source, k, paths)
         except FileError as error:
@@ -87,7 +78,12 @@ def _cards(files: tuple[Source, ...]) -> dict[str, Cards]:
             raise FileError(f"{where}{error}") from None
         for name, table in part.items():
             found.setdefault(name, []).append(table)
-    return {name: joined(parts) for name, parts in found.items()}
+    cards = {name: joined(parts) for name, parts in found.items()}
+    if not cards:
+        raise FileError(f"{path} has no bulk data")
+    case = case_control(files.control, sections=files.begins >= 0)
+    names, allowed = _names(files.sources), tuple(a.upper() for a in allow)
+    return Deck(path, files.sources, cards, case, names, max(files.begins, 0), allowed)
 
 
 def _names(files: tuple[Source, ...]) -> dict[int, str]:

@@ -75,7 +75,7 @@ class Command:
     """One command, its continuation lines joined."""
 
     where: str  # file:line on which it begins
-    name: str  # in full where it is acted upon, else as it is written, upper case
+    name: str  # in full where it has an effect, else as it is written, upper case
     rest: str  # what stands behind its name, upper case
     text: str  # as it is written
     plots: bool = False  # it stands in the language of plots, behind OUTPUT(XYPLOT) or the like

@@ -47,7 +47,7 @@ class DeckFiles:
     sources: tuple[Source, ...]  # the deck's own file first, then what it includes, depth first
     # (file:line, text) of executive and case control, includes in place
     control: tuple[tuple[str, str], ...]
-    begins: int  # position of the file with BEGIN BULK; -1: there is none, all is bulk data
+    begins: int  # position of the file with BEGIN BULK; -1: all is bulk data
 
 
 def sources(path: Path) -> DeckFiles:
