@@ -83,6 +83,12 @@ def test_a_concealed_mass_is_named(heavy, diagnosed):
     assert any("motion of the base" in note for note in diagnosed.notes)
 
 
+def test_a_normal_is_an_output_of_a_moving_base():
+    grid, f = at(clamped(), [PLACE])[0], np.linspace(12, 100, 5)
+    T = chladni.frf(clamped(), [f"{grid}:n", f"{grid}:+Z"], ["base:+Z"], f).frfs[0]
+    assert_allclose(np.abs(T.values[:, 0]), np.abs(T.values[:, 1]))
+
+
 def test_a_null_stays_quiet(tmp_path):
     """The same plate 3 % thicker: that is calibrated, and nothing is named."""
     found = chladni.diagnose(a_case(tmp_path / "null", clamped(1.236e-3, 2), 3))

@@ -1,4 +1,4 @@
-"""Responses of a structure: static, enforced, harmonic, and to motion of its base.
+"""Responses of a structure: static, enforced and harmonic.
 
 Loads and motions are (6n, k) over all points in the basic frame: six motions a point, one column a
 load case. Dependent dofs may have loads, which Tᵀ transfers to their independent dofs.
@@ -11,7 +11,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dofs import COMPONENTS, rows
-from ..dynamics.frf import FRF, Residual, transfer
 from ..dynamics.modes import ModalModel
 from ..errors import LabelError, ModelError
 from ..model.analysis import Analysis, Subcase
@@ -215,43 +214,6 @@ def harmonic(
         Z = sp.csr_array(system.K + 1j * omega * system.V - omega**2 * system.M)
         H[k] = pick @ factorise(Z, nodes=system.dofs[:, 0], definite=False).solve(f)
     return H
-
-
-def base_response(
-    built: Structure,
-    modal: ModalModel,
-    axis: int,
-    frequency: np.ndarray,
-    dofs: np.ndarray,
-    *,
-    residual: Residual | None = None,
-) -> FRF:
-    """Acceleration per base acceleration, T = r - ω² H(ω) (-Tᵀ M r), with all supports moving.
-
-    Parameters
-    ----------
-    modal : modes of the structure held at its supports, with damping
-    axis : int               1, 2 or 3: translation of every support along a basic axis
-    frequency : (n_f,)       [Hz]
-    dofs : (n_out, 2) int    point id and component 1-6 of the outputs
-    residual : Residual      of the modes left out, for these outputs and this load
-    """
-    rigid = rigid_motions(built.assembly)[:, axis - 1 : axis]
-    load = inertia_load(built.assembly, -np.eye(3)[:, axis - 1 : axis])
-    pick = built.rows(dofs)
-    s = 2j * np.pi * np.asarray(frequency, dtype=float)
-    phi_in = (built.T.T @ load).T @ modal.shapes
-    H = transfer(modal, pick @ modal.shapes, phi_in, s, residual=residual)
-    rigid_motion = motion_at(built.assembly, dofs, rigid)
-    outputs = tuple(f"{p}:+{COMPONENTS[c - 1]}" for p, c in np.asarray(dofs).tolist())
-    values = rigid_motion[None] + (s**2)[:, None, None] * H
-    return FRF(
-        values,
-        np.asarray(frequency),
-        outputs,
-        (f"base:+{COMPONENTS[axis - 1]}",),
-        "transmissibility",
-    )
 
 
 def motion_at(assembly: Assembly, dofs: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -5,16 +5,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..arguments import checked
 from ..case import Case
 from ..case.sensor_places import ROLES, placed, sensor_masses, weight_of_sensors
 from ..dofs import label, parse
-from ..dynamics.frf import FRF, residual_flexibility, transfer
+from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError, ShapeError
+from ..fem.base_motion import base_motion
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, modelled
-from ..fem.solve import base_response, inertia_load
 from ..io.tables.sensor_table import exciter, read_layout
 from ..model.analysis import Analysis, Subcase
 from ..model.point_masses import with_masses
@@ -181,52 +182,39 @@ def superposed(
     model: Model, made: Modelled, outputs: Side, inputs: Side,
     frequency: np.ndarray, damping: float,
 ) -> FRF:  # fmt: skip
-    """Superpose solved modes, up to ``REACH`` times the band, and the static rest of the others."""
-    names_o, names_i = _labels(outputs), _labels(inputs)
-    if isinstance(outputs, MeasuredDofs) and isinstance(inputs, MeasuredDofs) and inputs.base.any():
-        return _places_from_base(made, outputs, inputs, frequency, damping)
-    if names_i[0].startswith("base:"):
-        return _from_base(made, names_o, names_i, frequency, damping)
-    pick, load = (
-        side.rows(made.structure) if isinstance(side, MeasuredDofs) else model.directions(side)
-        for side in (outputs, inputs)
-    )
-    return FRF(receptances(made, damping, pick, load, frequency), frequency, names_o, names_i)
+    """Superpose solved modes, up to ``REACH`` times the band, and the static rest of the others.
+
+    Where the base moves: acceleration per acceleration of all supports (transmissibility).
+    """
+    s, names = made.structure, (_labels(outputs), _labels(inputs))
+    pick = outputs.rows(s) if isinstance(outputs, MeasuredDofs) else model.directions(outputs)
+    if (b := _ways_of_base(inputs)) is None:
+        load = inputs.rows(s) if isinstance(inputs, MeasuredDofs) else model.directions(inputs)
+        return FRF(receptances(made, damping, pick, load, frequency), frequency, *names)
+    base = base_motion(s, b)
+    if isinstance(outputs, MeasuredDofs):
+        moved = outputs.directions @ b.T
+    else:
+        moved = model.directions(outputs, free=False) @ base.whole
+    load = sp.csr_array(-base.force.T)
+    H = receptances(made, damping, pick, load, frequency)
+    values = moved - (2 * np.pi * frequency)[:, None, None] ** 2 * H
+    return FRF(values, frequency, *names, "transmissibility")
 
 
-def _from_base(
-    made: Modelled, outputs: Sequence[str], inputs: Sequence[str], frequency: np.ndarray,
-    damping: float,
-) -> FRF:  # fmt: skip
-    """Compute the acceleration per acceleration of all supports (transmissibility)."""
-    _, axis, sign = parse(inputs[0].replace("base:", "0:"))
-    ends = [parse(text) for text in outputs]
-    dofs, s = np.array([(point, c) for point, c, _ in ends]), made.structure
-    load = s.T.T @ inertia_load(made.assembly, -np.eye(3)[:, axis - 1 : axis])
-    modal, pick = made.modes.with_damping(damping), s.rows(dofs).T.toarray()
-    rest = residual_flexibility(s.system, modal, pick, load)
-    found = base_response(s, modal, axis, frequency, dofs, residual=rest)
-    signs = sign * np.array([c for _, _, c in ends])
-    return replace(
-        found,
-        values=found.values * signs[:, None],
-        outputs=tuple(outputs),
-        inputs=tuple(inputs),
-    )
-
-
-def _places_from_base(
-    made: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs, frequency: np.ndarray,
-    damping: float,
-) -> FRF:  # fmt: skip
-    """Compute the transmissibility at places off the grids, along their own directions."""
-    built, modal = made.structure, made.modes.with_damping(damping)
-    pick, load = outputs.rows(built).T.toarray(), inputs.loads(built).T.toarray()
-    rest = residual_flexibility(built.system, modal, pick, load)
-    s = 2j * np.pi * frequency
-    H = transfer(modal, pick.T @ modal.shapes, load.T @ modal.shapes, s, residual=rest)
-    values = outputs.moved_with_base(inputs) + (s**2)[:, None, None] * H
-    return FRF(values, frequency, outputs.labels, inputs.labels, "transmissibility")
+def _ways_of_base(inputs: Side) -> np.ndarray | None:
+    """Directions (k, 3) in which the inputs move all supports; None where they are forces."""
+    if isinstance(inputs, MeasuredDofs):
+        return inputs.directions if inputs.base.any() else None
+    if not inputs[0].startswith("base:"):
+        return None
+    try:
+        _, axis, sign = parse(inputs[0].replace("base:", "0:"))
+    except LabelError:
+        axis = 0
+    if not 1 <= axis <= 3:
+        raise LabelError(f"--input {inputs[0]}: write base:+X, base:+Y or base:+Z")
+    return sign * np.eye(3)[[axis - 1]]
 
 
 def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> FrequencyResponses:

@@ -70,17 +70,23 @@ class Model:
         count = min(count, len(self.structure.system.dofs))
         return normal_modes(self.structure.system, count)
 
-    def directions(self, labels: Sequence[str]) -> sp.csr_array:
-        """Motion at labels as 12:+Z or 12:n (the surface normal): (k, n_free)."""
-        return sp.csr_array(sp.vstack([self._direction(text) for text in labels]))
+    def directions(self, labels: Sequence[str], free: bool = True) -> sp.csr_array:
+        """Motion at labels as 12:+Z or 12:n (the surface normal) over the free dofs: (k, n_free).
 
-    def _direction(self, text: str) -> sp.csr_array:
+        Without ``free`` over all motions of all points (k, 6 n_points).
+        """
+        built = self.structure
+        if not free:
+            built = replace(built, T=sp.csr_array(sp.eye_array(built.T.shape[0])))
+        return sp.csr_array(sp.vstack([self._direction(built, text) for text in labels]))
+
+    def _direction(self, built: Structure, text: str) -> sp.csr_array:
         point, _, axis = text.partition(":")
         if axis.strip() == "n" and point.strip().isdecimal():
             ids = np.array([int(point)])
-            return self.structure.along(ids, normals_at(self.assembly, ids))
+            return built.along(ids, normals_at(self.assembly, ids))
         point_id, component, sign = parse(text)
-        return sp.csr_array(sign * self.structure.rows(np.array([[point_id, component]])))
+        return sp.csr_array(sign * built.rows(np.array([[point_id, component]])))
 
     def motion(self, shapes: np.ndarray) -> np.ndarray:
         """Translation of every point in the basic frame, u = T q: (n, r) -> (n_points, 3, r)."""
