@@ -35,7 +35,7 @@ def refusals(table: Path) -> pytest.MarkDecorator:
     """
     kind, cases = "", []
     for line in table.read_text(encoding="utf-8").splitlines():
-        damage, mark, said = (word.strip() for word in line.partition(" || "))
+        damage, mark, said = (word.strip() for word in f" {line}".partition(" || "))
         if mark:
             cases.append((kind, damage.replace(r"\n", "\n"), said))
         elif line.startswith("["):
