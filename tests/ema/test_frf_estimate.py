@@ -9,7 +9,6 @@ from chladni.dynamics.frf import FRF
 from chladni.ema.frf_estimate import EstimateSettings, estimate, excitation_of
 from chladni.ema.identification import identify
 from chladni.ema.ring_down import ring_downs
-from chladni.ema.stepped_sine import dwells
 from chladni.ema.time_record import TimeRecord, overloaded
 from chladni.workflows.identify import without_window
 
@@ -166,16 +165,6 @@ def test_a_stepped_sine_is_demodulated_with_its_harmonics() -> None:
     expected = 0.5e-2 * size / np.abs(made.response[:, 1]).max()  # (A cos)² is A²/2 cos 2ωt + ...
     np.testing.assert_allclose(found.distortion[:, 1], expected, rtol=0.1, atol=2e-4)
     assert found.distortion[:, 0].max() < 2e-3
-
-
-def test_dwells_are_the_steps() -> None:
-    steps = np.array([20.0, 20.4, 21.0, 40.0])
-    found = dwells(sweep(steps))
-    length = int(3 * RATE)
-    assert len(found) == 4
-    # steps are located to the eight cycles on either side, and so is the end of the record
-    starts = np.array([first for first, _ in found])
-    np.testing.assert_allclose(starts, np.arange(4) * length, atol=10 * RATE / 20)
 
 
 def test_a_free_decay_gives_poles_and_keeps_a_linear_damping() -> None:

@@ -85,13 +85,6 @@ def test_errors_are_as_large_as_the_spread_says(f: np.ndarray) -> None:
         assert np.sqrt((score**2).mean()) == pytest.approx(1.0, abs=3 / np.sqrt(2 * score.size))
 
 
-def test_spread_shrinks_as_the_noise() -> None:
-    """Standard deviations are proportional to the noise (Cramer-Rao bound)."""
-    truth = a_truth(3, 8, 6)
-    coarse, fine = (identify(truth.frf(EVEN, "mobility", noise)) for noise in (0.02, 0.002))
-    np.testing.assert_allclose(coarse.frequency_sd / fine.frequency_sd, 10, rtol=0.15)
-
-
 @pytest.mark.parametrize(
     ("seed", "outputs", "inputs", "spacing"), [(0, 1, 1, 0.0), (1, 1, 1, 0.0), (0, 5, 2, 0.01)]
 )

@@ -187,13 +187,3 @@ def test_tapered_strip():
         error.append(abs(w.mean() / exact - 1))
     assert np.log2(error[-2] / error[-1]) > 1.6
     assert error[-1] < 2e-3
-
-
-def test_mean_thickness_is_not_enough():
-    """K of a taper differs from that of its mean: t³ is taken point by point."""
-    points, nodes = grid(np.array([0, 1.0]), np.array([0, 1.0]))
-    geo = shell.geometry(points, sheet(points, nodes, 0.1).shells)
-    Q = Isotropic(E, NU).plane_stress()
-    taper = np.array([[0.05, 0.15, 0.15, 0.05]])
-    K, mean = (shell.stiffness(geo, t, Qb=Q) for t in (taper, np.full((1, 4), 0.1)))
-    assert np.trace(K[0]) > 1.2 * np.trace(mean[0])

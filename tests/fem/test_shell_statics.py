@@ -11,7 +11,7 @@ from tests.builders.published import benchmarks, held
 
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
-from chladni_specimens.plates import grid, merged, sheet
+from chladni_specimens.plates import grid, sheet
 
 ALL = (1, 2, 3, 4, 5, 6)
 
@@ -175,11 +175,3 @@ def test_raasch_hook():
     tip = k == len(line) - 1
     u = deflection(hook, nodal(hook, (tip, (0, 0, 1))))
     assert 4.9 < u[tip, 2].mean() < 5.15
-
-
-def test_closed_sections_are_merged():
-    points, nodes = merged(
-        np.array([[0, 0, 0], [1, 0, 0], [1e-9, 0, 0.0]]), np.array([[0, 1, 2]]), 1e-6
-    )
-    assert len(points) == 2
-    assert nodes.tolist() == [[0, 1, 0]]

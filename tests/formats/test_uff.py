@@ -48,17 +48,6 @@ def test_what_is_written_is_read_back(tmp_path, f, binary, quantity):
     assert [p.name for p in tmp_path.iterdir()] == ["a.uff"]
 
 
-def test_pyuff_reads_what_we_write(tmp_path):
-    """The second reader: pyuff by itself finds every dataset and every number."""
-    H = a_frf()
-    write_uff(tmp_path / "a.uff", H, {1: np.zeros(3)})
-    read = sets(tmp_path / "a.uff")
-    assert [d["type"] for d in read] == [151, 164, 2411] + [58] * 6
-    assert [d["rsp_dir"] for d in read[3:6]] == [3, -1, 0]
-    np.testing.assert_allclose(read[3]["data"], H.values[:, 0, 0], rtol=1e-12)
-    np.testing.assert_allclose(read[3]["x"], H.frequency, rtol=1e-12)
-
-
 def test_base_motion_keeps_its_name(tmp_path):
     """A title that is no text, as a file's name may be, is written with question marks."""
     H = a_frf(outputs=("7:+Z",), inputs=("base:+Z",), quantity="transmissibility")
@@ -209,15 +198,6 @@ def test_mode_shapes_alone_give_natural_frequencies(tmp_path):
     with_frf = foreign(path, record())
     assert read_uff(with_frf).frf is not None
     assert read_uff(with_frf).poles is None
-
-
-def test_hammer_test_of_a_plate(recordings):
-    """A file of another program: plate, accelerance with coherence, 0 to 2 kHz."""
-    recording = read_uff(recordings / "spruce_plates/plate_2L.uff")
-    assert recording.frf.values.shape == (4001, 1, 1)
-    assert (recording.frf.outputs, recording.frf.inputs) == (("2:+Z",), ("1:+Z",))
-    assert recording.frf.quantity == "accelerance"
-    assert recording.frf.coherence is not None
 
 
 def test_what_is_no_file_or_half_of_one_is_said_in_a_sentence(tmp_path):
