@@ -134,25 +134,10 @@ def test_misuse_is_named(chain):
     says(r"99:\+Z", modal.at, ["99:+Z"])
     says(r"99:\+Z.*2:\+Z", superposed(modal.with_damping(0.01)).sel, ["99:+Z"])
     says(r"\(3, 1, 1\).*\(3, 2, 1\)", FRF, np.ones((3, 1, 1), complex), F[:3], LABELS, ("1:+Z",))
-    says(
-        "variance",
-        FRF,
-        np.ones((1, 1, 1), complex),
-        F[:1],
-        ("a",),
-        ("b",),
-        variance=np.ones((1, 1)),
-    )
+    one = np.ones((1, 1, 1), complex), F[:1], ("a",), ("b",)
+    says("variance", FRF, *one, variance=np.ones((1, 1)))
     says("must increase", FRF, np.ones((2, 1, 1), complex), np.array([2.0, 1.0]), ("a",), ("b",))
-    says(
-        "no quantity 'admittance'",
-        FRF,
-        np.ones((1, 1, 1), complex),
-        F[:1],
-        ("a",),
-        ("b",),
-        "admittance",
-    )
+    says("no quantity 'admittance'", FRF, *one, "admittance")
 
 
 def test_values_cannot_be_overwritten(chain):

@@ -68,13 +68,5 @@ def test_what_cannot_be_said_is_said(modal):
     says("both output and input", modal_model, replace(ss, inputs=("1:+Z", "3:+Z")))
     says("not passive", modal_model, replace(ss, B=-ss.B), error=AccuracyError)
     says("transmissibility", spaced, modal, "transmissibility")
-    says(
-        r"B is \(2, 1\).*\(2, 2\)",
-        StateSpace,
-        np.eye(2),
-        np.ones((2, 1)),
-        np.ones((1, 2)),
-        np.ones((1, 2)),
-        ("a",),
-        ("b", "c"),
-    )
+    matrices = np.eye(2), np.ones((2, 1)), np.ones((1, 2)), np.ones((1, 2))
+    says(r"B is \(2, 1\).*\(2, 2\)", StateSpace, *matrices, ("a",), ("b", "c"))

@@ -60,11 +60,8 @@ def test_inertia_of_a_rectangle():
     """m (a² + b²)/12 about the normal and m (b² + t²)/12 about x, with mid-surface offset d."""
     a, b, t, d = 0.4, 0.3, 0.02, 0.05
     shape = plate(a, b, 4, 3, t)
-    shape = replace(
-        shape,
-        points=shape.points - [a / 2, b / 2, 0],
-        shells=replace(shape.shells, offset=np.full(12, d)),
-    )
+    shells = replace(shape.shells, offset=np.full(12, d))
+    shape = replace(shape, points=shape.points - [a / 2, b / 2, 0], shells=shells)
     R, M = rigid_motions(shape), structure(shape).system.M
     m = 7850 * a * b * t
     G = R.T @ (M @ R)
@@ -134,11 +131,9 @@ def test_points_without_stiffness_are_left_out():
     """A free grid, and the rotations of a membrane without drilling, do not make K singular."""
     shape = plate(0.4, 0.3, 4, 3, 1e-3)
     unattached = replace(
-        shape,
-        ids=np.append(shape.ids, 99),
-        points=np.vstack([shape.points, [1.0, 1, 1]]),
+        shape, ids=np.append(shape.ids, 99), points=np.vstack([shape.points, [1.0, 1, 1]]),
         masses=Masses(np.array([1]), np.array([20]), np.eye(6)[None]),
-    )
+    )  # fmt: skip
     assert 99 not in structure(unattached).system.dofs[:, 0]
     assert 99 in structure(replace(unattached, auto_spc=False)).system.dofs[:, 0]
     sheet = tuple(p.with_section(bending=None) for p in shape.parts)
@@ -154,12 +149,9 @@ def test_a_point_sprung_in_two_directions_loses_one_dof(slanting):
     if slanting:
         axes[20] = turned_axes(1)[0]
     joined = replace(
-        shape,
-        ids=np.append(shape.ids, 99),
-        points=np.vstack([shape.points, [0.0, 0, 0]]),
-        bushes=joint,
-        axes=axes,
-    )
+        shape, ids=np.append(shape.ids, 99), points=np.vstack([shape.points, [0.0, 0, 0]]),
+        bushes=joint, axes=axes,
+    )  # fmt: skip
     dofs = structure(joined).system.dofs
     kept = set(dofs[dofs[:, 0] == 99, 1])
     assert kept == {1, 2, 3} - {1 + int(np.argmax(np.abs(axes[20, :, 2])))}

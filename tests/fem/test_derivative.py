@@ -77,6 +77,10 @@ def with_material(assembly, part, **changes):
     return assembly.with_parts(tuple(parts))
 
 
+def changing(assembly, part, name, value):
+    return lambda step: with_material(assembly, part, **{name: value + step})
+
+
 def thicker(assembly, part, step):
     shells = assembly.shells
     t = shells.thickness + step * (shells.part == part)[:, None]
@@ -111,10 +115,7 @@ def test_grain(made, name):
     made = made.with_parts(tuple(parts))
     value = getattr(orthotropic, name)
     slope = derivative.by_part(structure(made), 1, name)
-    order = remainder_order(
-        lambda step: with_material(made, 1, **{name: value + step}), slope, value
-    )
-    assert order > 1.9
+    assert remainder_order(changing(made, 1, name, value), slope, value) > 1.9
 
 
 @pytest.mark.parametrize("name", ["E", "nu", "rho"])
@@ -125,10 +126,7 @@ def test_adhesive(made, name, own, full):
     made = made.with_parts(tuple(parts))
     value = getattr(GLUE, name)
     slope = derivative.by_part(structure(made), 2, name)
-    order = remainder_order(
-        lambda step: with_material(made, 2, **{name: value + step}), slope, value
-    )
-    assert order > 1.9
+    assert remainder_order(changing(made, 2, name, value), slope, value) > 1.9
 
 
 @pytest.mark.parametrize("direction", [2, 6])
@@ -148,20 +146,18 @@ def test_bush(made, direction, name):
 @pytest.mark.parametrize("family", ["springs", "dampers"])
 def test_scalar(made, family):
     old = getattr(made, family)
-    slope = {"springs": derivative.by_spring, "dampers": derivative.by_damper}[family](
-        structure(made), 0
-    )
-    order = remainder_order(
-        lambda step: replace(made, **{family: replace(old, value=old.value + step)}), slope, 2e4
-    )
-    assert order == np.inf
+    by = {"springs": derivative.by_spring, "dampers": derivative.by_damper}[family]
+
+    def change(step):
+        return replace(made, **{family: replace(old, value=old.value + step)})
+
+    assert remainder_order(change, by(structure(made), 0), 2e4) == np.inf
 
 
 def test_point_mass(made):
     def change(step):
-        return replace(
-            made, masses=replace(made.masses, matrix=made.masses.matrix * (1 + 10 * step))
-        )
+        matrix = made.masses.matrix * (1 + 10 * step)
+        return replace(made, masses=replace(made.masses, matrix=matrix))
 
     assert remainder_order(change, derivative.by_mass(structure(made), 0), 0.1) == np.inf
 

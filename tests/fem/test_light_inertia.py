@@ -100,22 +100,15 @@ def strutted(cells, held):
     along = np.diff(sheet.points[list(corners)], axis=0)
     bar = bars([[n, n + 1]], 1, (0, 0, 1))
     section = BeamSection(Isotropic(210e9, 0.3, 0.0), 1e-6, 1e-9, 1e-9, 0.0, 2e-9, (0, 0))
-    balls = tuple(
-        Equation(1, (n + k, c), (d, d), (1.0, -1.0))
-        for k, c in enumerate(corners)
-        for d in (1, 2, 3)
-    )
+    balls = tuple(Equation(1, (n + k, c), (d, d), (1.0, -1.0))
+                  for k, c in enumerate(corners) for d in (1, 2, 3))  # fmt: skip
     axial = Equation(2, (n, n), (4, 5), tuple(along[0, :2]))  # of the rotation of one end
-    return structure(
-        replace(
-            sheet,
-            ids=np.arange(1, n + 3),
-            points=np.vstack([sheet.points, sheet.points[list(corners)]]),
-            parts=(*sheet.parts, Part(99, "strut", section)),
-            beams=bar,
-            rigid=(*balls, axial) if held else balls,
-        )
-    ).system
+    made = replace(
+        sheet, ids=np.arange(1, n + 3), points=np.vstack([sheet.points, sheet.points[[*corners]]]),
+        parts=(*sheet.parts, Part(99, "strut", section)), beams=bar,
+        rigid=(*balls, axial) if held else balls,
+    )  # fmt: skip
+    return structure(made).system
 
 
 @pytest.mark.parametrize("cells", [4, 14])

@@ -56,9 +56,8 @@ def test_scordelis_lo_roof(n, tolerance):
     free, crown, middle, wall = (*ends(phi)[::-1], *ends(x))
     roof = held(roof, (wall, (2, 3)), (middle, (1, 5, 6)), (crown, (2, 4, 6)))
     u = deflection(roof, weight(roof, 90.0))
-    assert -u[free & middle, 2][0] == pytest.approx(
-        benchmarks()["MH_scordelis_lo"]["target"], rel=tolerance
-    )
+    target = benchmarks()["MH_scordelis_lo"]["target"]
+    assert -u[free & middle, 2][0] == pytest.approx(target, rel=tolerance)
 
 
 @pytest.mark.parametrize(("n_x", "n_y"), [(12, 2), (36, 6)])
@@ -96,9 +95,8 @@ def test_hemisphere_with_a_hole(n, tolerance):
     """Quarter with 18 degrees hole, unit loads at the equator; converges to 0.0934."""
     points, nodes = grid(np.linspace(0, 90, n + 1), np.linspace(0, 72, n + 1))
     lon, lat = np.deg2rad(points[:, :2]).T
-    points = 10 * np.column_stack(
-        [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]
-    )
+    round_ = [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]
+    points = 10 * np.column_stack(round_)
     at_x, at_y = ends(lon)
     equator = ends(lat)[0]
     dome = sheet(points, nodes, 0.04, Isotropic(6.825e7, 0.3))
