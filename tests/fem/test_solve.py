@@ -11,7 +11,7 @@ from chladni.fem import solve
 from chladni.fem.assemble import structure
 from chladni.model.analysis import Analysis, Load, Motion, Subcase
 from chladni.model.assembly import Assembly, Masses, RigidBody
-from chladni.model.properties import BeamSection, Isotropic
+from chladni.model.properties import BeamSection, Isotropic, Part
 
 E, I, A, RHO, L, N = 210e9, 4e-9, 2e-4, 7850.0, 1.5, 6
 SECTION = BeamSection(Isotropic(E, 0.3, RHO), A, I, I, 0.0, 2 * I)
@@ -120,6 +120,17 @@ def test_hysteretic_losses():
     H = solve.harmonic(built, unit_load(2, 6), np.array([3.0]), built.rows(np.array([[2, 1]])))
     w = 2 * np.pi * 3
     assert H[0, 0, 0] == pytest.approx(1 / (1e4 * (1 + 0.07j) - w**2 * 2))
+
+
+def test_losses_of_the_material():
+    """A loss factor η of the beam's material makes a static answer 1 / (1 + i η) of itself."""
+    lossy = BeamSection(Isotropic(E, 0.3, RHO, damping=0.1), A, I, I, 0.0, 2 * I)
+    tip, load = np.array([[N + 1, 2]]), unit_load(N + 1, 6 * N + 1)
+    u = []
+    for section in (SECTION, lossy):
+        built = structure(cantilever(parts=(Part(1, "b", section),)))
+        u.append(solve.harmonic(built, load, np.array([0.0]), built.rows(tip))[0, 0, 0])
+    assert u[1] == pytest.approx(u[0] / (1 + 0.1j))
 
 
 def test_transmissibility_of_an_oscillator():

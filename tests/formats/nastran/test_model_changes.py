@@ -215,7 +215,7 @@ def another_grain(a):
     """A MAT8's moduli, nu12 and density."""
     old = a.parts[0].section.membrane
     new = replace(old, E1=1.1 * old.E1, E2=0.9 * old.E2, nu12=0.25, G12=1.2 * old.G12, rho=8000.0)
-    return a.with_parts((a.parts[0].with_section(membrane=new, bending=new),))
+    return a.with_parts((a.parts[0].with_section(membrane=new, bending=new, shear=new),))
 
 
 def of_the_sheet(a):
