@@ -35,3 +35,9 @@ def test_an_axis_that_begins_at_zero_passes_whatever_its_scale(scale):
     findings, check = axis_check(frf := recorded(0.0, scale), identify(frf))
     assert findings == []
     assert check.passed
+
+
+def test_modes_that_do_not_fit_decide_nothing():
+    frf = recorded(2.0)
+    findings, check = axis_check(frf, replace(identify(frf), chi=100.0))
+    assert (findings, check.passed) == ([], None)

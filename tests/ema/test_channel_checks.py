@@ -171,6 +171,12 @@ def test_a_wrong_quantity_is_named(quantity: str) -> None:
         assert f'quantity = "{quantity}"' in " ".join(f.repair for f in named)
 
 
+def test_a_poor_fit_that_no_other_reading_mends_is_no_wrong_quantity() -> None:
+    frf = recording().sel(band=(10.0, 60.0))
+    found = screened(Recording("a", frf), replace(identify(frf), chi=5.0)).findings
+    assert [f for f in found if f.kind == "wrong quantity"] == []
+
+
 def test_a_reversed_force_turns_every_mode() -> None:
     frf = recording()
     (found,), _ = level_checks(*gains(replace(frf, values=-frf.values)), outputs=N)
