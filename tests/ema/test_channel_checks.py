@@ -7,8 +7,9 @@ import pytest
 from tests.builders.modal_frfs import modal_frf, noisy
 
 from chladni.dynamics.frf import FRF
-from chladni.ema.chain_checks import fitted_delay, level_checks, modal_gains
+from chladni.ema.chain_checks import fitted_delay, level_checks, modal_gains, other_reading
 from chladni.ema.channel_checks import channel_checks
+from chladni.ema.frf_maps import misreadings
 from chladni.ema.identification import Identified, identify
 from chladni.ema.recording_screening import screened, strong_modes
 from chladni.ema.setup import Recording
@@ -171,10 +172,11 @@ def test_a_wrong_quantity_is_named(quantity: str) -> None:
         assert f'quantity = "{quantity}"' in " ".join(f.repair for f in named)
 
 
-def test_a_poor_fit_that_no_other_reading_mends_is_no_wrong_quantity() -> None:
-    frf = recording().sel(band=(10.0, 60.0))
-    found = screened(Recording("a", frf), replace(identify(frf), chi=5.0)).findings
-    assert [f for f in found if f.kind == "wrong quantity"] == []
+def test_a_reading_that_fits_no_better_is_no_other_one() -> None:
+    """Twice the residual, and the same."""
+    modes, (error, *_) = identify(recording()), misreadings(recording())
+    for chi in (modes.chi, 2 * modes.chi):
+        assert other_reading(modes, {error: replace(modes, chi=chi)}) == []
 
 
 def test_a_reversed_force_turns_every_mode() -> None:
