@@ -1,4 +1,4 @@
-"""Deliberate bugs, one a room: each is a few characters of the source, and a room must fail."""
+"""Deliberate bugs: each is a few characters of the source, and the tests of its room must fail."""
 
 from typing import NamedTuple
 
@@ -48,6 +48,18 @@ BUGS = (
     DeliberateBug(  # the arm of a bush turns the wrong way
         "src/chladni/fem/spring.py", "= -joined * (bushes.frame", "= joined * (bushes.frame",
         "tests/fem/test_spring.py",
+    ),
+    DeliberateBug(  # bars of a lossy material have no losses
+        "src/chladni/fem/assemble.py", "_lossy(beam.loss_factors(assembly), K_e",
+        "_lossy(0 * beam.loss_factors(assembly), K_e", "tests/fem/test_solve.py",
+    ),
+    DeliberateBug(  # losses of a bush go one field too far
+        "src/chladni/io/nastran/edit/joint_changes.py", "key + 1 + k: v for", "key + 2 + k: v for",
+        "tests/formats/nastran/test_joint_changes.py",
+    ),
+    DeliberateBug(  # Poisson's ratio of a grain is a thousandth off where it stands
+        "src/chladni/io/nastran/edit/model_changes.py", 'names["nu12"] = ("NU12", 1.0)',
+        'names["nu12"] = ("NU12", 1.001)', "tests/formats/nastran/test_model_changes.py",
     ),
     DeliberateBug(  # the mass is written at the grid, its offset is lost
         "src/chladni/effects/point_mass.py", "(grid,), m, offset)", "(grid,), m)",

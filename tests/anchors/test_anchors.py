@@ -166,10 +166,8 @@ def of_statics(entry):
         for quantity, part in (("translation", slice(0, 3)), ("rotation", slice(3, 6))):
             known = due[:, part]
             dofs = [(n, c) for n in ids for c in range(part.start + 1, part.stop + 1)]
-            found, said = (
-                motion_at(made, np.array(dofs), u).reshape(known.shape),
-                np.isfinite(known),
-            )
+            found = motion_at(made, np.array(dofs), u).reshape(known.shape)
+            said = np.isfinite(known)
             if said.any():
                 out[quantity] = max(out.get(quantity, 0.0), worst(found[said], known[said]))
     return out
@@ -212,9 +210,8 @@ def of_responses(entry):
 def _responses(npz, case):
     """(quantity, grids, (lines, grids, components)) of one subcase."""
     if "mag_T1_1" in npz:
-        polar = [
-            npz[f"mag_T1_{n}"] * np.exp(1j * np.deg2rad(npz[f"phase_deg_T1_{n}"])) for n in (1, 2)
-        ]
+        turns = [np.exp(1j * np.deg2rad(npz[f"phase_deg_T1_{n}"])) for n in (1, 2)]
+        polar = [npz[f"mag_T1_{n}"] * turn for n, turn in zip((1, 2), turns, strict=True)]
         return [("displacement", [1, 2], np.stack(polar, axis=1)[..., None])]
     if "disp" in npz:
         return [("displacement", npz["node_id"], npz["disp"].transpose(1, 0, 2))]
@@ -278,12 +275,8 @@ def ten_cell_beam(entry):
     return out | {"response": max(gaps)}
 
 
-LEGACY = {
-    "n95_d03081a": rotor_pylon,
-    "n95_d03071a": tapered_plate,
-    "n95_d08011a": plate_response,
-    "n95_d11011a": ten_cell_beam,
-}
+LEGACY = {"n95_d03081a": rotor_pylon, "n95_d03071a": tapered_plate, "n95_d08011a": plate_response,
+          "n95_d11011a": ten_cell_beam}  # fmt: skip
 
 
 def figures(entry):

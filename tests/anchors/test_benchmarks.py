@@ -5,21 +5,21 @@ the commercial code's figures where the publication gives them. Limits are the e
 behind the target or the digits printed; where they are wide the reason is said.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.elements import CUBE, row_of_bars
 from tests.builders.published import benchmarks
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
 from chladni.fem.solve import static
-from chladni.model.assembly import Assembly, Beams, Masses, RigidBody, Solids
+from chladni.model.assembly import Assembly, Masses, RigidBody, Solids
 from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
 
 NAFEMS = Isotropic(200e9, 0.3, 8000.0)
-CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 EVERY = (1, 2, 3, 4, 5, 6)
 
 
@@ -28,7 +28,9 @@ def bricks(n, place):
     lines = [np.linspace(0, 1, m + 1) for m in n]
     s = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(s)).reshape([m + 1 for m in n])
-    cells = [number[a : a + n[0], b : b + n[1], c : c + n[2]].ravel() for a, b, c in CORNERS]
+    cells = [
+        number[a : a + n[0], b : b + n[1], c : c + n[2]].ravel() for a, b, c in CUBE.astype(int)
+    ]
     return s, place(s), np.stack(cells, axis=1)
 
 
@@ -37,19 +39,6 @@ def block(points, cells, section, supports):
     part = Part(1, "block", section)
     ids = np.arange(1, len(points) + 1)
     return Assembly(ids, points, (part,), solids=(solids,), supports=np.array(supports))
-
-
-def row_of_beams(n, length, section, supports, extra=(), **more):
-    points = np.linspace(0, length, n + 1)[:, None] * np.array([1.0, 0, 0])
-    points = np.vstack([points, *[np.array(x)[None] for x in extra]])
-    nodes = np.stack([np.arange(n), np.arange(1, n + 1)], axis=1)
-    beams = Beams(
-        np.arange(n), nodes, np.zeros(n, int), np.tile([0, 1.0, 0], (n, 1)), np.zeros((n, 2, 3)),
-        np.zeros((n, 2, 6), bool),
-    )  # fmt: skip
-    ids = np.arange(1, len(points) + 1)
-    part = Part(1, "beam", section)
-    return Assembly(ids, points, (part,), beams=beams, supports=np.array(supports), **more)
 
 
 def fv52(modes, n=(8, 8, 3)):
@@ -67,9 +56,9 @@ def fv4():
     inertia = np.pi * d**4 / 64
     section = BeamSection(NAFEMS, np.pi * d**2 / 4, inertia, inertia, 0.0, 2 * inertia, (0.9, 0.9))
     lumps = np.array([10e3, 1e3])[:, None, None] * np.diag([1.0, 1, 1, 0, 0, 0])
-    made = row_of_beams(
-        n, 10.0, section, [(0, c) for c in EVERY],
-        extra=[(10, 2, 0), (10, -2, 0)],
+    row = row_of_bars(n, 10.0, section, supports=np.array([(0, c) for c in EVERY]))
+    made = replace(
+        row, ids=np.arange(1, n + 4), points=np.vstack([row.points, [(10, 2, 0), (10, -2, 0)]]),
         rigid=(RigidBody(9, n, (n + 1, n + 2), (EVERY, EVERY)),),
         masses=Masses(np.array([1, 2]), np.array([n + 1, n + 2]), lumps),
     )  # fmt: skip
@@ -84,7 +73,8 @@ def fv5():
         kind="beam",
     )  # fmt: skip
     held = [(0, 1), (0, 2), (0, 3), (0, 4), (n, 2), (n, 3)]
-    return normal_modes(structure(row_of_beams(n, 10.0, section, held)).system, 9).frequency
+    made = row_of_bars(n, 10.0, section, supports=np.array(held))
+    return normal_modes(structure(made).system, 9).frequency
 
 
 def tip_loads(n, place, material, modes, axes):

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from tests.builders.cases import case_text
 from tests.builders.commands import call, ran, refused
 from tests.builders.decks import flat_sheet
 
 import chladni
 from chladni.case import load_case
-from chladni.cli.app import commands, guarded
+from chladni.cli.app import guarded
 from chladni.errors import AccuracyError, FileError
 from chladni.fem.modelled import modelled
 from chladni.io.formed_files import read_formed
@@ -94,19 +95,6 @@ def test_rigid_motions_are_told_where_no_other_mode_is_asked_for(tmp_path, count
     assert "6 modes are rigid motions" in done.output
 
 
-def test_frf_peaks_at_its_modes(deck, tmp_path):
-    out = tmp_path / "out"
-    ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "49:n"]
-    ran("frf", deck, *ends, "--band", "20:60", "--units", "SI", "--out", out)
-    call("modes", deck, "--count", 7, "--units", "SI", "--out", tmp_path / "modes")
-    first = json.loads((tmp_path / "modes" / "modes.json").read_text())["frequency_hz"][6]
-    with np.load(out / "frf.npz", allow_pickle=False) as held:
-        assert held["outputs"].tolist() == ["1:+Z", "49:n"]
-        assert str(held["quantity"]) == "accelerance"
-        peak = held["frequency_hz"][np.abs(held["values"][:, 0, 0]).argmax()]
-    assert peak == pytest.approx(first, abs=0.1)
-
-
 def test_frf_holds_what_higher_modes_contribute(deck, tmp_path):
     """Modes to 3 f and a two-term rest: direct inversion to (1/3)⁴ of the rest, so 1.2 %."""
     from chladni.dynamics.frf import direct_frf
@@ -149,15 +137,6 @@ def test_transmissibility_of_a_base(tmp_path):
         np.testing.assert_allclose(held["values"][:, 0, 0], 1 / (1 - (f / f0) ** 2), rtol=1e-9)
 
 
-def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
-    """On a plate in z = 0 the normal is Z up to sign, and H is reciprocal."""
-    labels = ["--input", "1:+Z", "--input", "9:n", "--output", "1:+Z", "--output", "9:n"]
-    ran("frf", deck, *labels, "--out", tmp_path / "out")
-    with np.load(tmp_path / "out" / "frf.npz", allow_pickle=False) as held:
-        H = held["values"]
-    np.testing.assert_allclose(H, H.swapaxes(1, 2), rtol=1e-6, atol=1e-9 * np.abs(H).max())
-
-
 def test_render(deck, tmp_path, monkeypatch):
     """Modes are counted with the rigid ones, as everywhere, so the plate's seventh is elastic."""
     monkeypatch.setattr(scene, "mode_gif", partial(scene.mode_gif, frames=3))  # twenty take long
@@ -188,36 +167,24 @@ def plates(heights):
 
 
 def test_clearance_of_two_plates(tmp_path):
-    """Two plates of 1 mm at a distance of 3 mm leave 2 mm, and a force that closes them."""
-    deck, out = tmp_path / "two.bdf", tmp_path / "out"
-    deck.write_text(plates([0.0, 0.003]))
-    options = ["--clearance", "--modes", 7, "--units", "SI", "--out", out]
-    ran("render", deck, *options)
-    (pair,) = json.loads((out / "clearance.json").read_text())
-    assert pair["least"] == pytest.approx(2e-3, abs=1e-6)
-    assert not pair["touching"]
-    assert "first contact" in (out / "report.html").read_text()
+    """Two plates of 1 mm at a distance of 3 mm leave 2 mm, and a force that closes them.
 
-
-def test_a_rigid_motion_closes_no_gap_and_stops_no_picture(tmp_path):
-    """Modes 1 to 8: all are drawn, contacts are of the two elastic ones."""
+    Modes 1 to 8 are drawn, and contacts are of the two elastic ones.
+    """
     deck, out = tmp_path / "two.bdf", tmp_path / "out"
     deck.write_text(plates([0.0, 0.003]))
     ran("render", deck, "--clearance", "--modes", "1-8", "--units", "SI", "--out", out)
+    (pair,) = json.loads((out / "clearance.json").read_text())
+    assert pair["least"] == pytest.approx(2e-3, abs=1e-6)
+    assert not pair["touching"]
     page = (out / "report.html").read_text()
     assert "A rigid motion closes no gap" in page
     table = page.split("first contact")[1].split("</table>")[0]
     assert re.findall(r"<td[^>]*>(\d)</td>", table) == ["7", "8"]
 
 
-def test_one_plate_has_no_clearance(tmp_path):
-    deck, out = tmp_path / "one.bdf", tmp_path / "out"
-    deck.write_text(plates([0.0]))
-    assert "no two parts" in refused("render", deck, "--clearance", "--out", out)
-
-
 SENSORS = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
-RECORDED = ["--input", "2:+Z", *SENSORS, "--band", "20:200", "--units", "SI"]
+RECORDED = ["--input", "2:+Z", *SENSORS, "--band", "20:200", "--lines", 700, "--units", "SI"]
 
 
 @pytest.fixture(scope="module")
@@ -385,9 +352,8 @@ def test_a_plan_without_units_says_what_it_took_the_deck_for(deck, tmp_path):
         done = ran("plan", path, *words, "--out", tmp_path / name)
         assert f"units = {name}: " in done.output
     a, b = (json.loads((tmp_path / n / "plan.json").read_text()) for n in ("SI", "mm-t-s"))
-    assert [m["frequency_hz"] for m in a["modes"]] == pytest.approx(
-        [m["frequency_hz"] for m in b["modes"]], rel=1e-5
-    )
+    hertz = [[m["frequency_hz"] for m in found["modes"]] for found in (a, b)]
+    np.testing.assert_allclose(*hertz, rtol=1e-5)
     at = [np.array([s["point_m"] for s in found["sensors"]]) for found in (a, b)]
     np.testing.assert_allclose(*at, atol=1e-6)
     deck.write_text(deck.read_text().replace("7850.", ""))
@@ -400,15 +366,13 @@ def test_a_plan_without_units_says_what_it_took_the_deck_for(deck, tmp_path):
         (["frf", "--input", "999:+Z", "--output", "1:+Z"], "999"),
         (["frf"], "--input"),
         (["frf", "--input", "1:+Z"], "--output"),
-        (
-            ["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"],
-            "must be the only input",
-        ),
+        (["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"], "the only input"),
         (["frf", "--input", "1:up", "--output", "1:+Z"], "1:up"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "9"], "--band"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "1:inf"], "be finite"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--quantity", "force"], "mobility"),
         (["modes", "--units", "cubits"], "mm-t-s"),
+        (["render", "--clearance"], "no two parts"),
         (["render", "--modes", "a-b"], "--modes"),
         (["render", "--modes", "0-3"], "from 1"),
         (["render", "--gif", "100000"], "100000"),
@@ -416,29 +380,24 @@ def test_a_plan_without_units_says_what_it_took_the_deck_for(deck, tmp_path):
         (["plan", "--drawn", "99999999"], "--drawn"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--lines", "99999999"], "--lines"),
         (["study", "--vary", "E=90%:110%", "--lines", "99999999"], "--lines"),
+        (["specimen", "teapot"], "tailgate"),
+        (["specimen", "plate", "--set", "lenght=1"], "length"),
+        (["specimen", "plate", "--set", "length=a"], "number"),
+        (["specimen", "tailgate", "--size", "1"], "6 to 32"),
+        (["specimen", "panel", "--set", "t"], "KEY=VALUE"),
+        (
+            ["specimen", "panel", "--set", "lenght=1"],
+            "there are length, width, depth, rise, h, t\n",
+        ),
+        (["specimen", "plate", "--size", "0.1"], "--size is in mm and must be at least 1 mm"),
+        (["specimen", "panel", "--size", "0.1"], "--size is in mm"),
+        (["specimen", "box", "--set", "h=1e-4"], "--size is in mm"),
     ],
 )
 def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
     command, *options = arguments
-    assert named in refused(command, deck, *options, "--out", tmp_path / "x")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["teapot"], "tailgate"),
-        (["plate", "--set", "lenght=1"], "length"),
-        (["plate", "--set", "length=a"], "number"),
-        (["tailgate", "--size", "1"], "6 to 32"),
-        (["panel", "--set", "t"], "KEY=VALUE"),
-        (["panel", "--set", "lenght=1"], "there are length, width, depth, rise, h, t\n"),
-        (["plate", "--size", "0.1"], "--size is in mm and must be at least 1 mm"),
-        (["panel", "--size", "0.1"], "--size is in mm"),
-        (["box", "--set", "h=1e-4"], "--size is in mm"),
-    ],
-)
-def test_a_wrong_specimen_names_the_right_ones(tmp_path, arguments, named):
-    assert named in refused("specimen", *arguments, "--out", tmp_path / "x") + "\n"
+    given = [] if command == "specimen" else [deck]
+    assert named in refused(command, *given, *options, "--out", tmp_path / "x") + "\n"
 
 
 def test_every_setting_of_a_specimen_is_in_its_help():
@@ -469,27 +428,16 @@ def test_out_must_be_a_folder(deck):
 
 @pytest.mark.parametrize(
     ("raised", "code"),
-    [
-        (FileError("a"), 2),
-        (AccuracyError("a"), 3),
-        (OSError(13, "no", "f"), 2),
-        (KeyboardInterrupt(), 130),
-    ],
-)
+    [(FileError("a"), 2), (AccuracyError("a"), 3), (OSError(13, "no", "f"), 2),
+     (KeyboardInterrupt(), 130)],
+)  # fmt: skip
 def test_exit_codes(raised, code):
-    import typer
-
     def command():
         raise raised
 
     with pytest.raises(typer.Exit) as caught:
         guarded(command)()
     assert caught.value.exit_code == code
-
-
-def test_help_lists_every_command():
-    said = call("--help").output
-    assert all(name in said for name in commands())
 
 
 def test_version_is_printed():

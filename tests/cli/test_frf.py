@@ -46,12 +46,17 @@ ENDDATA
 
 def responses(folder, name="frf.npz"):
     with np.load(folder / name, allow_pickle=False) as held:
-        return (
-            held["frequency_hz"],
-            held["outputs"].tolist(),
-            held["inputs"].tolist(),
-            held["values"],
-        )
+        names = held["outputs"].tolist(), held["inputs"].tolist()
+        return held["frequency_hz"], *names, held["values"]
+
+
+def two(folder, **changes):
+    """The deck with some of its text replaced, and the folder of results."""
+    text = TWO
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    (folder / "two.bdf").write_text(text)
+    return folder / "two.bdf", folder / "out"
 
 
 def stiffness(w, held):
@@ -62,8 +67,7 @@ def stiffness(w, held):
 
 def test_every_subcase_has_its_own_supports_and_frequencies(tmp_path):
     """u_1 = (Z⁻¹ p)_1 with the dofs that this subcase leaves free."""
-    deck, out = tmp_path / "two.bdf", tmp_path / "out"
-    deck.write_text(TWO)
+    deck, out = two(tmp_path)
     ran("frf", deck, "--quantity", "receptance", "--out", out)
     f, outputs, inputs, H = responses(out)
     assert inputs == ["subcase 1", "subcase 2"]
@@ -80,8 +84,7 @@ def test_every_subcase_has_its_own_supports_and_frequencies(tmp_path):
 
 @pytest.mark.parametrize(("subcase", "count"), [(1, 1), (2, 2)])
 def test_modes_under_the_supports_of_a_subcase(tmp_path, subcase, count):
-    deck, out = tmp_path / "two.bdf", tmp_path / "out"
-    deck.write_text(TWO)
+    deck, out = two(tmp_path)
     ran("modes", deck, "--subcase", subcase, "--out", out)
     f = json.loads((out / "modes.json").read_text())["frequency_hz"]
     assert len(f) == count
@@ -90,16 +93,14 @@ def test_modes_under_the_supports_of_a_subcase(tmp_path, subcase, count):
 
 
 def test_supports_are_those_of_the_subcase_that_seeks_modes(tmp_path):
-    deck, out = tmp_path / "two.bdf", tmp_path / "out"
-    text = TWO.replace("SUBCASE 2\n", "SUBCASE 2\nMETHOD = 4\n")
-    deck.write_text(text.replace("ENDDATA", "EIGRL,4,,,2\nENDDATA"))
+    deck, out = two(tmp_path, **{"SUBCASE 2\n": "SUBCASE 2\nMETHOD = 4\n",
+                                 "ENDDATA": "EIGRL,4,,,2\nENDDATA"})  # fmt: skip
     ran("modes", deck, "--out", out)
     assert len(json.loads((out / "modes.json").read_text())["frequency_hz"]) == 2
 
 
 def test_a_card_is_left_out_on_request_only(tmp_path):
-    deck, out = tmp_path / "two.bdf", tmp_path / "out"
-    deck.write_text(TWO.replace("CELAS2,1", "CWELD,77,1\nCELAS2,1"))
+    deck, out = two(tmp_path, ENDDATA="CWELD,77,1\nENDDATA")
     said = refused("modes", deck, "--out", out)
     assert "CWELD" in said
     assert "--allow CWELD" in said
@@ -108,9 +109,8 @@ def test_a_card_is_left_out_on_request_only(tmp_path):
 
 def test_what_modes_do_not_need_does_not_stop_them(tmp_path):
     """A load that cannot be understood, a reduction that is passed over and said to be."""
-    deck, out = tmp_path / "two.bdf", tmp_path / "out"
     more = "DLOAD,50,1.,1.,51\nTLOAD1,51,7,,,8\nASET1,1,1\nPELAST,9,3\nENDDATA"
-    deck.write_text(TWO.replace("ENDDATA", more))
+    deck, out = two(tmp_path, ENDDATA=more)
     ran("modes", deck, "--out", out)
     page = (out / "report.html").read_text()
     assert "ASET1 (static reduction) is left out" in page
@@ -129,17 +129,15 @@ def test_every_format_holds_the_same_responses(deck, tmp_path):
     ends = ("--input", "1:+Z", "--output", "9:+Z", "--output", "25:+Z")
     out = tmp_path / "out"
     ran("frf", deck, *ends, "--band", "5:90", "--lines", 80, "--units", "SI", "--out", out)
-    read = [
-        read_recordings(out / name, quantity)[0]
-        for name, quantity in (("frf.npz", None), ("frf.csv", "accelerance"), ("frf.uff", None))
+    first, table, universal = read = [
+        read_recordings(out / f"frf.{ending}", quantity)[0].frf
+        for ending, quantity in (("npz", None), ("csv", "accelerance"), ("uff", None))
     ]
-    first = read[0].frf
-    for other in read[1:]:
-        np.testing.assert_allclose(other.frf.values, first.values, rtol=1e-11)
-        np.testing.assert_allclose(other.frf.frequency, first.frequency, rtol=1e-7)
-        assert (other.frf.outputs, other.frf.inputs) == (first.outputs, first.inputs)
-        assert other.frf.quantity == first.quantity
-    assert set(read[2].nodes) == {1, 9, 25}
+    for other in (table, universal):
+        np.testing.assert_allclose(other.values, first.values, rtol=1e-11)
+        np.testing.assert_allclose(other.frequency, first.frequency, rtol=1e-7)
+    assert len({(one.outputs, one.inputs, one.quantity) for one in read}) == 1
+    assert set(read_uff(out / "frf.uff").nodes) == {1, 9, 25}
     told = json.loads((out / "frf.json").read_text())
     assert told["unit"] == "m/s²/N"
     size = np.abs(first.values[:, 1, 0])

@@ -6,8 +6,8 @@ import re
 import pytest
 from tests.builders.commands import ran
 from tests.builders.decks import flat_sheet
+from tests.builders.refusals import says
 
-from chladni.errors import FileError
 from chladni.units import UNITS
 from chladni.workflows.loaded_model import load_deck
 
@@ -31,18 +31,13 @@ def test_a_deck_of_known_materials_is_read_in_their_system_alone(tmp_path):
         if said == meant:
             assert deck.model().notes == ()
             continue
-        named = rf"give --units {meant.name}, not {said.name}: .*steel"
-        with pytest.raises(FileError, match=named):
-            deck.model()
+        says(rf"give --units {meant.name}, not {said.name}: .*steel", deck.model)
 
 
 @pytest.mark.parametrize(
     ("more", "noted"),
     [
-        (
-            {"rho": 7850e12},
-            "no unit system makes its materials known ones; .* weighs .*, with E = 210 GPa",
-        ),
+        ({"rho": 7850e12}, "no unit system makes its materials known ones; .* with E = 210 GPa"),
         ({"E": 1.0, "rho": 1.0}, "no unit system makes its materials known ones"),
         ({"side": 3e-4}, "the deck is 0.000424 m across, weighs .* check --units"),
         ({"side": 300.0}, "the deck is 424 m across"),

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from tests.builders.refusals import says
 
 from chladni.dynamics import eigen
 from chladni.dynamics.eigen import normal_modes
@@ -44,12 +45,6 @@ def test_shapes_solve_the_problem(shell_box):
     np.testing.assert_allclose(phi.T @ (shell_box.M @ phi), np.eye(25), atol=1e-10)
     k = phi.T @ (shell_box.K @ phi)
     np.testing.assert_allclose(k, np.diag(lam), atol=1e-7 * lam[-1])
-
-
-def test_free_box_has_six_rigid_modes(shell_box):
-    modal = normal_modes(shell_box, 12)
-    assert rigid_modes(modal).sum() == 6
-    assert modal.frequency[6] > 1e3 * modal.frequency[5]
 
 
 def test_a_wide_range_of_modes_leaves_the_rigid_one_rigid():
@@ -178,8 +173,7 @@ def test_a_mode_lost_for_good_is_an_error(monkeypatch):
         return block_lanczos(lambda B: (Y := solve(B)) - np.outer(x, x @ Y), M, k, **options)
 
     monkeypatch.setattr(eigen, "block_lanczos", blind)
-    with pytest.raises(AccuracyError, match=r"modes lie below .* Hz, .* were found"):
-        normal_modes(line(n), 12)
+    says(r"modes lie below .* Hz, .* were found", normal_modes, line(n), 12, error=AccuracyError)
     assert len(normal_modes(line(n), 12, proof=False)) == 12
 
 
@@ -189,8 +183,7 @@ def test_wrong_vectors_are_an_error(monkeypatch):
         return replace(ritz, weights=ritz.weights[:, ::-1])
 
     monkeypatch.setattr(eigen, "block_lanczos", sloppy)
-    with pytest.raises(AccuracyError, match="residual"):
-        normal_modes(line(900), 12)
+    says("residual", normal_modes, line(900), 12, error=AccuracyError)
 
 
 def test_a_part_that_hangs_on_nothing_is_named():
@@ -201,8 +194,7 @@ def test_a_part_that_hangs_on_nothing_is_named():
         K=sp.csr_array(K),
         M=sp.csr_array(sp.diags_array(np.where(np.arange(900) == 600, 0.0, 1.0))),
     )
-    with pytest.raises(ModelError, match=r"601:\+Z"):
-        normal_modes(loose, 5)
+    says(r"601:\+Z", normal_modes, loose, 5)
 
 
 @pytest.mark.parametrize("n", [50, 900])
@@ -227,8 +219,7 @@ def test_what_does_not_converge_names_the_mass_out_of_proportion(shell_box, monk
     M = shell_box.M.copy().tolil()
     M[heavy, heavy] = 1e5 * np.median(shell_box.M.diagonal()[shell_box.dofs[:, 1] <= 3])
     monkeypatch.setattr(eigen, "_LOOSE", -1.0)  # whatever converges is not enough
-    at = f"{shell_box.dofs[heavy, 0]}:"
-    with pytest.raises(AccuracyError, match=f"may be wrong: {at}.* has 1e\\+05 times"):
-        normal_modes(replace(shell_box, M=sp.csr_array(M)), 8)
-    with pytest.raises(AccuracyError, match="nearer to the modes"):
-        normal_modes(shell_box, 8, shift=-1e3)
+    said = f"may be wrong: {shell_box.dofs[heavy, 0]}:.* has 1e\\+05 times"
+    other = replace(shell_box, M=sp.csr_array(M))
+    says(said, normal_modes, other, 8, error=AccuracyError)
+    says("nearer to the modes", normal_modes, shell_box, 8, shift=-1e3, error=AccuracyError)

@@ -2,11 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.refusals import says
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import synthesise
 from chladni.dynamics.statespace import StateSpace, modal_model, state_space
-from chladni.errors import AccuracyError, LabelError, ShapeError
+from chladni.errors import AccuracyError
 
 F = np.linspace(3, 120, 50)
 OUT, IN = ("2:+Z", "5:-Z", "9:+Z"), ("5:-Z", "7:+Z")
@@ -64,11 +65,8 @@ def test_basis_of_the_states_does_not_matter(modal):
 
 def test_what_cannot_be_said_is_said(modal):
     ss = spaced(modal)
-    with pytest.raises(LabelError, match="both output and input"):
-        modal_model(replace(ss, inputs=("1:+Z", "3:+Z")))
-    with pytest.raises(AccuracyError, match="not passive"):
-        modal_model(replace(ss, B=-ss.B))
-    with pytest.raises(LabelError, match="transmissibility"):
-        spaced(modal, "transmissibility")
-    with pytest.raises(ShapeError, match=r"B is \(2, 1\).*\(2, 2\)"):
-        StateSpace(np.eye(2), np.ones((2, 1)), np.ones((1, 2)), np.ones((1, 2)), ("a",), ("b", "c"))
+    says("both output and input", modal_model, replace(ss, inputs=("1:+Z", "3:+Z")))
+    says("not passive", modal_model, replace(ss, B=-ss.B), error=AccuracyError)
+    says("transmissibility", spaced, modal, "transmissibility")
+    matrices = np.eye(2), np.ones((2, 1)), np.ones((1, 2)), np.ones((1, 2))
+    says(r"B is \(2, 1\).*\(2, 2\)", StateSpace, *matrices, ("a",), ("b", "c"))

@@ -5,22 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.modal_frfs import modal_frf
 
-from chladni.dynamics.frf import FRF
 from chladni.ema.coincident_poles import peak_notes, peaks, twins_joined
 from chladni.ema.identification import identify
 
-F, ZETA = np.array([40.0, 60.0, 90.0]), 0.01
+F = np.array([40.0, 60.0, 90.0])
 SHAPES = np.array([[1.0, 1.0, 0.3], [0.5, -1.0, 0.9], [0.2, 0.4, -1.0], [1.0, 0.3, 0.5]])
 
 
 @pytest.fixture(scope="module")
 def found():
-    frequency = np.linspace(20, 120, 800)
-    s, w = 2j * np.pi * frequency[:, None], 2 * np.pi * F
-    H = (SHAPES[:, None, :] * (s**2 / (s**2 + 2 * ZETA * w * s + w**2))).sum(axis=-1).T
-    labels = tuple(f"{k}:+Z" for k in range(1, len(SHAPES) + 1))
-    out = identify(FRF(H[:, :, None], frequency, labels, ("1:+Z",), "accelerance"), (25.0, 115.0))
+    frf = modal_frf(np.linspace(20, 120, 800), F, SHAPES)
+    out = identify(frf, (25.0, 115.0))
     return out.sel(out.inside & (out.frequency < 100))
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.builders.modal_frfs import modal_frf
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.frf_maps import mapped, misreadings
@@ -11,12 +12,9 @@ F = np.linspace(5, 200, 800)
 
 def plate_like(level=1.0):
     """Accelerance of four modes at three outputs, on both sides of 0 dB."""
-    s = 2j * np.pi * F
-    omega, zeta = 2 * np.pi * np.array([18.0, 47.0, 90.0, 140.0]), 0.01
-    h = s[:, None] ** 2 / (omega**2 + 2 * zeta * omega * s[:, None] + s[:, None] ** 2)
     phi = np.array([[1, 0.8, -0.6, 0.9], [0.7, -1, 0.9, 0.4], [-0.8, 0.5, 1, -0.7]])
-    H = level * np.einsum("fr,or,r->fo", h, phi, phi[0])[:, :, None]
-    return FRF(H, F, ("1:+Z", "2:+Z", "3:+Z"), ("1:+Z",), "accelerance")
+    frf = modal_frf(F, [18.0, 47.0, 90.0, 140.0], phi)
+    return with_values(frf, level * frf.values)
 
 
 def with_values(frf, values):

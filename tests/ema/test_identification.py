@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.modal_frfs import modal_sum, noisy
+from tests.builders.refusals import says
 
 from chladni.dynamics.frf import FRF
 from chladni.ema import pole_fitting as fitting
 from chladni.ema.identification import DERIVATIVES, Identified, equalised, evaluate, identify
-from chladni.errors import FileError
 from chladni_evidence.identification_evidence import recording, structure
 
 EVEN, LOG = np.linspace(20.0, 200.0, 500), np.geomspace(20.0, 200.0, 500)
@@ -30,21 +31,20 @@ class Truth:
         return self.omega * (-self.zeta + 1j * np.sqrt(1 - self.zeta**2))
 
     def values(self, s: np.ndarray, q: int, undamped: bool = False) -> np.ndarray:
-        s = s[:, None]
-        zeta = 0 * self.zeta if undamped else self.zeta
-        h = 1 / (s**2 + 2 * zeta * self.omega * s + self.omega**2)
-        H = np.einsum("ir,kr,jr->kij", self.phi, h, self.psi)
-        s = s[:, :, None]
+        zeta = 0.0 if undamped else self.zeta
+        H = modal_sum(s, self.omega / (2 * np.pi), self.phi, self.psi, zeta, 0)
+        s = s[:, None, None]
         return s**q * (H + self.lower / s**2 + self.upper)
 
     def frf(self, f: np.ndarray, quantity: str, noise: float) -> FRF:
         H = self.values(2j * np.pi * f, DERIVATIVES[quantity])
-        sd = noise * np.abs(H) + 0.1 * noise * np.sqrt((np.abs(H) ** 2).mean(axis=0))
-        hiss = self.rng.normal(size=(2, *H.shape)) / np.sqrt(2)
-        names = [f"{k}:+Z" for k in range(len(self.phi))]
-        inputs = tuple(names[: len(self.psi)])
-        H = H + sd * (hiss[0] + 1j * hiss[1])
-        return FRF(H, f, tuple(names), inputs, quantity, variance=sd**2)  # type: ignore[arg-type]
+        names = tuple(f"{k}:+Z" for k in range(len(self.phi)))
+        exact = FRF(H, f, names, names[: len(self.psi)], quantity)  # type: ignore[arg-type]
+        return noisy(exact, noise, 0.1 * noise, self.rng)
+
+    def misses(self, found: Identified) -> np.ndarray:
+        """Distance of the nearest pole to each true one, over its half bandwidth."""
+        return np.abs(found.poles[:, None] - self.poles).min(axis=0) / np.abs(self.poles.real)
 
 
 def a_truth(seed: int, r: int, n_out: int, n_in: int = 1, spacing: float = 0.0) -> Truth:
@@ -66,9 +66,8 @@ def test_poles_are_found_on_any_grid_in_any_quantity(f: np.ndarray, quantity: st
     """Twelve modes, 1 % noise: none missed, none invented, nothing left but noise."""
     truth = a_truth(0, 12, 6)
     found = identify(truth.frf(f, quantity, 0.01))
-    error = np.abs(found.poles[matched(found, truth)] - truth.poles) / np.abs(truth.poles.real)
     assert found.order == 12
-    assert error.max() < 0.1
+    assert truth.misses(found).max() < 0.1
     assert found.chi == pytest.approx(1.0, abs=0.03)
 
 
@@ -86,30 +85,17 @@ def test_errors_are_as_large_as_the_spread_says(f: np.ndarray) -> None:
         assert np.sqrt((score**2).mean()) == pytest.approx(1.0, abs=3 / np.sqrt(2 * score.size))
 
 
-def test_spread_shrinks_as_the_noise() -> None:
-    """Standard deviations are proportional to the noise (Cramer-Rao bound)."""
-    truth = a_truth(3, 8, 6)
-    coarse, fine = (identify(truth.frf(EVEN, "mobility", noise)) for noise in (0.02, 0.002))
-    np.testing.assert_allclose(coarse.frequency_sd / fine.frequency_sd, 10, rtol=0.15)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_single_response(seed: int) -> None:
-    truth = a_truth(seed, 8, 1)
-    found = identify(truth.frf(EVEN, "accelerance", 0.01))
-    error = np.abs(found.poles[matched(found, truth)] - truth.poles) / np.abs(truth.poles.real)
-    assert found.order == 8
-    assert error.max() < 0.2
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_close_modes_with_two_exciters(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("seed", "outputs", "inputs", "spacing"), [(0, 1, 1, 0.0), (1, 1, 1, 0.0), (0, 5, 2, 0.01)]
+)
+def test_one_response_or_close_modes_with_two_exciters(
+    seed: int, outputs: int, inputs: int, spacing: float
+) -> None:
     """Pairs 1 % apart."""
-    truth = a_truth(seed, 8, 5, n_in=2, spacing=0.01)
+    truth = a_truth(seed, 8, outputs, inputs, spacing)
     found = identify(truth.frf(EVEN, "accelerance", 0.01))
-    error = np.abs(found.poles[matched(found, truth)] - truth.poles) / np.abs(truth.poles.real)
     assert found.order == 8
-    assert error.max() < 0.1
+    assert truth.misses(found).max() < (0.2 if outputs == 1 else 0.1)
 
 
 def test_residues_and_residual_terms_without_noise() -> None:
@@ -202,9 +188,8 @@ def test_slope_is_the_derivative() -> None:
             h = 1e-6 * abs(p[k].real) * unit * (np.arange(4) == k)
             rise = fitting.solve(data, p + h)[0].chi2 - fitting.solve(data, p - h)[0].chi2
             due = -2 * slope.g[2 * k + part]
-            assert rise / (2 * abs(h[k])) == pytest.approx(
-                due, rel=2e-2, abs=1e-3 * abs(slope.g).max()
-            )
+            due, small = -2 * slope.g[2 * k + part], 1e-3 * abs(slope.g).max()
+            assert rise / (2 * abs(h[k])) == pytest.approx(due, rel=2e-2, abs=small)
 
 
 def test_vector_fitting_finds_poles_from_afar() -> None:
@@ -221,10 +206,8 @@ def test_vector_fitting_finds_poles_from_afar() -> None:
 
 
 def test_a_band_without_lines_is_refused() -> None:
-    with pytest.raises(
-        FileError, match=r"0 lines between [\d.]+ and [\d.]+ Hz .* covers 20 to 200 Hz"
-    ):
-        identify(a_truth(0, 4, 2).frf(EVEN, "mobility", 0.01), band=(300, 400))
+    said = r"0 lines between [\d.]+ and [\d.]+ Hz .* covers 20 to 200 Hz"
+    says(said, identify, a_truth(0, 4, 2).frf(EVEN, "mobility", 0.01), band=(300, 400))
 
 
 def test_a_distorted_resonance_is_one_mode() -> None:

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.modal_frfs import noisy
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.describing_functions import cubic, drag, gap_spring, micro_slip, slider
@@ -51,12 +52,11 @@ def recorded(level, kappa=None, control="force", seed=0, noise=2e-3, shift=(0.0,
         D = np.abs(linear[:, None] + w[0] ** 2 * kappa(A)) * A / level
         at = np.argmax(D >= 1, axis=1)
         added = kappa(A[at])
-    q = PHI[0] / np.stack([linear + w[0] ** 2 * added,
-                           w[1] ** 2 - omega**2 + 2j * ZETA * w[1] * omega], axis=1)  # fmt: skip
+    other = w[1] ** 2 - omega**2 + 2j * ZETA * w[1] * omega
+    q = PHI[0] / np.stack([linear + w[0] ** 2 * added, other], axis=1)
     H = -(omega[:, None, None] ** 2) * (q @ PHI.T)[:, :, None]
-    sd = noise * np.abs(H) + 1e-3 * noise * np.abs(H).max()
-    z = np.random.default_rng(seed).normal(size=(2, *H.shape)) / np.sqrt(2)
-    return FRF(H + sd * (z[0] + 1j * z[1]), F, OUT, DRIVE, "accelerance", variance=sd**2)
+    size = 1e-3 * noise * np.abs(H).max() / np.sqrt((np.abs(H) ** 2).mean(axis=0))
+    return noisy(FRF(H, F, OUT, DRIVE, "accelerance"), noise, size, seed)
 
 
 def at(level, kappa=None, control="force", **more):
@@ -166,8 +166,8 @@ def test_what_moves_every_mode_alike_is_a_drift():
     assert study.drift
     assert not study.nonlinear
     assert "drifted" in level_notes(study)[0]
-    alone = level_study([at(x, None, seed=k, shift=(d, 0)) for k, (x, d) in
-                         enumerate([(1.0, 0.0), (4.0, -4e-3), (16.0, -9e-3)])])  # fmt: skip
+    first = [at(x, None, seed=k, shift=(d, 0)) for k, x, d in ((1, 4, -4e-3), (2, 16, -9e-3))]
+    alone = level_study([runs[0], *first])
     assert alone.nonlinear
     assert alone.modes[0].signature == "softening"
 
@@ -180,8 +180,10 @@ def test_runs_that_differ_a_little_are_no_nonlinearity():
     assert not study.nonlinear
 
 
-def test_two_levels_have_a_trend_and_no_element():
-    kappa, _ = ELEMENTS["slider"]
+def test_one_level_says_nothing_and_two_have_a_trend_and_no_element():
+    one, kappa = at(1.0), ELEMENTS["slider"][0]
+    assert not level_study([one, one]).modes
+    assert level_notes(level_study([one, replace(one, level=None)])) == []
     study = level_study([at(1.0, kappa, "response"), at(16.0, kappa, "response", seed=1)])
     first = study.modes[0]
     assert first.signature == "friction"
@@ -196,12 +198,6 @@ def test_notes_name_the_mode_that_moves_alone():
     assert sum(note.startswith("nonlinear") for note in said) == 1
     calm = level_notes(level_study([at(1.0), at(8.0, seed=1)]))
     assert calm == ["no natural frequency or damping changes with level (1, 8)"]
-
-
-def test_one_level_says_nothing():
-    one = at(1.0)
-    assert not level_study([one, one]).modes
-    assert level_notes(level_study([one, replace(one, level=None)])) == []
 
 
 def test_a_mode_without_partner_is_not_followed():
@@ -321,10 +317,8 @@ def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control, kin
             for row in table.rows:
                 k = np.abs(size - 2 * np.pi * row.frequency_hz).argmin()
                 f = size[k] / (2 * np.pi)
-                held += [
-                    row.frequency_low_hz < f < row.frequency_high_hz,
-                    row.damping_low < zeta[k] < row.damping_high,
-                ]
+                held += [row.frequency_low_hz < f < row.frequency_high_hz,
+                         row.damping_low < zeta[k] < row.damping_high]  # fmt: skip
                 scores += [(row.frequency_hz - f) / row.frequency_sd_hz,
                            (row.damping - zeta[k]) / row.damping_sd]  # fmt: skip
                 assert 0 < row.damping_low < row.damping < row.damping_high

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import kstest
+from tests.builders.refusals import says
 
 from chladni.ema import condensed_lines, propagation
 from chladni.ema.condensed_lines import line_bins
@@ -18,7 +19,7 @@ from chladni.ema.response_variance import frf_variance
 from chladni.ema.shapes import real_shapes, shape_covariance, shape_sd, shape_spread, shapes
 from chladni_evidence.identification_evidence import recording, structure
 
-SEEDS, CHANNELS, MODES = 30, 6, 4
+SEEDS, CHANNELS, MODES = 24, 6, 4
 
 
 @pytest.fixture(scope="module")
@@ -111,30 +112,33 @@ def test_poles_and_residues_scatter_as_foretold(found):
     close_to_one(ratios, MODES * len(found) * (2 + 2 * CHANNELS))
 
 
-def test_shapes_scatter_as_foretold(found):
-    ratios = []
-    C = [shape_covariance(one) for one in found]
-    for k in range(MODES):
-        psi = np.array([real_shapes(one)[:, k] for one in found])
-        psi *= np.sign(psi @ psi[0])[:, None]
-        ratios.append(ratio(psi, [c[k] for c in C]))
-    close_to_one(ratios, MODES * len(found) * (CHANNELS - 1))
-    for one, c in zip(found, C, strict=True):  # a unit shape has no spread along itself
-        along = np.einsum("nr,rnm,mr->r", real_shapes(one), c, real_shapes(one))
-        assert (along < 1e-6 * np.trace(c, axis1=1, axis2=2)).all()
+@pytest.fixture(scope="module")
+def real(found):
+    """Real shapes of every run with one sign (runs, channels, modes), and their covariances."""
+    psi = np.array([real_shapes(one) for one in found])
+    psi *= np.sign(np.einsum("knr,nr->kr", psi, psi[0]))[:, None]
+    return psi, np.array([shape_covariance(one) for one in found])
 
 
-def test_noise_leaves_the_mac_that_is_foretold(found):
+def test_shapes_scatter_as_foretold(real):
+    """A unit shape has no spread along itself."""
+    psi, C = real
+    ratios = [ratio(psi[:, :, k], C[:, k]) for k in range(MODES)]
+    close_to_one(ratios, MODES * len(psi) * (CHANNELS - 1))
+    along = np.einsum("knr,krnm,kmr->kr", psi, C, psi)
+    assert (along < 1e-6 * np.trace(C, axis1=2, axis2=3)).all()
+
+
+def test_noise_leaves_the_mac_that_is_foretold(real):
     """Shapes of runs against the mean of all: 1 - MAC is the trace of the covariance."""
-    C = [shape_covariance(one) for one in found]
+    psi, C = real
     lost, due = [], []
     for k in range(MODES):
-        psi = np.array([real_shapes(one)[:, k] for one in found])
-        psi *= np.sign(psi @ psi[0])[:, None]
-        lost.append(1 - mac(psi.mean(axis=0)[:, None], psi.T).mean())
-        one = likeness(psi[:1].T, psi[0], np.mean(C, axis=0)[k], 0, np.array([0]))
+        every = psi[:, :, k]
+        lost.append(1 - mac(every.mean(axis=0)[:, None], every.T).mean())
+        one = likeness(every[:1].T, every[0], C[:, k].mean(axis=0), 0, np.array([0]))
         due.append(1 - one.noise_leaves)
-    close_to_one(np.divide(lost, due), MODES * len(found) * (CHANNELS - 1))
+    close_to_one(np.divide(lost, due), MODES * len(psi) * (CHANNELS - 1))
 
 
 def test_scaled_shapes_have_the_spread_that_is_written(found):
@@ -187,8 +191,8 @@ def test_modes_may_be_taken_one_after_the_other(found, monkeypatch):
 
 
 def test_no_covariance_is_said(found):
-    with pytest.raises(ValueError, match="no covariance"):
-        shape_covariance(replace(found[0], covariance=None))
+    none = replace(found[0], covariance=None)
+    says("no covariance", shape_covariance, none, error=ValueError)
 
 
 @pytest.mark.parametrize(("n", "trials"), [(4, 1), (12, 1), (12, 7)])

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.modal_frfs import modal_frf, modal_sum, noisy
 
-from chladni.dynamics.frf import FRF
 from chladni.ema.identification import equalised, identify
 from chladni.ema.recording_noise import equalised_error, equalised_noise, sample_noise
 
@@ -15,10 +15,9 @@ S = 2 * np.pi * np.geomspace(8, 115, 60) * (0.02 + 1j)
 DRAWS = 24
 
 
-def response(s, phi, damping=0.008):
-    w = 2 * np.pi * POLES
-    h = s[:, None] ** 2 / (w**2 + 2 * damping * w * s[:, None] + s[:, None] ** 2)
-    return np.einsum("or,fr,ir->foi", phi, h, phi[:1])
+PHI = np.random.default_rng(7).normal(size=(3, len(POLES)))
+EXACT = modal_frf(F, POLES, PHI, 0.008)
+EVERY = np.ones(len(F), bool)
 
 
 @pytest.fixture(scope="module")
@@ -27,19 +26,15 @@ def drawn():
 
     Last, χ² of Δ ln H within the columns of its error, and their number.
     """
-    rng = np.random.default_rng(7)
-    phi = rng.normal(size=(3, len(POLES)))
-    H, true = response(2j * np.pi * F, phi), response(S, phi, 0.0)
-    sd = 0.01 * np.abs(H) + 1e-3 * np.sqrt((np.abs(H) ** 2).mean(axis=0))
+    true = modal_sum(S, POLES, PHI, PHI[:1], 0.0)
     found, due, within = [], [], []
-    for _ in range(DRAWS):
-        noise = (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) * sd / np.sqrt(2)
-        frf = FRF(H + noise, F, ("a", "b", "c"), ("a",), "accelerance", variance=sd**2)
+    for k in range(DRAWS):
+        frf = noisy(EXACT, 0.01, 1e-3, k)
         modal = identify(frf)
-        found.append(np.abs(np.log10(equalised(modal, S) / true)) ** 2)
-        due.append(equalised_noise(modal, frf, S, np.ones(len(F), bool)))
-        error = equalised_error(modal, frf, S, np.ones(len(F), bool))
-        within.append(chi2(np.log(true / equalised(modal, S)), error))
+        log = np.log(equalised(modal, S) / true)
+        found.append(np.abs(log / np.log(10)) ** 2)
+        due.append(equalised_noise(modal, frf, S, EVERY))
+        within.append(chi2(-log, equalised_error(modal, frf, S, EVERY)))
     return np.array(found), np.array(due), np.array(within)
 
 
@@ -48,10 +43,8 @@ def chi2(delta, error):
     own, common = error
     each = [own * (np.arange(3) == o)[:, None] for o in range(3)]
     V = np.concatenate([*each, common]).reshape(-1, delta.size).T
-    V, r = (
-        np.concatenate([V.real, V.imag]),
-        np.concatenate([delta.real.ravel(), delta.imag.ravel()]),
-    )
+    V = np.concatenate([V.real, V.imag])
+    r = np.concatenate([delta.real.ravel(), delta.imag.ravel()])
     U, sd, _ = np.linalg.svd(V, full_matrices=False)
     kept = sd > 1e-3 * sd[0]  # beyond, second order is larger than the noise
     return ((U[:, kept].T @ r / sd[kept]) ** 2).sum(), kept.sum()
@@ -78,11 +71,8 @@ def test_is_in_proportion_to_the_variance_of_the_recording():
 
     The 1e-4 of |H| that is added to any variance is 1e-4 of this one.
     """
-    phi = np.random.default_rng(7).normal(size=(3, len(POLES)))
-    H = response(2j * np.pi * F, phi)
-    sd = 0.01 * np.abs(H) + 1e-3 * np.sqrt((np.abs(H) ** 2).mean(axis=0))
-    frf = FRF(H, F, ("a", "b", "c"), ("a",), "accelerance", variance=sd**2)
-    modal, use = replace(identify(frf), chi=1.0), np.ones(len(F), bool)
+    frf = replace(EXACT, variance=noisy(EXACT, 0.01, 1e-3).variance)
+    modal, use = replace(identify(frf), chi=1.0), EVERY
     twice = replace(frf, variance=4 * frf.variance)
     one, four = (equalised_noise(modal, f, S, use) for f in (frf, twice))
     np.testing.assert_allclose(four / one, 4.0, rtol=1e-3)
@@ -95,16 +85,14 @@ def test_samples_summed_as_independent_know_no_more_than_the_lines_they_come_fro
 
     The exact noise of a sample is smaller, for it is that of all lines of a mode at once.
     """
-    phi = np.random.default_rng(7).normal(size=(3, len(POLES)))
-    H = response(2j * np.pi * F, phi)
-    frf = FRF(H, F, ("a", "b", "c"), ("a",), "accelerance", variance=(0.01 * np.abs(H)) ** 2)
+    frf = replace(EXACT, variance=(0.01 * np.abs(EXACT.values)) ** 2)
     modal = replace(identify(frf), chi=1.0)
     high = S[S.imag > 2 * np.pi * 60]  # where a half-bandwidth holds lines enough
     dense = sample_noise(modal, frf, high)
     half = replace(frf, values=frf.values[::2], frequency=F[::2], variance=frf.variance[::2])
     sparse = sample_noise(modal, half, high)
     np.testing.assert_allclose((sparse / dense) ** 2, 2.0, rtol=0.1)
-    exact = np.sqrt(equalised_noise(modal, frf, high, np.ones(len(F), bool)))
+    exact = np.sqrt(equalised_noise(modal, frf, high, EVERY))
     assert np.median(exact) < np.median(dense)
 
 
@@ -116,13 +104,9 @@ def test_poles_far_below_the_band_are_as_sure_together_as_what_they_stand_for() 
     """
     rng = np.random.default_rng(0)
     f = np.geomspace(16, 310, 400)
-    w_r = 2 * np.pi * np.concatenate([[2.0, 3.1, 4.2], 27.0 * 1.4 ** np.arange(8)])
-    phi = rng.normal(size=(7, len(w_r)))
-    s = 2j * np.pi * f[:, None]
-    H = (s**2 / (s**2 + 0.02 * w_r * s + w_r**2) * phi[0]) @ phi[1:].T
-    H = H * (1 + 0.01 / np.sqrt(2) * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)))
-    labels = tuple(f"{k}:+Z" for k in range(6))
-    frf = FRF(H[:, :, None], f, labels, ("9:+Z",), "accelerance")
+    hertz = np.concatenate([[2.0, 3.1, 4.2], 27.0 * 1.4 ** np.arange(8)])
+    frf = modal_frf(f, hertz, rng.normal(size=(7, len(hertz))))
+    frf = noisy(frf.sel(frf.outputs[1:]), 0.01, seed=0, stated=False)
     found = identify(frf)
     far = np.append(found.poles, 2 * np.pi * np.array([2.1, 4.0]) * (-0.01 + 1j))
     order = np.argsort(np.abs(far))

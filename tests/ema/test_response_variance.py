@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.modal_frfs import modal_frf, modal_sum, noisy
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import Identified, equalised, identify
@@ -52,12 +53,9 @@ def test_both_parts_of_the_noise_are_told_apart() -> None:
 
 def faint_mode(f: np.ndarray) -> FRF:
     """Three strong modes and one a thousand times fainter, known exactly."""
-    w, wr = 2 * np.pi * f[:, None], 2 * np.pi * np.array([30.0, 60.0, 95.0, 150.0])
-    h = -(w**2) / (wr**2 - w**2 + 2j * np.array([0.01, 0.006, 0.004, 0.008]) * wr * w)
-    shapes = np.random.default_rng(3).normal(size=(5, 4)) * [1, 1, 1e-3, 1]
-    H = (h @ shapes.T)[:, :, None]
-    labels = tuple(f"{k}:+Z" for k in range(5))
-    return FRF(H, f, labels, ("9:+Z",), "accelerance")
+    shapes = np.random.default_rng(3).normal(size=(6, 4)) * [1, 1, 1e-3, 1]
+    shapes[0] = 1.0
+    return modal_frf(f, [30.0, 60.0, 95.0, 150.0], shapes, [0.01, 0.006, 0.004, 0.008])
 
 
 def test_exact_data_are_met_exactly_with_a_gap_on_a_log_grid() -> None:
@@ -108,18 +106,11 @@ def test_bodies_that_bounce_below_the_band_are_felt_where_the_recording_is_faint
     """
     rng = np.random.default_rng(seed)
     f = np.geomspace(16, 310, 500)
-    w_r = 2 * np.pi * np.concatenate([[6.3, 10.7, 12.4], 27.0 * 1.35 ** np.arange(9)])
-    phi = rng.normal(size=(7, len(w_r))) * np.where(w_r < 100, 0.3, 1.0)
-
-    def accelerance(s: np.ndarray, zeta: float) -> np.ndarray:
-        d = s[:, None] ** 2 + 2 * zeta * w_r * s[:, None] + w_r**2
-        return ((s[:, None] ** 2 / d) * phi[0]) @ phi[1:].T
-
-    H = accelerance(2j * np.pi * f, 0.01)
-    noise = (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) * 0.01 / np.sqrt(2)
-    labels = tuple(f"{k}:+Z" for k in range(6))
-    frf = FRF((H * (1 + noise))[:, :, None], f, labels, ("9:+Z",), "accelerance")
+    hertz = np.concatenate([[6.3, 10.7, 12.4], 27.0 * 1.35 ** np.arange(9)])
+    phi = rng.normal(size=(7, len(hertz))) * np.where(hertz < 16, 0.3, 1.0)
+    frf = modal_frf(f, hertz, phi)
+    frf = noisy(frf.sel(frf.outputs[1:]), 0.01, seed=seed, stated=False)
     s = 2 * np.pi * np.geomspace(20, 45, 20) * (0.08 + 1j)
-    exact = accelerance(s, 0.0)
+    exact = modal_sum(s, hertz, phi[1:], phi[:1], 0.0)[..., 0]
     off = np.linalg.norm(equalised(identify(frf), s)[..., 0] - exact, axis=1)
     assert (off / np.linalg.norm(exact, axis=1)).max() < 0.01

@@ -1,8 +1,8 @@
 """Lines that screening needs: all of a short recording, of a long one those of its resonances."""
 
 import numpy as np
+from tests.builders.modal_frfs import modal_frf
 
-from chladni.dynamics.frf import FRF
 from chladni.ema.identification import identify
 from chladni.ema.recording_screening import strong_modes
 from chladni.ema.screening_lines import screening_lines
@@ -33,12 +33,9 @@ def test_a_twentieth_of_the_lines_shows_every_mode() -> None:
 def test_resonances_as_narrow_as_the_lines_are_apart_keep_theirs() -> None:
     """However long the recording: three lines about each peak, no fewer than at full length."""
     f = np.linspace(10.0, 2000.0, 6000)
-    omega, omega_r = 2 * np.pi * f[:, None], 2 * np.pi * np.array([301.0, 777.7, 1500.2])
-    h = -(omega**2) / (omega_r**2 - omega**2 + 2e-3j * omega_r * omega)
-    shapes = np.random.default_rng(582).normal(size=(30, 3))
-    labels = tuple(f"{k + 1}:+Z" for k in range(30))
-    frf = FRF((h @ shapes.T)[:, :, None], f, labels, labels[:1], "accelerance")
+    hertz = np.array([301.0, 777.7, 1500.2])
+    frf = modal_frf(f, hertz, np.random.default_rng(582).normal(size=(30, 3)), 1e-3)
     use = screening_lines(frf)
     assert use.sum() < 1000
-    for one in omega_r / (2 * np.pi):
+    for one in hertz:
         assert use[np.abs(f - one).argsort()[:3]].all()

@@ -4,11 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.elements import CUBE, bars
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
-from chladni.fem.energy import mass_properties, part_energies, rigid_motions, shell_energies
-from chladni_specimens.plates import STEEL, box, folded_panel, plate
+from chladni.fem.energy import (
+    beam_energies,
+    mass_properties,
+    part_energies,
+    part_kinetic_energies,
+    shell_energies,
+    solid_energies,
+)
+from chladni.model.assembly import Assembly, Masses, Solids
+from chladni.model.properties import BeamSection, Part, SolidSection
+from chladni_specimens.plates import STEEL, folded_panel, plate
 
 
 def test_mass_and_centre_of_a_plate():
@@ -29,14 +39,6 @@ def test_centre_moves_with_the_structure():
     np.testing.assert_allclose(moved[1], c + shift, atol=1e-9)
 
 
-def test_rigid_motions_cost_no_energy():
-    s = structure(box())
-    R = rigid_motions(s.assembly)
-    assert np.abs(s.T.T @ R).max() > 0
-    energy = np.einsum("nr,nr->r", s.T.T @ R, s.system.K @ (s.T.T @ R))
-    assert energy.max() < 1e-9 * s.system.K.diagonal().max()
-
-
 def test_shares_of_all_parts_add_up():
     """Σ_p φᵀ K_p φ = φᵀ K φ = ω², and Σ_e ½ φᵀ K_e φ = ½ ω²."""
     s = structure(folded_panel())
@@ -50,3 +52,53 @@ def test_shares_of_all_parts_add_up():
     np.testing.assert_allclose(energy.sum(axis=0), omega**2 / 2, rtol=1e-6)
     of_flanges = energy[s.assembly.shells.part == 1].sum(axis=0) / energy.sum(axis=0)
     np.testing.assert_allclose(of_flanges, share[1], rtol=1e-6)
+
+
+def block_with_a_mast():
+    """Two bricks on top of each other, clamped below, and a mast of two beams on a corner."""
+    points = np.vstack([CUBE, CUBE[4:] + np.array([0, 0, 1]), [[1, 1, 3.0], [1, 1, 4.0]]])
+    solids = Solids(np.array([1, 2]), np.array([range(8), range(4, 12)]), np.array([0, 1]))
+    block = SolidSection(STEEL)
+    mast = Part(3, "mast", BeamSection(STEEL, 1e-3, 1e-6, 2e-6, 0, 3e-6))
+    held = [(n, c) for n in range(4) for c in (1, 2, 3)] + [(10, c) for c in (4, 5, 6)]
+    masses = Masses(np.array([9]), np.array([13]), 5 * np.diag([1.0, 1, 1, 0, 0, 0])[None])
+    return Assembly(
+        np.arange(1, 15), points, (Part(1, "low", block), Part(2, "high", block), mast),
+        solids=(solids,), beams=bars([[10, 12], [12, 13]], 2, (1, 0, 0)), masses=masses,
+        supports=np.array(held),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def mast():
+    built = structure(block_with_a_mast())
+    return built, normal_modes(built.system, 6)
+
+
+def test_elements_add_up_to_the_eigenvalue(mast):
+    """Σ_e ½ uᵀ K_e u = ½ ω²: nothing of the strain energy is lost between the families."""
+    built, modal = mast
+    total = beam_energies(built, modal.shapes).sum(axis=0)
+    total = total + sum(e.sum(axis=0) for e in solid_energies(built, modal.shapes))
+    np.testing.assert_allclose(total, (2 * np.pi * modal.frequency) ** 2 / 2, rtol=1e-8)
+
+
+def test_parts_equal_their_elements(mast):
+    built, modal = mast
+    share = part_energies(built, modal.shapes)
+    whole = (2 * np.pi * modal.frequency) ** 2 / 2
+    bricks = solid_energies(built, modal.shapes)[0]
+    np.testing.assert_allclose(share[:2], bricks / whole, rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(
+        share[2], beam_energies(built, modal.shapes).sum(axis=0) / whole, rtol=1e-8
+    )
+
+
+def test_kinetic_energy_is_shared_by_parts_and_point_masses(mast):
+    """Shares and the point mass's ½ m v² add up to one; a light mast leads the first mode."""
+    built, modal = mast
+    share = part_kinetic_energies(built, modal.shapes)
+    u = (built.T @ modal.shapes).reshape(-1, 6, 6)
+    point = 5 * np.sum(u[13, :3] ** 2, axis=0)
+    np.testing.assert_allclose(share.sum(axis=0) + point, 1, rtol=1e-9)
+    assert point[0] + share[2, 0] > 0.9

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
+from tests.builders.elements import bars
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.system import System
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck
-from chladni.model.assembly import Beams, Equation
+from chladni.model.assembly import Equation
 from chladni.model.properties import BeamSection, Isotropic, Part
 from chladni_specimens.plates import plate
 
@@ -97,27 +98,17 @@ def strutted(cells, held):
     sheet = plate(0.3, 0.2, cells, cells, 1e-3)
     n, corners = len(sheet.points), (0, len(sheet.points) - 1)
     along = np.diff(sheet.points[list(corners)], axis=0)
-    bar = Beams(
-        np.array([9001]), np.array([[n, n + 1]]), np.ones(1, int), np.array([[0.0, 0, 1]]),
-        np.zeros((1, 2, 3)), np.zeros((1, 2, 6), bool),
-    )  # fmt: skip
+    bar = bars([[n, n + 1]], 1, (0, 0, 1))
     section = BeamSection(Isotropic(210e9, 0.3, 0.0), 1e-6, 1e-9, 1e-9, 0.0, 2e-9, (0, 0))
-    balls = tuple(
-        Equation(1, (n + k, c), (d, d), (1.0, -1.0))
-        for k, c in enumerate(corners)
-        for d in (1, 2, 3)
-    )
+    balls = tuple(Equation(1, (n + k, c), (d, d), (1.0, -1.0))
+                  for k, c in enumerate(corners) for d in (1, 2, 3))  # fmt: skip
     axial = Equation(2, (n, n), (4, 5), tuple(along[0, :2]))  # of the rotation of one end
-    return structure(
-        replace(
-            sheet,
-            ids=np.arange(1, n + 3),
-            points=np.vstack([sheet.points, sheet.points[list(corners)]]),
-            parts=(*sheet.parts, Part(99, "strut", section)),
-            beams=bar,
-            rigid=(*balls, axial) if held else balls,
-        )
-    ).system
+    made = replace(
+        sheet, ids=np.arange(1, n + 3), points=np.vstack([sheet.points, sheet.points[[*corners]]]),
+        parts=(*sheet.parts, Part(99, "strut", section)), beams=bar,
+        rigid=(*balls, axial) if held else balls,
+    )  # fmt: skip
+    return structure(made).system
 
 
 @pytest.mark.parametrize("cells", [4, 14])

@@ -1,6 +1,7 @@
 """Modes without strain: those of the whole structure are none of a part that a part is loose."""
 
 import pytest
+from tests.builders.elements import CUBE
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
@@ -68,16 +69,14 @@ def test_a_free_plate_is_whole_and_two_are_not():
 
 def blocks(shared: str, turned: bool) -> str:
     """Two cubes of steel that share a face, an edge or a corner; in turned frames where said."""
-    cube = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     step = {"face": (1, 0, 0), "edge": (1, 1, 0), "corner": (1, 1, 1)}[shared]
-    second = [tuple(a + b for a, b in zip(p, step, strict=True)) for p in cube]
-    points = list(dict.fromkeys(cube + second))
-    grids = [f"GRID,{k},,{x}.,{y}.,{z}.,{8 * turned}" for k, (x, y, z) in enumerate(points, 1)]
-    solids = [
-        f"CHEXA,{k},1,{','.join(str(points.index(p) + 1) for p in body[:6])}\n"
-        f",{','.join(str(points.index(p) + 1) for p in body[6:])}"
-        for k, body in enumerate((cube, second), 1)
-    ]
+    cubes = [[tuple(x) for x in (CUBE + at).tolist()] for at in ((0, 0, 0), step)]
+    points = list(dict.fromkeys(cubes[0] + cubes[1]))
+    grids = [f"GRID,{k},,{x},{y},{z},{8 * turned}" for k, (x, y, z) in enumerate(points, 1)]
+    solids = []
+    for k, body in enumerate(cubes, 1):
+        corners = [str(points.index(p) + 1) for p in body]
+        solids += [f"CHEXA,{k},1,{','.join(corners[:6])}", f",{','.join(corners[6:])}"]
     other = ["PSOLID,1,1", "MAT1,1,2.+11,,.3,7800.", "CORD2R,8,,0.,0.,0.,1.,2.,3.", ",2.,0.,1."]
     return "\n".join(["SOL 103", "CEND", "BEGIN BULK", *grids, *solids, *other, "ENDDATA"])
 

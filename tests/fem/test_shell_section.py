@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.refusals import says
 
-from chladni.errors import ModelError
 from chladni.fem import shell
 from chladni.fem.shell_section import modulus_derivative, section_arrays
 from chladni.model.properties import Anisotropic, Isotropic, Orthotropic, ShellSection, SolidSection
@@ -27,6 +27,11 @@ def panel(material=PLY):
         axis=np.tile([1.0, 0.7, 0.2], (len(nodes), 1)),
     )
     return replace(shape, shells=shells)
+
+
+def of_all(assembly, **section):
+    """The assembly with other section values of all parts."""
+    return assembly.with_parts(tuple(p.with_section(**section) for p in assembly.parts))
 
 
 def element_matrices(assembly):
@@ -79,8 +84,7 @@ def test_modulus_derivative_of_orthotropic_elements(name):
 
     def K(h):
         material = replace(PLY, **{name: scale * (1 + h)})
-        parts = tuple(p.with_section(membrane=material, bending=material) for p in assembly.parts)
-        return element_matrices(assembly.with_parts(parts))[2]
+        return element_matrices(of_all(assembly, membrane=material, bending=material))[2]
 
     assert orders(K, dK) == pytest.approx(2.0, abs=0.05)
 
@@ -93,8 +97,7 @@ def test_transverse_modulus_derivative():
 
     def K(h):
         soft = replace(PLY, G1z=PLY.G1z * (1 + h), G2z=PLY.G2z * (1 + h))
-        parts = tuple(p.with_section(shear=soft) for p in assembly.parts)
-        return element_matrices(assembly.with_parts(parts))[2]
+        return element_matrices(of_all(assembly, shear=soft))[2]
 
     assert orders(K, dK) == pytest.approx(2.0, abs=0.05)
 
@@ -118,8 +121,7 @@ def test_orthotropic_moduli_of_an_isotropic_sheet():
         for name, value in (("E1", STEEL.E), ("E2", STEEL.E), ("G12", STEEL.shear_modulus))
     )
     np.testing.assert_allclose(parts, STEEL.E * modulus_derivative(STEEL, "E"), rtol=1e-12)
-    with pytest.raises(ModelError, match="E1, E2"):
-        modulus_derivative(STEEL, "E3")
+    says("E1, E2", modulus_derivative, STEEL, "E3")
 
 
 def test_stiffness_is_linear_in_every_part():
@@ -172,17 +174,12 @@ def test_isotropic_shear_and_residual_bending():
 def test_sections_without_bending_or_shear():
     """A membrane has no plate stiffness; MID3 blank has residual bending alone."""
     shape = panel(STEEL)
-    flat = shape.with_parts(tuple(p.with_section(bending=None) for p in shape.parts))
-    s = section_arrays(flat)
+    s = section_arrays(of_all(shape, bending=None))
     assert not s.S.any()
     assert not s.Qb.any()
-    stiff = shape.with_parts(tuple(p.with_section(rigid_shear=True) for p in shape.parts))
-    soft = section_arrays(shape)
-    np.testing.assert_allclose(
-        section_arrays(stiff).residual_flexibility, soft.residual_flexibility
-    )
-    ratio = section_arrays(stiff).shear_flexibility / soft.shear_flexibility[0, 0, 0, 0]
-    assert ratio.max() < 0.01
+    stiff, soft = section_arrays(of_all(shape, rigid_shear=True)), section_arrays(shape)
+    np.testing.assert_allclose(stiff.residual_flexibility, soft.residual_flexibility)
+    assert (stiff.shear_flexibility / soft.shear_flexibility[0, 0, 0, 0]).max() < 0.01
 
 
 def test_anisotropic_axes_turn():
@@ -197,11 +194,9 @@ def test_anisotropic_axes_turn():
 def test_faults_are_named():
     shape = panel(STEEL)
     thin = replace(shape.shells, thickness=np.zeros_like(shape.shells.thickness))
-    with pytest.raises(ModelError, match="no thickness"):
-        section_arrays(replace(shape, shells=thin))
+    says("no thickness", section_arrays, replace(shape, shells=thin))
     solid = tuple(replace(p, section=SolidSection(STEEL)) for p in shape.parts)
-    with pytest.raises(ModelError, match="panel"):
-        section_arrays(shape.with_parts(solid))
+    says("panel", section_arrays, shape.with_parts(solid))
 
 
 def test_rho_and_nonstructural_mass_come_from_the_section():
@@ -215,8 +210,7 @@ def test_rho_and_nonstructural_mass_come_from_the_section():
 def test_a_plate_without_membrane_is_a_plate():
     """MID1 blank: the stiffness is finite and that of bending and shear alone."""
     shape = panel(STEEL)
-    parts = tuple(p.with_section(membrane=None) for p in shape.parts)
-    _, s, K = element_matrices(shape.with_parts(parts))
+    _, s, K = element_matrices(of_all(shape, membrane=None))
     _, whole, _ = element_matrices(shape)
     geo = shell.geometry(shape.points, shape.shells)
     due = shell.stiffness(geo, shape.shells.thickness, Qb=whole.Qb, S=whole.S)

@@ -1,8 +1,9 @@
 import numpy as np
 from numpy.testing import assert_allclose
+from tests.builders.elements import bush, scalar
 
 from chladni.fem import spring
-from chladni.model.assembly import Assembly, Bushes, Masses, Scalars
+from chladni.model.assembly import Assembly, Masses
 
 
 def frames(n, seed=0):
@@ -10,30 +11,15 @@ def frames(n, seed=0):
     return Q * np.linalg.det(Q)[:, None, None]
 
 
-def scalars(nodes, component, value, damping=0.0):
-    return Scalars(
-        np.array([1]), np.array([nodes]), np.array([component]), np.array([value]),
-        np.array([damping]),
-    )  # fmt: skip
-
-
 def assembly(**families):
     points = np.array([[0.0, 0, 0], [1, 2, 0.5], [3, 1, 1]])
     return Assembly(np.array([1, 2, 3]), points, (), **families)
 
 
-def bush(nodes, place, k, viscous=0.0, loss=0.0):
-    one = np.ones((1, 6))
-    return Bushes(
-        np.array([1]), np.array([nodes]), frames(1), np.array([place], float),
-        np.array([k], float), viscous * one, loss * one,
-    )  # fmt: skip
-
-
 def test_spring_between_components_of_two_frames():
     """k (q_a - q_b)²: energy of motions counted along the points' own axes."""
     axes = frames(3)
-    made = assembly(springs=scalars((0, 2), (2, 3), 5.0, 0.1), axes=axes)
+    made = assembly(springs=scalar((0, 2), (2, 3), 5.0, 0.1), axes=axes)
     K, V, M, loss = spring.matrices(made)
     u = np.random.default_rng(1).normal(size=18)
     stretch = axes[0, 1] @ u[:3] - axes[2, 2] @ u[12:15]
@@ -46,8 +32,8 @@ def test_grounded_rotational_damper_and_mass():
     """A grounded end (-1) takes no part; components 4-6 turn about the point's axes."""
     axes = frames(3)
     made = assembly(
-        dampers=scalars((1, -1), (5, 1), 2.0),
-        scalar_masses=scalars((1, -1), (1, 1), 3.0),
+        dampers=scalar((1, -1), (5, 1), 2.0),
+        scalar_masses=scalar((1, -1), (1, 1), 3.0),
         axes=axes,
     )
     _, V, M, _ = spring.matrices(made)
@@ -57,13 +43,13 @@ def test_grounded_rotational_damper_and_mass():
 
 
 def test_scalars_without_frames():
-    K, *_ = spring.matrices(assembly(springs=scalars((0, 1), (1, 1), 7.0)))
+    K, *_ = spring.matrices(assembly(springs=scalar((0, 1), (1, 1), 7.0)))
     assert_allclose(K.toarray()[[0, 0, 6], [0, 6, 6]], [7, -7, 7])
 
 
 def test_bush_is_blind_to_rigid_motion():
     """Rigid arms lead to the spring wherever it sits: no held rotation over a gap."""
-    made = assembly(bushes=bush((0, 1), (5, -3, 2), [1, 2, 3, 4, 5, 6]))
+    made = assembly(bushes=bush((0, 1), (5, -3, 2), [1, 2, 3, 4, 5, 6], frames(1)[0]))
     K, *_ = spring.matrices(made)
     for motion in np.eye(6):
         u = np.hstack([motion[:3] + np.cross(motion[3:], made.points), np.tile(motion[3:], (3, 1))])
@@ -73,7 +59,7 @@ def test_bush_is_blind_to_rigid_motion():
 def test_bush_in_its_own_frame_with_losses():
     """½ Σ k_i δ_i², δ along the frame's axes at the place of the spring; V and loss likewise."""
     k = np.array([1.0, 2, 3, 4, 5, 6])
-    made = assembly(bushes=bush((0, 1), (0.5, 0, 0), k, viscous=0.3, loss=0.2))
+    made = assembly(bushes=bush((0, 1), (0.5, 0, 0), k, frames(1)[0], 0.3, 0.2))
     K, V, _, loss = spring.matrices(made)
     u = np.random.default_rng(3).normal(size=18)
     R, arms = frames(1)[0], np.array([0.5, 0, 0]) - made.points
@@ -85,7 +71,7 @@ def test_bush_in_its_own_frame_with_losses():
 
 
 def test_grounded_bush():
-    made = assembly(bushes=bush((1, -1), (1, 2, 0.5), [1, 1, 1, 0, 0, 0]))
+    made = assembly(bushes=bush((1, -1), (1, 2, 0.5), [1, 1, 1, 0, 0, 0], frames(1)[0]))
     K, *_ = spring.matrices(made)
     expected = np.zeros(K.shape)
     expected[6:9, 6:9] = np.eye(3)

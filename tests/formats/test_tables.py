@@ -1,4 +1,4 @@
-"""Tables: round trips to the last digit; one sentence for each kind of fault."""
+"""Tables: round trips to the last digit, in every form that programs write."""
 
 import re
 from dataclasses import replace
@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
+from tests.builders.refusals import says
 
 import chladni
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import PoleTable
-from chladni.errors import FileError
 from chladni.io.tables.csv_table import escaped, unescaped
 from chladni.io.tables.read_tables import read_poles, read_recordings
 from chladni.io.tables.sensor_table import read_sensors
@@ -76,11 +76,9 @@ def test_labels_come_back_whatever_they_are(tmp_path, H):
 
 def test_every_table_is_written_by_one_function():
     """No other module makes rows of cells."""
-    source = Path(chladni.__file__).parents[1]
-    makers = {
-        p.name for p in source.rglob("*.py") if re.search(r"csv\.(Dict)?[wW]rit", p.read_text())
-    }
-    assert makers == {"csv_table.py"}
+    every = Path(chladni.__file__).parents[1].rglob("*.py")
+    makers = [p.name for p in every if re.search(r"csv\.(Dict)?[wW]rit", p.read_text())]
+    assert makers == ["csv_table.py"]
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz"])
@@ -123,8 +121,7 @@ def test_a_mat_holds_frfs_by_the_names_of_npz(tmp_path, H, outputs, inputs):
 )  # fmt: skip
 def test_a_mat_of_other_frfs_is_a_sentence(tmp_path, held, said):
     savemat(tmp_path / "a.mat", held)
-    with pytest.raises(FileError, match=rf"a\.mat: .*{said}"):
-        read_recordings(tmp_path / "a.mat")
+    says(rf"a\.mat: .*{said}", read_recordings, tmp_path / "a.mat")
 
 
 def test_order_of_rows_and_columns_is_free(tmp_path, H):
@@ -160,12 +157,6 @@ def test_time_data_as_windows_programs_write_them(tmp_path, mark):
     (read,) = read_recordings(tmp_path / "a.csv")
     assert (read.time.rate, read.time.quantity) == (64.0, "accelerance")
     np.testing.assert_allclose(read.time.response[0, 0, :3], [0.25, 1.25, 2.25])
-
-
-def test_a_decimal_comma_beside_a_decimal_point_is_not_guessed(tmp_path):
-    (tmp_path / "a.csv").write_text("mode;frequency_hz\n1;1,234\n2;2.5\n")
-    with pytest.raises(FileError, match="line 2: frequency_hz is '1,234', which is not a number"):
-        read_recordings(tmp_path / "a.csv")
 
 
 def test_levels_and_articles_are_recordings_of_their_own(tmp_path):
@@ -214,9 +205,6 @@ def test_sensors_of_every_kind(tmp_path):
     assert (base.grid, base.place) == (None, None)
 
 
-HEAD = "frequency_hz,output,input,real,imag\n"
-
-
 @pytest.mark.parametrize(("phase", "in_a_turn"), [("phase_deg", 360), ("phase_rad", 2 * np.pi)])
 def test_magnitude_and_phase_are_real_and_imaginary_part(tmp_path, phase, in_a_turn):
     H = np.array([2.0 - 3j, -1e-3j, -4.0])
@@ -230,85 +218,9 @@ def test_magnitude_and_phase_are_real_and_imaginary_part(tmp_path, phase, in_a_t
     np.testing.assert_allclose(read.frf.values.ravel(), H, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("", "empty"),
-        (HEAD, "no rows"),
-        (HEAD.strip() + ",level\n1,1:+Z,1:+Z,1,1,-2\n", "line 2: level is -2"),
-        ("frequency_hz,level\n1,2\n", "line 1: neither FRFs .* nor poles .*; there are freq"),
-        ("frequency_hz,magnitude\n1,2\n", "line 1: no column output, input, phase_deg; there are"),
-        (HEAD.replace("real", "magnitude"), "line 1: no column phase_deg; there are"),
-        (HEAD.replace("real,imag", "magnitude,phase_rad,phase_deg"), "column 'phase_rad'; known"),
-        ("frequency_hz,output,real,imag\n1,1:+Z,1,1\n", "no column input"),
-        ("frequency_hz,output,input,real,imag,phase\n", "unknown column 'phase'; known are"),
-        (
-            "frequency_hz,output,input,magnitude,phase_rad\n1,1:+Z,1:+Z,-9,1\n",
-            "line 2: a magnitude cannot be -9; convert decibels",
-        ),
-        (HEAD + "1,1:+Z,1:+Z,1\n", "line 2: 4 cells, the header has 5"),
-        (HEAD + "1,1:+Z,1:+Z,1,1\n2,1:+Z,1:+Z,nan,1\n", "line 3: real is 'nan'"),
-        (HEAD + "1,1:+Z,1:+Z,1,one\n", "line 2: imag is 'one'"),
-        (HEAD + "1,1:+Z,1:+Z,1,1\n1,1:+Z,1:+Z,1,1\n", "line 3: .* twice; several levels"),
-        (HEAD + "1,1:+Z,1:+Z,1,1\n2,2:+Z,1:+Z,1,1\n", "2:.Z / 1:.Z has no line at 1 Hz"),
-        (HEAD + "1,1:+Z,1:+Z,0,0\n", "the FRF is empty"),
-    ],
-)
-def test_faults_of_a_table(tmp_path, text, said):
-    (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(FileError, match=said) as error:
-        read_recordings(tmp_path / "a.csv", "mobility")
-    assert "a.csv" in str(error.value)
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("row", "said"),
-    [
-        ("2:+Z,,,,,up,,", "line 2: direction 'up'; write"),
-        ("2:+Z,,1,,,,,", "line 2: a place needs x, y and z"),
-        ("2:+Z,3,1,1,1,,,", "both a grid and a place"),
-        ("2:+Z,3,,,,,sensor,", "role 'sensor'; there are output and input"),
-        ("tip:+Z,,,,,,,", "names no node"),
-        ("2:+Z,,,,,,,-1", "cannot be negative"),
-        ("2:+Z,,,,,,,\n2:+Z,,,,,,,", "line 3: output 2:.Z is already in line 2"),
-    ],
-)
-def test_faults_of_the_sensors(tmp_path, row, said):
-    (tmp_path / "s.csv").write_text(f"label,grid,x,y,z,direction,role,mass\n{row}\n")
-    with pytest.raises(FileError, match=said):
-        read_sensors(tmp_path / "s.csv")
-
-
-def test_faults_of_an_archive(tmp_path, H):
-    path = tmp_path / "a.npz"
-    write_npz(path, H)
-    arrays = dict(np.load(path, allow_pickle=False))
-    for change, said in (
-        ({"outputs": np.array(["1:+Z"])}, r"labels and frequencies say \(20, 1, 2\)"),
-        ({"values": np.where(np.arange(20)[:, None, None] == 3, 1e280, H.values)}, "not a number"),
-        ({"outputs": np.array([{}], dtype=object)}, "cannot be read"),
-        ({"frequency_hz": np.ones(20)}, "frequencies must increase"),
-    ):
-        np.savez(path, **(arrays | change))
-        with pytest.raises(FileError, match=said):
-            read_recordings(path)
-    path.write_bytes(path.read_bytes()[:100])
-    with pytest.raises(FileError, match="cannot be read"):
-        read_recordings(path)
-
-
 def test_the_quantity_must_be_known(tmp_path, H):
     write_csv(tmp_path / "a.csv", replace(H, variance=None))
-    with pytest.raises(FileError, match="does not say its quantity: one of receptance"):
-        read_recordings(tmp_path / "a.csv")
-    with pytest.raises(FileError, match=r"end in .uff, .unv, .npz, .csv, .mat or .wav, not '.txt'"):
-        read_recordings(tmp_path / "a.txt")
-
-
-@pytest.mark.parametrize("text", ["1_0", "\u0661\u0660", "nan", "inf", "1e999", "0x10", "1\u00b2"])
-def test_what_python_alone_takes_for_a_number_is_none(tmp_path, text):
-    path = tmp_path / "poles.csv"
-    path.write_text(f"mode,frequency_hz\n1,5.\n2,{text}\n", encoding="utf-8")
-    with pytest.raises(FileError, match=r"line 3: frequency_hz is .* not a number"):
-        read_poles(path)
+    said = "does not say its quantity: one of receptance"
+    says(said, read_recordings, tmp_path / "a.csv")
+    said = r"end in .uff, .unv, .npz, .csv, .mat or .wav, not '.txt'"
+    says(said, read_recordings, tmp_path / "a.txt")

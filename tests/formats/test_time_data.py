@@ -1,13 +1,11 @@
 """One test as WAV, MAT, CSV, NPZ and universal file; what is wrong is one sentence."""
 
-import re
-
 import numpy as np
 import pytest
 import pyuff
 from scipy.io import savemat, wavfile
+from tests.builders.refusals import says
 
-from chladni.errors import ChladniError
 from chladni.io.tables.read_tables import read_recordings
 
 RATE, N = 2048.0, 600
@@ -27,24 +25,20 @@ def csv(path, unit="m/s^2"):
 
 def universal(path, blocks=1):
     file = pyuff.UFF(str(path))
-    channels = [
-        (FORCE[0], 13, "N", 7, 3),
-        (MOTION[0], 12, "g", 7, 3),
-        (MOTION[1], 12, "mm/s^2", 9, -1),
-    ]
-    for _ in range(blocks):
-        for y, kind, unit, node, way in channels:
-            file.write_sets(
-                {
-                    "type": 58, "func_type": 1, "rsp_node": node, "rsp_dir": way, "ref_node": 0,
-                    "ref_dir": 0, "data": y, "x": np.arange(N) / RATE, "id1": "NONE", "id2": "NONE",
-                    "id3": "NONE", "id4": "NONE", "id5": "NONE", "binary": 0,
-                    "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s",
-                    "ordinate_spec_data_type": kind, "ordinate_axis_units_lab": unit,
-                    "orddenom_spec_data_type": 0, "orddenom_axis_units_lab": "NONE",
-                },
-                mode="add",
-            )  # fmt: skip
+    names = {f"id{k}": "NONE" for k in range(1, 6)}
+    for y, kind, unit, node, way in blocks * [
+        (FORCE[0], 13, "N", 7, 3), (MOTION[0], 12, "g", 7, 3), (MOTION[1], 12, "mm/s^2", 9, -1),
+    ]:  # fmt: skip
+        file.write_sets(
+            {
+                "type": 58, "func_type": 1, "rsp_node": node, "rsp_dir": way, "ref_node": 0,
+                "ref_dir": 0, "data": y, "x": np.arange(N) / RATE, "binary": 0,
+                "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s",
+                "ordinate_spec_data_type": kind, "ordinate_axis_units_lab": unit,
+                "orddenom_spec_data_type": 0, "orddenom_axis_units_lab": "NONE", **names,
+            },
+            mode="add",
+        )  # fmt: skip
     return path
 
 
@@ -67,19 +61,16 @@ def test_wav_gets_units_from_the_table_beside_it(tmp_path):
     """16 bits: shares of full scale to 2⁻¹⁶, times the scale of each channel."""
     numbers = np.round(np.vstack([FORCE, MOTION]).T * 32767).astype(np.int16)
     wavfile.write(tmp_path / "hit.wav", int(RATE), numbers)
-    with pytest.raises(
-        ChladniError, match=r"hit.wav has 3 channels .* add the file hit.channels.csv"
-    ):
-        read_recordings(tmp_path / "hit.wav")
+    said = r"hit.wav has 3 channels .* add the file hit.channels.csv"
+    says(said, read_recordings, tmp_path / "hit.wav")
     (tmp_path / "hit.channels.csv").write_text(CHANNELS)
     found = the_record(tmp_path / "hit.wav")
     np.testing.assert_allclose(found.force[0], 2 * POUND * FORCE, atol=2 * POUND * 2**-14)
     np.testing.assert_allclose(found.response[0, 0], 4 * GRAVITY * MOTION[0], atol=GRAVITY * 2**-12)
     eight = np.round((np.vstack([FORCE, MOTION]).T + 1) * 127.5).astype(np.uint8)
     wavfile.write(tmp_path / "hit.wav", int(RATE), eight)
-    np.testing.assert_allclose(
-        the_record(tmp_path / "hit.wav").force[0], 2 * POUND * FORCE, atol=0.1
-    )
+    found = the_record(tmp_path / "hit.wav")
+    np.testing.assert_allclose(found.force[0], 2 * POUND * FORCE, atol=0.1)
 
 
 def test_both_layouts_of_mat(tmp_path):
@@ -164,32 +155,6 @@ def test_responses_without_a_force_are_time_histories(tmp_path):
         np.testing.assert_allclose(found.functions[0].x, np.arange(N) / RATE, atol=1e-9)
 
 
-def test_sound_has_no_frequency_response(tmp_path):
-    path = csv(tmp_path / "a.csv", "Pa")
-    path.write_text(path.read_text().replace("[g]", "[Pa]"))
-    with pytest.raises(ChladniError, match=r"a\.csv: .*1 inputs and 2 outputs"):
-        read_recordings(path)
-
-
-BAD_CSV = {
-    "unit": (lambda t: t.replace("[g]", "[V]"), r"7:\+Z is in 'V'; known are N"),
-    "no unit": (lambda t: t.replace(" [g]", ""), r"is in 'no unit'"),
-    "no motion": (lambda t: re.sub(r"\[(g|m/s.2)\]", "[N]", t), "3 inputs and 0 outputs"),
-    "two kinds": (lambda t: t.replace("[m/s^2]", "[mm]"), "one kind of motion"),
-    "word": (lambda t: t.replace("\n0,", "\nzero,", 1), "is not 4 numbers"),
-    "uneven": (lambda t: t + "9.5,0,0,0\n", "not evenly spaced"),
-}
-
-
-@pytest.mark.parametrize("name", BAD_CSV)
-def test_what_is_wrong_with_a_table_is_said(tmp_path, name):
-    change, said = BAD_CSV[name]
-    path = csv(tmp_path / "a.csv")
-    path.write_text(change(path.read_text()))
-    with pytest.raises(ChladniError, match=rf"a\.csv: .*{said}"):
-        read_recordings(path)
-
-
 @pytest.mark.parametrize(
     ("arrays", "said"),
     [
@@ -203,8 +168,7 @@ def test_what_is_wrong_with_a_table_is_said(tmp_path, name):
 )
 def test_what_is_wrong_with_arrays_is_said(tmp_path, arrays, said):
     np.savez(tmp_path / "a.npz", **arrays)
-    with pytest.raises(ChladniError, match=rf"a\.npz: .*{said}"):
-        read_recordings(tmp_path / "a.npz")
+    says(rf"a\.npz: .*{said}", read_recordings, tmp_path / "a.npz")
 
 
 def test_damaged_and_new_files_are_refused(tmp_path):
@@ -224,8 +188,7 @@ def test_damaged_and_new_files_are_refused(tmp_path):
         ("f.wav", "no file"),
         ("g.npz", "cannot be read as NPZ: it is not an archive"),
     ):
-        with pytest.raises(ChladniError, match=rf"{name}.*{said}|{said}.*{name}"):
-            read_recordings(tmp_path / name)
+        says(rf"{name}.*{said}|{said}.*{name}", read_recordings, tmp_path / name)
 
 
 def test_the_table_of_channels_is_held_to_its_words(tmp_path):
@@ -237,8 +200,7 @@ def test_the_table_of_channels_is_held_to_its_words(tmp_path):
         ("channel,label,unit\n1,7:+Z,N\n2,7:+Z,g\n3,7:+Z,g\n", r"channel 7:\+Z occurs twice"),
     ):
         (tmp_path / "a.channels.csv").write_text(table)
-        with pytest.raises(ChladniError, match=said):
-            read_recordings(tmp_path / "a.csv")
+        says(said, read_recordings, tmp_path / "a.csv")
 
 
 def test_a_wav_that_is_shorter_than_it_says_is_refused(tmp_path):
@@ -251,16 +213,14 @@ def test_a_wav_that_is_shorter_than_it_says_is_refused(tmp_path):
     at = data.index(b"data") + 4
     for changed in (data[: len(data) // 2], data[:at] + b"\0\0\1\0" + data[at + 4 :]):
         path.write_bytes(changed)
-        with pytest.raises(ChladniError, match=r"a.wav states \d+ bytes of samples, but"):
-            read_recordings(path)
+        says(r"a.wav states \d+ bytes of samples, but", read_recordings, path)
 
 
 def test_channels_said_twice_are_refused_and_those_not_said_named(tmp_path):
     path = csv(tmp_path / "a.csv")
     table = tmp_path / "a.channels.csv"
     table.write_text(CHANNELS + "2,12:+Z,g,4\n")
-    with pytest.raises(ChladniError, match=r"line 5: channel 2 occurs twice, first in line 3"):
-        read_recordings(path)
+    says(r"line 5: channel 2 occurs twice, first in line 3", read_recordings, path)
     table.write_text(CHANNELS.rpartition("3,")[0])
     (found,) = read_recordings(path)
     assert found.time.outputs == ("7:+Z",)

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import loadmat
+from tests.builders.refusals import says
 
 from chladni.ema.identification import evaluate, identify
 from chladni.ema.shapes import shapes
-from chladni.errors import LabelError
 from chladni.io.tables.write_modal import write_shape_table, write_state_space
 from chladni_evidence.identification_evidence import recording, structure
 
@@ -34,8 +34,7 @@ def test_the_state_space_responds_as_the_identified_model(identified, tmp_path: 
 
 
 def test_no_other_format(identified, tmp_path: Path) -> None:
-    with pytest.raises(LabelError, match=r"\.npz or \.mat"):
-        write_state_space(tmp_path / "s.txt", identified)
+    says(r"\.npz or \.mat", write_state_space, tmp_path / "s.txt", identified)
 
 
 def test_shapes_as_a_table(identified, tmp_path: Path) -> None:

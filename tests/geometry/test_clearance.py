@@ -2,26 +2,18 @@
 
 import numpy as np
 import pytest
+from tests.geometry.test_thickness_mapping import assembled
 
 from chladni.geometry.clearance import all_gaps, gaps, summary
-from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni_specimens.joints.builders import spot_welds
 from chladni_specimens.mesher.flat_regions import grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.plates import folded_panel
-from chladni_specimens.tailgate.tailgate import of_sheets
-
-STEEL = Isotropic(210e9, 0.3, 7850.0)
 
 
 def two(surface_a, surface_b, h=0.01, t=1e-3):
     plan, quads = grid(np.linspace(0, 0.2, round(0.2 / h) + 1), np.linspace(0, 0.1, round(0.1 / h)))
-    made, parts = {}, []
-    for k, (name, f) in enumerate((("a", surface_a), ("b", surface_b)), start=1):
-        points = np.column_stack([plan, f(*plan.T)])
-        made[name] = PressedSheet(name, points, points, quads, np.full(len(quads), MAIN))
-        parts.append(Part(k, name, ShellSection(t, STEEL, STEEL)))
-    return of_sheets(made, tuple(parts))[0]
+    surfaces = (np.column_stack([plan, f(*plan.T)]) for f in (surface_a, surface_b))
+    return assembled(*((points, quads) for points in surfaces), gauge=t)
 
 
 def clearances(assembly, within=0.010):
@@ -51,7 +43,7 @@ def test_a_curved_gap_is_known_to_its_facets(h):
     def arc(radius):
         return lambda x, y: np.sqrt(radius**2 - (x - 0.1) ** 2) - R + 0 * y
 
-    found = gaps(two(arc(R), arc(R + c), h), "a", "b")
+    found = gaps(two(arc(R), arc(R + c), h), "sheet 0", "sheet 1")
     inner = np.abs(found.clearance - (c - 1e-3)) <= found.uncertainty * 1.5 + 1e-5
     assert inner.mean() > 0.9
     assert np.median(found.uncertainty) == pytest.approx(2 * h**2 / R / 8, rel=0.3)
@@ -71,7 +63,7 @@ def test_touching_within_the_uncertainty():
 def test_opening_of_given_motions():
     """Rigid motions open nothing; b lifted by w(x) opens by w at each place."""
     assembly = two(flat(0), flat(0.003))
-    found = gaps(assembly, "a", "b")
+    found = gaps(assembly, "sheet 0", "sheet 1")
     x = assembly.points
     n = len(x)
     shapes = np.zeros((n, 3, 8))
@@ -92,7 +84,7 @@ def test_opening_of_given_motions():
 def test_force_until_first_contact():
     """F = c 2ζω²/(|φ_f||δ|): at that force the amplitude at resonance is the clearance."""
     assembly = two(flat(0), flat(0.003))
-    found = gaps(assembly, "a", "b")
+    found = gaps(assembly, "sheet 0", "sheet 1")
     shapes = np.zeros((len(assembly.points), 3, 1))
     shapes[assembly.points[:, 2] > 0.001, 2, 0] = 0.7
     f, zeta, drive = np.array([50.0]), 0.01, np.array([0.3])
@@ -104,7 +96,7 @@ def test_force_until_first_contact():
 
 def test_places_near_a_joint_are_not_free():
     assembly, _ = spot_welds(two(flat(0), flat(0.003)), np.array([(0.1, 0.05, 0.0015)]))
-    found = gaps(assembly, "a", "b", away=0.018)
+    found = gaps(assembly, "sheet 0", "sheet 1", away=0.018)
     distance = np.linalg.norm(assembly.points[found.rows, :2] - (0.1, 0.05), axis=1)
     assert not found.free[distance < 0.014].any()
     assert found.free[distance > 0.023].all()

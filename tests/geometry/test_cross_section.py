@@ -33,7 +33,6 @@ def test_a_leaning_wall_is_cut_wider(degrees):
     a, t = np.radians(degrees), 2e-3
     turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
     flat = plate(0.4, 0.3, 4, 3, t)
-    upright = flat.points[:, [0, 2, 1]] @ turn.T  # normal along y before, cut at z
     upright = flat.points[:, [1, 0, 2]] @ np.roll(np.eye(3), 1, axis=0).T  # y-z plane, normal x
     leaning = upright @ turn.T
     found = cross_section(leaning, flat.shells.nodes, 2, leaning[:, 2].mean())

@@ -74,9 +74,7 @@ def test_the_rim_of_a_hole_stays():
     whole = plate(0.3, 0.2, 6, 4, 1e-3)
     shells = whole.shells
     keep = np.arange(len(shells)) != 8
-    holed = {
-        name: value[keep] for name, value in vars(shells).items() if isinstance(value, np.ndarray)
-    }
+    holed = {n: v[keep] for n, v in vars(shells).items() if isinstance(v, np.ndarray)}
     assembly = held(tuple(CELL.tolist()), whole.points[CELL].mean(axis=0) + UP, "spider")
     assembly = replace(assembly, shells=replace(shells, **holed))
     _, body = smaller(assembly)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import pyvista
 import trimesh
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -10,8 +9,6 @@ from numpy.testing import assert_allclose
 
 from chladni.geometry import nearest
 from chladni.geometry.nearest import ShellSurface
-from chladni.io.package_files import mesh_path
-from chladni.workflows.loaded_model import load_deck
 from chladni_specimens.plates import plate
 
 ROTATION = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
@@ -103,16 +100,3 @@ def test_it_is_the_nearest_of_all_whatever_was_tried_first(seed, near):
         least = np.minimum(least, np.linalg.norm(closest - places, axis=1))
     assert_allclose(found.distance, least, atol=1e-9)
     assert_allclose(np.linalg.norm(found.place - places, axis=1), found.distance, atol=1e-12)
-
-
-def test_it_is_vtk_s_nearest_point_on_a_tailgate():
-    """Two thousand places by the sheets and five hundred far from them."""
-    assembly = load_deck(mesh_path("tailgate_30mm.bdf"), "mm-t-s").model().assembly
-    points, cells = assembly.points, assembly.shells.nodes
-    rng = np.random.default_rng(0)
-    by = points[cells].mean(axis=1)[rng.integers(len(cells), size=2000)]
-    places = np.vstack([by + rng.normal(0, 0.01, by.shape), rng.uniform(-1, 2, (500, 3))])
-    vtk = pyvista.PolyData.from_regular_faces(points, _halves(cells))
-    _, closest = vtk.find_closest_cell(places, return_closest_point=True)
-    found = ShellSurface.whole(assembly).closest_points(places)
-    assert_allclose(found.distance, np.linalg.norm(closest - places, axis=1), atol=1e-9)

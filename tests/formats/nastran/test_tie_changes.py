@@ -4,16 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from tests.builders.decks import rewritten
+from tests.builders.refusals import says
 
 from chladni.effects.membrane_prestress import prestressed
 from chladni.effects.rigid_ties import rigid_ties, sprung
-from chladni.errors import ModelError
-from chladni.fem.assemble import structure
-from chladni.io.nastran import assembly, read_deck, write_deck
-from chladni.io.nastran.edit.model_changes import changes
-from chladni.model.assembly import RigidBody
-from chladni.units import UNITS
 
 DECK = """\
 SOL 103
@@ -41,54 +36,36 @@ ENDDATA
 """
 
 
-def written(deck, made, tmp_path):
-    read, before = deck
-    write_deck(read, tmp_path / "new.bdf", changes(read, before, made, UNITS["mm-t-s"]))
-    return assembly(read_deck(tmp_path / "new.bdf"), UNITS["mm-t-s"])
-
-
-def alike(one, two):
-    """The same stiffness and mass over the same free motions."""
-    one, two = structure(one).system, structure(two).system
-    assert np.array_equal(one.dofs, two.dofs)
-    for a, b in ((one.K, two.K), (one.M, two.M)):
-        assert_allclose(b.toarray(), a.toarray(), atol=2e-6 * np.abs(a.toarray()).max())
-
-
 @pytest.mark.parametrize("k", range(4))
-def test_a_tie_let_loose_comes_back(deck, tmp_path, k):
+def test_a_tie_let_loose_comes_back(deck, k):
     """RBE2 and RBAR whose one follower moves over, an RBE2 split by its sheets."""
     ties = rigid_ties(deck[1])
     assert sorted(len(tie.rows) for tie in ties) == [1, 1, 1, 1, 2]
-    made = sprung(deck[1], ties[k], 2e5)
-    again = written(deck, made, tmp_path)
-    alike(made, again)
-    assert len(again.bushes) == 1
+    assert len(rewritten(*deck, sprung(deck[1], ties[k], 2e5)).found.bushes) == 1
 
 
-def test_a_membrane_force_comes_back(deck, tmp_path):
+def test_a_membrane_force_comes_back(deck):
     """Springs between grids and between the turns of one, each in its unit."""
     tensor = np.array([[1.0, 0.4, 0.1], [0.4, 0.8, 0.3], [0.1, 0.3, 0.2]])
-    made = prestressed(deck[1], 1, tensor, -800.0)
-    again = written(deck, made, tmp_path)
-    alike(made, again)
+    again = rewritten(*deck, prestressed(deck[1], 1, tensor, -800.0)).found
     assert (again.springs.value < 0).any()
     assert (again.springs.component > 3).any()
 
 
-def test_followers_in_different_motions_are_refused(deck, tmp_path):
-    body = next(b for b in deck[1].rigid if isinstance(b, RigidBody) and len(b.dependent) > 1)
-    odd = replace(body, dependent=body.dependent[:2], components=((1, 2, 3), (1, 2)))
-    rigid = tuple(odd if b is body else b for b in deck[1].rigid)
-    with pytest.raises(ModelError, match="follow in different motions"):
-        written(deck, replace(deck[1], rigid=rigid), tmp_path)
+def with_odd_body(made, k):
+    """A structure whose bodies of so many followers tie two of them in different motions."""
+    odd = tuple(
+        replace(b, dependent=b.dependent[:2], components=((1, 2, 3), (1, 2)))
+        if len(b.dependent) == k else b for b in made.rigid
+    )  # fmt: skip
+    return replace(made, rigid=odd)
 
 
-def test_a_new_body_of_several_motions_comes_back(deck, tmp_path):
+def test_followers_in_different_motions_are_refused(deck):
+    says("follow in different motions", rewritten, *deck, with_odd_body(deck[1], 3))
+
+
+def test_a_new_body_of_several_motions_comes_back(deck):
     """It is one RBE2 for each set of motions."""
     tie = next(t for t in rigid_ties(deck[1]) if len(t.rows) == 2)
-    made = sprung(deck[1], tie, 2e5)
-    odd = [replace(b, components=((1, 2, 3), (1, 2))) if len(b.dependent) == 2 else b
-           for b in made.rigid]  # fmt: skip
-    made = replace(made, rigid=tuple(odd))
-    alike(made, written(deck, made, tmp_path))
+    rewritten(*deck, with_odd_body(sprung(deck[1], tie, 2e5), 2))
