@@ -7,6 +7,7 @@ from chladni.io.tables.write_tables import write_npz
 from chladni_specimens.plates import plate
 
 SENSORS = (2, 4, 7, 18, 30, 43)
+NINE = (2, 4, 7, 18, 24, 30, 36, 43, 47)
 CASE = """
 [model]
 deck = "plate.bdf"

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 from tests.builders.commands import ran
 from tests.builders.quick_runs import coarse_pictures
+from tests.builders.structures import stiffer
 
 import chladni
 from chladni.errors import ChladniError
@@ -103,15 +104,7 @@ def test_what_cannot_be_right_is_exit_3_and_said(copied, tmp_path, spoilt):
 
 def test_an_odd_material_is_the_users_own(case):
     """A modulus that is known in no system says nothing of the units."""
-    parts = tuple(
-        p.with_section(**{
-            side: replace(m, E=m.E * 1e-4)
-            for side in ("membrane", "bending", "shear")
-            if (m := getattr(p.section, side)) is not None
-        })
-        for p in case.assembly.parts
-    )  # fmt: skip
-    odd = replace(case, assembly=case.assembly.with_parts(parts))
+    odd = replace(case, assembly=stiffer(case.assembly, 1e-4))
     refuse_other_units(odd)
     (finding,) = (f for f in chladni.check(odd).findings if "usual in no unit" in f.text)
     assert not finding.fault
@@ -177,7 +170,8 @@ def test_of_a_long_recording_few_lines_are_identified(case, monkeypatch):
 
     monkeypatch.setattr(preparation, "identify", counted)
     ready(case, diagnosing=True)
-    monkeypatch.setattr("chladni.ema.screening_lines.LONG", 0)
+    for name, few in (("LONG", 0), ("BETWEEN", 100)):
+        monkeypatch.setattr(f"chladni.ema.screening_lines.{name}", few)
     assert not chladni.check(case).findings
     ready(case, diagnosing=True)
     assert lines[0] == lines[2] > lines[1] > 0

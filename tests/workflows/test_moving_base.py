@@ -9,6 +9,8 @@ from numpy.testing import assert_allclose
 from tests.builders.cases import case_text
 from tests.builders.commands import refused
 from tests.builders.plate_recordings import at
+from tests.builders.recordings import noisy
+from tests.builders.structures import held_along_x0
 
 import chladni
 from chladni.effects.points import with_masses
@@ -29,9 +31,7 @@ PLACE = (0.24, 0.15)  # of 20 g that the deck does not have
 
 def clamped(t=1.2e-3, finer=1):
     """A plate held along its edge x = 0."""
-    made = plate(0.3, 0.2, 10 * finer, 8 * finer, t)
-    edge = np.flatnonzero(made.points[:, 0] == 0)
-    return replace(made, supports=np.array([(k, c) for k in edge for c in range(1, 7)]))
+    return held_along_x0(plate(0.3, 0.2, 10 * finer, 8 * finer, t))
 
 
 def a_case(folder, article, seed):
@@ -41,11 +41,9 @@ def a_case(folder, article, seed):
     write_assembly(article, folder / "article.bdf")
     model = chladni.load(folder / "article.bdf", "SI")
     ends = [f"{g}:+Z" for g in at(article, SENSORS)]
-    T = chladni.frf(model, ends, ["base:+Z"], np.linspace(12, 480, 1200)).frfs[0]
-    noise = np.random.default_rng(seed).normal(size=(2, *T.values.shape))
-    values = T.values * (1 + 0.01 * (noise[0] + 1j * noise[1]) / np.sqrt(2))
+    T = chladni.frf(model, ends, ["base:+Z"], np.linspace(12, 480, 700)).frfs[0]
     labels = tuple(f"{g}:+Z" for g in at(clamped(), SENSORS))
-    write_npz(folder / "table.npz", replace(T, values=values, outputs=labels))
+    write_npz(folder / "table.npz", replace(T, values=noisy(T.values, 0.01, seed), outputs=labels))
     mass = round(chladni.modes(model, 3).mass, 5)
     tried = f"[search]\neffects = {TRIED}\n"
     (folder / "case.toml").write_text(case_text(15.0, 420.0, mass, "table.npz") + tried)

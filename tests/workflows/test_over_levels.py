@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 import pytest
 from tests.builders.commands import call, ran, refused
+from tests.builders.recordings import noisy
 
 import chladni
 from chladni.dynamics.frf import FRF
@@ -30,7 +31,7 @@ from chladni_specimens.plates import plate
 
 LEVELS = (1.0, 4.0, 7.0, 10.0)
 SENSORS = (2, 7, 18, 43)
-F = np.arange(20, 75, 0.12)
+F = np.arange(20, 75, 0.2)
 SPRING = 5000.0  # [N/m], under each corner
 CASE = """
 [model]
@@ -66,8 +67,7 @@ def recorded(folder, level, joint, seed):
     w, W = 2 * np.pi * f, 2 * np.pi * F[:, None]
     q = -(W**2) / (w**2 * (1 + 1j * loss) - W**2)
     H = np.einsum("or,fr,r->fo", rows, q, rows[0])[:, :, None]
-    z = np.random.default_rng(seed).normal(size=(2, *H.shape)) / np.sqrt(2)
-    H = H * (1 + 0.01 * (z[0] + 1j * z[1]))
+    H = noisy(H, 0.01, seed)
     labels = tuple(f"{g}:+Z" for g in SENSORS)
     write_npz(folder / f"at_{level:g}.npz", FRF(H, F, labels, labels[:1], "accelerance"))
 

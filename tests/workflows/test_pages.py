@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 from tests.builders.commands import ran
-from tests.builders.quick_runs import coarse_pictures
 
 import chladni
 from chladni.report.diagnosis_folder import write_diagnosis
@@ -17,8 +16,7 @@ from chladni.report.verdict import PLACES
 @pytest.fixture(scope="module")
 def run_folder(case, diagnosed, tmp_path_factory):
     out = tmp_path_factory.mktemp("run")
-    with coarse_pictures():
-        write_diagnosis(out, case, diagnosed)
+    write_diagnosis(out, case, diagnosed)
     return out
 
 
