@@ -8,6 +8,7 @@ import pandas
 import pytest
 import xarray
 from tests.builders.commands import ran, refused
+from tests.builders.structures import stiffer
 
 import chladni
 from chladni.io.tables.write_tables import write_npz
@@ -43,18 +44,7 @@ def folder(deck, tmp_path_factory):
     folder = tmp_path_factory.mktemp("case")
     (folder / "plate.bdf").write_bytes(deck.read_bytes())
     model = chladni.load(deck, "SI")
-    parts = model.assembly.parts
-    stiffer = model.assembly.with_parts(
-        tuple(
-            p.with_section(**{
-                side: type(m)(E=1.05 * m.E, nu=m.nu, rho=m.rho, id=m.id)
-                for side in ("membrane", "bending", "shear")
-                if (m := getattr(p.section, side)) is not None
-            })
-            for p in parts
-        )
-    )  # fmt: skip
-    article = type(model)(model.source, stiffer)
+    article = type(model)(model.source, stiffer(model.assembly, 1.05))
     made = chladni.frf(article, ["3:+Z", "8:+Z", "17:+Z"], ["1:+Z"], np.linspace(15, 100, 300))
     write_npz(folder / "frf.npz", made.frfs[0].to("accelerance"))
     (folder / "case.toml").write_text(CASE)
