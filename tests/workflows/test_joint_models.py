@@ -45,7 +45,7 @@ def write_case(folder, deck, article):
 
 @pytest.fixture(scope="module")
 def welded(tmp_path_factory):
-    deck = panel(0.04)
+    deck = panel(0.05)
     made = {v.name: v.assembly for v in joint_variants(deck)}
     return write_case(tmp_path_factory.mktemp("welded"), deck, made[TRUTH])
 
