@@ -7,6 +7,7 @@ import numpy as np
 import pandas
 import pytest
 import xarray
+from tests.builders.cases import changed_case
 from tests.builders.commands import ran, refused
 from tests.builders.structures import stiffer
 
@@ -158,12 +159,8 @@ def test_mostly_failed_is_not_to_be_trusted(deck, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ['Ω \n,"E"', "E/rho <b>", "x" * 300, "$_$"])
 def test_any_name_goes_through_every_file(folder, tmp_path, name):
-    place = tmp_path / "Gehäuse Ω"
-    place.mkdir()
-    for file in ("plate.bdf", "frf.npz"):
-        (place / file).write_bytes((folder / file).read_bytes())
     quoted = json.dumps(name, ensure_ascii=False)
-    (place / "case.toml").write_text(CASE.replace('"sheet"', quoted), encoding="utf-8")
+    place = changed_case(folder, tmp_path / "Gehäuse Ω", ('"sheet"', quoted))
     ran("study", place, "--samples", 5, "--sampler", "oat", "--modes", 2, "--out", tmp_path / "x")
     table = pandas.read_csv(tmp_path / "x/samples.csv")
     assert name in table.columns
@@ -177,9 +174,5 @@ def test_any_name_goes_through_every_file(folder, tmp_path, name):
 
 @pytest.mark.parametrize("name", ["Q", "f1_hz", "sample", "mode"])
 def test_a_parameter_is_not_called_as_a_result(folder, tmp_path, name):
-    place = tmp_path / "case"
-    place.mkdir()
-    for file in ("plate.bdf", "frf.npz"):
-        (place / file).write_bytes((folder / file).read_bytes())
-    (place / "case.toml").write_text(CASE.replace('"sheet"', f'"{name}"'))
+    place = changed_case(folder, tmp_path / "case", ('"sheet"', f'"{name}"'))
     assert "cannot be called" in refused("study", place, "--samples", 5, "--out", tmp_path / "x")

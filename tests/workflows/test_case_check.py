@@ -42,6 +42,11 @@ def rewritten(place, old, new):
     return place
 
 
+def weighed(place):
+    """The line of case.toml that says the mass."""
+    return next(x for x in (place / "case.toml").read_text().splitlines() if x.startswith("mass"))
+
+
 def test_a_good_case_is_not_blamed(case):
     found = chladni.check(case)
     assert not found.findings
@@ -92,8 +97,7 @@ FAULTS = {  # how a case is spoilt: what must be said
 def test_what_cannot_be_right_is_exit_3_and_said(copied, tmp_path, spoilt):
     old, new, said = FAULTS[spoilt]
     if spoilt == "grams":
-        text = (copied / "case.toml").read_text()
-        mass = next(line for line in text.splitlines() if line.startswith("mass"))
+        mass = weighed(copied)
         old, new = mass, f"mass = {1e3 * float(mass.split('=')[1]):.4g}"
     rewritten(copied, old, new)
     done = ran("check", copied, "--out", tmp_path / "out", code=3)
@@ -220,9 +224,7 @@ def solids(place):
     )
     cards = "MAT1,1,2.1+11,,0.3,7850.\nPSOLID,1,1\nCHEXA,1,1,1,2,4,3,5,6\n,8,7\n"
     (place / "plate.bdf").write_text(f"BEGIN BULK\n{block}\n{cards}ENDDATA\n")
-    text = (place / "case.toml").read_text()
-    mass = next(line for line in text.splitlines() if line.startswith("mass"))
-    return with_recording(rewritten(place, mass, ""), "poles.csv", poles)
+    return with_recording(rewritten(place, weighed(place), ""), "poles.csv", poles)
 
 
 def no_line(place):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.builders.cases import case_text
+from tests.builders.cases import case_text, changed_case
 from tests.builders.commands import refused
 from tests.builders.plate_recordings import at
 from tests.builders.recordings import noisy
@@ -94,19 +94,17 @@ def test_a_null_stays_quiet(tmp_path):
 
 def test_the_reference_of_a_table_has_a_node_of_its_own(heavy, tmp_path):
     """Node 901 is the accelerometer on the table: sensors.csv says that it is the base."""
-    for name in ("plate.bdf", "case.toml"):
-        (tmp_path / name).write_bytes((heavy.path.parent / name).read_bytes())
-    write_npz(tmp_path / "table.npz", replace(heavy.frfs[0], inputs=("901:+Z",)))
-    text = (tmp_path / "case.toml").read_text().replace("[band]", 'sensors = "s.csv"\n[band]')
-    (tmp_path / "case.toml").write_text(text)
-    (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,base,input\n")
-    case = chladni.load_case(tmp_path)
+    words = ("[band]", 'sensors = "s.csv"\n[band]')
+    source = changed_case(heavy.path.parent, tmp_path / "case", words)
+    write_npz(source / "table.npz", replace(heavy.frfs[0], inputs=("901:+Z",)))
+    (source / "s.csv").write_text("label,grid,role\n901:+Z,base,input\n")
+    case = chladni.load_case(source)
     assert case.inputs.base.tolist() == [True]
     named, plain = (prepare(question_of(c)) for c in (case, heavy))
     assert_allclose(named.problem.data.values, plain.problem.data.values)
-    (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,bas,input\n")
+    (source / "s.csv").write_text("label,grid,role\n901:+Z,bas,input\n")
     with pytest.raises(FileError, match=r"s.csv, line 2: .*bas"):
-        chladni.load_case(tmp_path)
+        chladni.load_case(source)
 
 
 def test_what_is_compared_is_the_full_structures_transmissibility(heavy):
@@ -141,9 +139,8 @@ def test_the_page_and_the_deck(heavy, diagnosed, tmp_path):
 
 @pytest.mark.parametrize("command", ["calibrate", "diagnose", "correlate"])
 def test_a_base_without_supports_is_refused(heavy, tmp_path, command):
-    write_assembly(replace(clamped(), supports=np.zeros((0, 2), int)), tmp_path / "plate.bdf")
-    (tmp_path / "table.npz").write_bytes((heavy.path.parent / "table.npz").read_bytes())
-    (tmp_path / "case.toml").write_text(heavy.path.read_text())
+    source = changed_case(heavy.path.parent, tmp_path / "case")
+    write_assembly(replace(clamped(), supports=np.zeros((0, 2), int)), source / "plate.bdf")
     assert "the base moves, but the deck has no grid with SPC" in refused(
-        command, tmp_path, "--out", tmp_path / "x"
+        command, source, "--out", tmp_path / "x"
     )

@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 import pytest
+from tests.builders.cases import changed_case
 from tests.builders.commands import call, ran, refused
 from tests.builders.recordings import noisy
 
@@ -192,13 +193,8 @@ def test_linear_recordings_are_not_called_nonlinear(tmp_path):
 
 def test_what_is_held_must_have_a_level(folder, tmp_path):
     """One sentence, and no result."""
-    text = (folder / "case.toml").read_text().replace("level = 1.0\n", "")
-    (folder / "bad").mkdir(exist_ok=True)
-    for path in folder.glob("*.npz"):
-        (folder / "bad" / path.name).write_bytes(path.read_bytes())
-    (folder / "bad" / "plate.bdf").write_text((folder / "plate.bdf").read_text())
-    (folder / "bad" / "case.toml").write_text(text)
-    assert "has no level" in refused("diagnose", folder / "bad", "--out", tmp_path / "o")
+    bad = changed_case(folder, tmp_path / "bad", ("level = 1.0\n", ""))
+    assert "has no level" in refused("diagnose", bad, "--out", tmp_path / "o")
 
 
 def test_a_linear_effect_that_was_named_stays_and_is_said_to_be_of_its_level(folder):
