@@ -6,9 +6,17 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from tests.builders.shared_results import RUN, folder_of_run
 
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no counterexample
 settings.load_profile("unhurried")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared(tmp_path_factory) -> Path:
+    """The folder of what all processes of this run share."""
+    RUN[:] = [folder_of_run(tmp_path_factory)]
+    return RUN[0]
 
 
 @pytest.fixture(scope="session")

@@ -85,6 +85,19 @@ BUGS = (
         "src/chladni/search/compensation.py", '"E": 1.0, "t": 3.0', '"E": 3.0, "t": 1.0',
         "tests/search/test_calibration.py",
     ),
+    DeliberateBug(  # of a silent drive and a silent sensor each is taken for the other
+        "src/chladni/search/silent_dofs.py", "silent.all(axis=0), silent.all(axis=1)",
+        "silent.all(axis=1), silent.all(axis=0)", "tests/search/test_silent_dofs.py",
+    ),
+    DeliberateBug(  # a recording is mended, and nothing says so
+        "src/chladni/workflows/mended_case.py",
+        "mended, (*faults, *(f for f in found.screening.faults if f.mend))", "mended, faults",
+        "tests/workflows/test_mended_case.py",
+    ),
+    DeliberateBug(  # variances of noise taken for its deviations
+        "src/chladni_planning/layouts/information.py", "rows / np.sqrt(noise)[:, None, None]",
+        "rows / noise[:, None, None]", "tests/planning/test_layouts.py",
+    ),
     DeliberateBug(  # a band is taken as it is asked for, whatever the recording covers
         "src/chladni/case/bands.py", "max(band[0], float(f[0]))", "float(band[0])", "tests/case",
     ),

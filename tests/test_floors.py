@@ -117,9 +117,10 @@ FRONTS = {name: front(name) for name in PACKAGES}
 COMMANDS = {("chladni", "cli", name) for name in BUILT_IN} | entry_points()["chladni.commands"]
 
 
+@cache
 def nodes(path):
     """The syntax tree of a file, node after node."""
-    return ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
 @cache

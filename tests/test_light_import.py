@@ -10,28 +10,10 @@ from chladni.io.nastran import write_assembly
 from chladni_specimens.plates import plate
 
 HEAVY = {
-    "pyvista",
-    "vtkmodules",
-    "trimesh",
-    "meshio",
-    "gymnasium",
-    "matplotlib",
-    "pyuff",
-    "jinja2",
-    "distributed",
-    "SALib",
-    "xarray",
-    "pandas",
-    "plotly",
-    "dask",
-    "control",
-    "sdynpy",
-    "emcee",
-    "scipy.stats",
-    "scipy.signal",
-    "scipy.optimize",
-    "scipy.spatial",
-}
+    "pyvista", "vtkmodules", "trimesh", "meshio", "gymnasium", "matplotlib", "pyuff", "jinja2",
+    "distributed", "SALib", "xarray", "pandas", "plotly", "dask", "control", "sdynpy", "emcee",
+    "scipy.stats", "scipy.signal", "scipy.optimize", "scipy.spatial",
+}  # fmt: skip
 OURS = {"planning", "bench", "studies", "specimens", "evidence", "envs"}
 MOST = {  # modules of ours and of SciPy that a command loads for its --help, a tenth to spare
     "": (20, 0),
@@ -85,9 +67,17 @@ def test_the_package_loads_no_library():
     few = loaded_by("import chladni; chladni.modes; chladni.read_deck")
     assert not (few | roots(few)) & HEAVY
     assert "chladni.case.load" not in few
+    built = {f"chladni_{name}" for name in OURS}
+    assert not roots(few) & built
+    assert roots(loaded_by("import chladni; chladni.study")) & built == {"chladni_studies"}
 
 
-@pytest.mark.parametrize("name", MOST)
+QUICK = ("", "modes", "diagnose", "blind")  # of every size; all others with `-m slow`
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n not in QUICK)) for n in MOST]
+)
 def test_a_command_loads_its_own_modules(name):
     """No graphics, no statistics, no other command; the bounds are counts, none is a time."""
     loaded = command(*([name] if name else []), "--help")
@@ -118,13 +108,6 @@ def test_modes_of_a_small_deck_need_no_renderer(tmp_path):
         "chladni.search",
     }
     assert counts(loaded)[0] <= MOST["modes"][0] + 60
-
-
-def test_the_package_loads_none_that_builds_on_it():
-    """The names that it holds of them are loaded at their first use."""
-    built = {f"chladni_{name}" for name in OURS}
-    assert not roots(loaded_by("import chladni")) & built
-    assert roots(loaded_by("import chladni; chladni.study")) & built == {"chladni_studies"}
 
 
 def test_nothing_is_printed():

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.ema.frf_estimate import estimate, excitation_of
+from chladni.ema.frf_estimate import EstimateSettings, estimate, excitation_of
+from chladni.ema.setup import Recording
 from chladni.ema.time_record import overloaded
 from chladni.errors import ModelError
+from chladni.workflows.evaluation import evaluate_recordings
 from chladni_bench.accelerometers import AccelerometerType
 from chladni_bench.bench_recording import BenchTest, level_for, record
 from chladni_bench.bench_rig import BenchSetup, bench_rig
@@ -75,6 +77,13 @@ def test_time_data_give_the_frf_that_was_given(small):
     found = record(rig, test, rng(), keep_time=True)
     again = estimate(found.time).frf.sel(band=BAND)
     np.testing.assert_allclose(again.values, found.frf.values, rtol=1e-9)
+    few = EstimateSettings(band=(25.0, 35.0))  # about the first mode
+    (read,) = evaluate_recordings(Recording("a.uff", time=found.time), few).recordings
+    assert read.estimate is not None
+    assert read.screening.checks
+    frf = read.recording.frf
+    due = again.sel(band=(frf.frequency[0], frf.frequency[-1]))
+    np.testing.assert_allclose(frf.values, due.values)
 
 
 def lines(damping, delay):

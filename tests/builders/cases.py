@@ -1,5 +1,7 @@
 """Small cases: a plate with a mass in one corner, recorded on the model's own responses."""
 
+import shutil
+
 import chladni
 from chladni.effects.points import with_masses
 from chladni.io.nastran import write_assembly
@@ -7,6 +9,7 @@ from chladni.io.tables.write_tables import write_npz
 from chladni_specimens.plates import plate
 
 SENSORS = (2, 4, 7, 18, 30, 43)
+NINE = (2, 4, 7, 18, 24, 30, 36, 43, 47)
 CASE = """
 [model]
 deck = "plate.bdf"
@@ -24,6 +27,17 @@ def case_text(low, top, mass=None, recording="frf.npz"):
     """The words of a case of plate.bdf in SI, a weighed mass among them where one is given."""
     weighed = "" if mass is None else f"mass = {mass}"
     return CASE.format(recording=recording, mass=weighed, low=low, top=top)
+
+
+def changed_case(source, to, *words):
+    """A copy of the folder of a case, with (old, new) words of its case.toml; its folder."""
+    shutil.copytree(source, to, ignore=shutil.ignore_patterns("out", "identified"))
+    text = (to / "case.toml").read_text()
+    for old, new in words:
+        assert old in text
+        text = text.replace(old, new)
+    (to / "case.toml").write_text(text, encoding="utf-8")
+    return to
 
 
 def write_case(folder, shells, sensors, frequency, top):

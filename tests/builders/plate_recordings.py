@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+from tests.builders.recordings import noisy
 
 import chladni
 from chladni.effects.points import with_masses
@@ -42,9 +43,8 @@ def record(path, t=T, mass=0.0, shakers=SHAKERS[:1], seed=0):
     write_assembly(article, path.with_suffix(".bdf"))
     model = chladni.load(path.with_suffix(".bdf"), "SI")
     ends, drives = (list(labels(article, p)) for p in (SENSORS, shakers))
-    H = chladni.frf(model, ends, drives, np.linspace(15, 230, 900)).frfs[0].to("accelerance")
-    z = np.random.default_rng(seed).normal(size=(2, *H.values.shape))
-    values = H.values * (1 + 0.005 * (z[0] + 1j * z[1]) / np.sqrt(2))
+    H = chladni.frf(model, ends, drives, np.linspace(15, 230, 450)).frfs[0].to("accelerance")
+    values = noisy(H.values, 0.005, seed)
     named = labels(DECK, SENSORS), labels(DECK, shakers)
     write_npz(path, replace(H, values=values, outputs=named[0], inputs=named[1]))
     return round(chladni.modes(model, 7).mass, 5)

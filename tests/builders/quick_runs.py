@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
+from tests.builders.shared_results import made_once
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import Identified, identify
@@ -37,14 +38,18 @@ _PHOTO, _SAVE, _WORDS = canvas._photo, Figure.savefig, paper._no_formulas
 
 @contextmanager
 def identified_once() -> Iterator[None]:
-    """The same recording with the same arguments is identified once."""
+    """The same recording with the same arguments is identified once, by one process."""
 
     found: Any = identify
 
+    def identified(frf: FRF, given: Any, named: Any) -> Identified:
+        return found(frf, *given, **dict(named))
+
     def once(frf: FRF, *given: Any, progress: Progress = silent, **named: Any) -> Identified:
-        key = pickle.dumps((frf, given, sorted(named.items())))
+        asked = frf, given, sorted(named.items())
+        key = pickle.dumps(asked)
         if key not in _KNOWN:
-            _KNOWN[key] = found(frf, *given, progress=progress, **named)
+            _KNOWN[key] = made_once(identified, *asked)
         return _KNOWN[key]
 
     with pytest.MonkeyPatch.context() as patch:

@@ -1,5 +1,6 @@
 """Results that are made once in a run of the tests, however many processes take part in it."""
 
+import hashlib
 import os
 import pickle
 from collections.abc import Callable, Iterator
@@ -8,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+RUN: list[Path] = []  # the folder of this run, as its conftest says
 
 
 def folder_of_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -26,6 +29,13 @@ def shared_folder(run: Path, name: str, write: Callable[[Path], object]) -> Path
             write(part)
             part.rename(place)
     return place
+
+
+def made_once(make: Callable[..., Any], *given: Any) -> Any:
+    """``make(*given)`` of the first process that asks; the key is the content of what is given."""
+    (run,) = RUN
+    key = hashlib.sha256(pickle.dumps(given)).hexdigest()[:24]
+    return shared_result(run, f"{make.__name__}-{key}", lambda: make(*given))
 
 
 def shared_result(run: Path, name: str, make: Callable[[], Any]) -> Any:

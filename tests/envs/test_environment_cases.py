@@ -1,13 +1,12 @@
 """Every environment on a case folder: the panel, recorded with one modulus off."""
 
-from dataclasses import replace
-
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from numpy.testing import assert_array_equal
 from tests.builders.environments import story
+from tests.builders.structures import stiffer
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
@@ -55,13 +54,10 @@ def case(tmp_path_factory):
 
 def _recorded(panel):
     """Accelerance of an article that is softer than the deck, with a little noise."""
-    steel = panel.parts[0].section.membrane
-    soft = replace(steel, E=SOFT * steel.E)
-    parts = tuple(p.with_section(membrane=soft, bending=soft, shear=soft) for p in panel.parts)
-    built = structure(panel.with_parts(parts))
+    built = structure(stiffer(panel, SOFT))
     modal = normal_modes(built.system, 60).with_damping(0.01)
     phi = modal.at(SENSORS)
-    f = np.arange(10.0, 130.0, 0.2)
+    f = np.arange(10.0, 130.0, 0.4)
     omega, omega_r = 2 * np.pi * f[:, None], 2 * np.pi * modal.frequency
     h = -(omega**2) / (omega_r**2 - omega**2 + 0.02j * omega_r * omega)
     H = np.einsum("ir,kr,jr->kij", phi, h, phi[2:3])
@@ -85,18 +81,14 @@ def ready(recorded, monkeypatch):
 @pytest.mark.parametrize("id", IDS)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
 def test_contracts_with_a_case(ready, case, id):
-    """Gymnasium's checker and, where it is installed, that of Stable-Baselines3."""
     env = gym.make(f"chladni_envs:{id}", case=case, render_mode="rgb_array")
     check_env(env.unwrapped)
     env.reset(seed=0)
     assert env.render().shape[2] == 3
-    sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
-    sb3.check_env(env.unwrapped, warn=False)
 
 
-@pytest.mark.parametrize("id", [i for i in IDS if "Placement" in i])
-def test_vectors_with_a_case_are_identical(case, id):
-    options = {"case": case, "modes": 8}
+def test_vectors_with_a_case_are_identical(case):
+    id, options = "chladni/SensorPlacement-v0", {"case": case, "modes": 8}
     assert_array_equal(story("sync", 5, id, **options), story("async", 5, id, **options))
 
 
@@ -108,12 +100,6 @@ def test_shakers_of_a_case_are_vetoed_by_its_mesh(case):
     closed = np.full(len(specimen.points), False)
     with pytest.raises(ShapeError, match="access and rattle leave 0"):
         gym.make("chladni_envs:chladni/ActuatorPlacement-v0", case=case, modes=8, access=closed)
-
-
-def test_sensors_of_a_case(case):
-    env = gym.make("chladni_envs:chladni/SensorPlacement-v0", case=case, modes=8, n_sensors=10)
-    efi, best = (agents.play(env, a) for a in (agents.efi, agents.exchange(env)))
-    assert efi["log_det"] <= best["log_det"]
 
 
 def test_actuators_of_a_case(case):

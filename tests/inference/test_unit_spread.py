@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from chladni.inference.unit_spread import KNOWN, unit_spread
 
 TAU = np.array([0.03, 0.2])
-SEEDS = 100
+SEEDS = 50
 
 
 def drawn(seed, articles=3, tau=TAU, form=50.0, samples=24):

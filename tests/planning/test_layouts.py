@@ -57,29 +57,18 @@ def simply_supported(n, modes):
     )
 
 
-def test_deletion_identity():
-    """det of what is left = det of all times (1 - E_i)."""
-    left = [log_det_fisher(np.delete(phi, i, axis=0)) for i in range(len(phi))]
-    np.testing.assert_allclose(left, log_det_fisher(phi) + np.log(1 - independence(phi)))
-
-
 @pytest.mark.parametrize("prior", [None, np.eye(3), np.diag([0.0, 1.0, 2.0])])
-def test_deletion_identity_under_correlated_noise_and_prior(prior):
-    noise = correlated(9)
+@pytest.mark.parametrize("noise", [np.ones(9), np.linspace(0.5, 2, 9), correlated(9)], ids=np.ndim)
+def test_deletion_identity(noise, prior):
+    """det of what is left = det of all times (1 - E_i); noise is variances or a covariance."""
+    dense = noise if noise.ndim == 2 else np.diag(noise)
     F_0 = np.zeros((3, 3)) if prior is None else prior
     log_det = [
-        np.linalg.slogdet(F_0 + fisher_of(phi, kept, noise))[1]
+        np.linalg.slogdet(F_0 + fisher_of(phi, kept, dense))[1]
         for kept in (range(9), *(np.delete(np.arange(9), i) for i in range(9)))
     ]
     E = independence(phi, noise, prior)
     np.testing.assert_allclose(log_det[0] + np.log(1 - E), log_det[1:])
-
-
-@pytest.mark.parametrize("prior", [2 * np.eye(3), np.diag([0.0, 1.0, 2.0])])
-def test_deletion_identity_under_a_prior(prior):
-    left = [log_det_fisher(np.delete(phi, i, axis=0), prior=prior) for i in range(len(phi))]
-    whole = np.linalg.slogdet(phi.T @ phi + prior)[1]
-    np.testing.assert_allclose(left, whole + np.log(1 - independence(phi, prior=prior)))
 
 
 def test_deletion_identity_over_draws():
@@ -109,12 +98,6 @@ def test_independence_is_a_projection():
 
 def test_mode_scaling_does_not_matter():
     np.testing.assert_allclose(independence(phi), independence(phi * [1e3, 1, 1e-3]))
-
-
-def test_one_deletion_is_optimal():
-    """Greedy and exhaustive search agree when only one candidate goes."""
-    best = max(combinations(range(9), 8), key=lambda kept: log_det_fisher(phi[list(kept)]))
-    np.testing.assert_array_equal(effective_independence(phi, 8), best)
 
 
 def test_downdates_follow_the_definition():
@@ -183,9 +166,9 @@ def test_mirrored_places_are_ties_decided_by_number():
 
 
 def test_exchange_meets_exhaustive_search():
-    """200 random instances: within 1 % of the best determinant per mode in at least 95 %."""
+    """80 random instances: within 1 % of the best determinant per mode in at least 95 %."""
     near = []
-    for seed in range(200):
+    for seed in range(80):
         rng = np.random.default_rng(seed)
         p, n = int(rng.integers(2, 5)), int(rng.integers(8, 12))
         m = int(rng.integers(p, 7))
@@ -205,20 +188,6 @@ def test_better_methods_are_better(seed):
     single = exchange(shapes, efi)
     many = best_layout(shapes, 8, starts=10)
     scores = [log_det_fisher(shapes[k]) for k in (qr_ranking(shapes)[:8], efi, single, many)]
-    assert scores == sorted(scores)
-
-
-def test_pysensors_is_not_better():
-    """EFI and exchange against the pivots PySensors chooses, on a plate and its own terms."""
-    ps = pytest.importorskip("pysensors")
-    shapes = simply_supported(12, 8)
-    optimiser = ps.optimizers.QR()
-    pivots = optimiser.fit(shapes).get_sensors()
-    np.testing.assert_allclose(  # the same first p pivots, up to ties of the symmetric plate
-        log_det_fisher(shapes[pivots[:8]]), log_det_fisher(shapes[qr_ranking(shapes)[:8]])
-    )
-    efi = effective_independence(shapes, 12)
-    scores = [log_det_fisher(shapes[k]) for k in (pivots[:12], efi, exchange(shapes, efi))]
     assert scores == sorted(scores)
 
 
@@ -264,13 +233,6 @@ def test_correlated_deletion_against_an_independent_implementation():
             )
         )
     np.testing.assert_array_equal(effective_independence(shapes, 5, noise=noise), kept)
-
-
-def test_diagonal_covariance_is_variances():
-    variance = np.random.default_rng(4).uniform(0.5, 2, 9)
-    np.testing.assert_array_equal(
-        best_layout(phi, 5, noise=variance), best_layout(phi, 5, noise=np.diag(variance))
-    )
 
 
 def test_a_noisy_place_is_avoided():
@@ -331,7 +293,7 @@ def test_entropy_is_that_of_the_normal():
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000), st.integers(3, 7), st.booleans())
 def test_rules_are_obeyed(seed, m, by_region):
     """Fixed, forbidden, distance, regions: in every layout of every method."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.structures import joined
 
 import chladni_planning as pretest
 from chladni.errors import ModelError, ShapeError
@@ -65,10 +66,10 @@ def test_a_covered_sheet_is_not_reachable():
     lower = plate(0.4, 0.3, 8, 6, 1e-3)
     for gap in (0.02, 0.003):
         upper = replace(lower, points=lower.points + gap * UP)
-        both = _joined(lower, upper)
+        both = joined(lower, upper)
         places = find_sensor_candidates(both, 500)
         assert np.all(places.side == np.where(places.points[:, 2] > gap / 2, 1, -1))
-        three = _joined(both, replace(lower, points=lower.points + gap / 2 * UP))
+        three = joined(both, replace(lower, points=lower.points + gap / 2 * UP))
         middle = find_sensor_candidates(three, 500).points[:, 2]
         inner = np.abs(middle - gap / 2) < 1e-9
         assert not inner.any() or find_sensor_candidates(three, 500).points[inner][:, 0].min() < 0.1
@@ -79,7 +80,7 @@ def test_a_sensor_needs_room():
     lower = plate(0.4, 0.3, 16, 12, 1e-3)
     strip = plate(0.4, 0.008, 16, 1, 1e-3)
     strip = replace(strip, points=strip.points + np.array([0.0, 0.146, 0.01]))
-    both = _joined(lower, strip)
+    both = joined(lower, strip)
     for room, below in ((0.03, True), (0.004, False)):
         places = find_sensor_candidates(both, 500, room=room)
         under = (np.abs(places.points[:, 1] - 0.15) < 0.006) & (places.points[:, 2] == 0)
@@ -87,24 +88,6 @@ def test_a_sensor_needs_room():
         assert np.all((places.side[under] == -1) == below)
         far = (np.abs(places.points[:, 1] - 0.15) > 0.06) & (places.points[:, 2] == 0)
         assert np.all(places.side[far] == 1)
-
-
-def _joined(a, b):
-    """One assembly of two that share nothing."""
-    n = len(a.points)
-    s, t = a.shells, b.shells
-    shells = replace(
-        s,
-        ids=np.r_[s.ids, t.ids + s.ids.max()],
-        nodes=np.r_[s.nodes, t.nodes + n],
-        part=np.r_[s.part, t.part],
-        thickness=np.r_[s.thickness, t.thickness],
-        axis=np.r_[s.axis, t.axis],
-        offset=np.r_[s.offset, t.offset],
-    )
-    return replace(
-        a, ids=np.r_[a.ids, b.ids + a.ids.max()], points=np.r_[a.points, b.points], shells=shells
-    )
 
 
 def test_places_do_not_depend_on_the_unit_of_length(panel):

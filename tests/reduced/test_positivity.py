@@ -1,11 +1,12 @@
 """No parameter of any effect or nuisance takes stiffness below zero, whatever all others are."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pytest
+from tests.builders.structures import held_along_x0
 
 from chladni.effects.calibration_parameters import defaults
 from chladni.effects.effect import Effect, Parameter
@@ -107,16 +108,10 @@ def ground(assembly: Assembly, f_max: float) -> Ground:
     return Ground(reduced, every, Catalogue(reduced, f_max))
 
 
-def clamped() -> Assembly:
-    free = plate(0.3, 0.2, 6, 4, 1.5e-3)
-    edge = np.flatnonzero(free.points[:, 0] == 0)
-    return replace(free, supports=np.array([(row, c) for row in edge for c in range(1, 7)]))
-
-
 STRUCTURES = {
     "panel": lambda: ground(folded_panel(0.05), 200.0),
     "jointed plates": lambda: ground(on_firm_springs(tied_plates()), 300.0),
-    "clamped plate": lambda: ground(clamped(), 300.0),
+    "clamped plate": lambda: ground(held_along_x0(plate(0.3, 0.2, 6, 4, 1.5e-3)), 300.0),
     "tailgate": lambda: ground(tailgate(TailgateDesign(size=0.030)), 100.0),
 }
 

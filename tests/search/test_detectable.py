@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.recordings import across, noisy
 
 import chladni
 from chladni.effects.points import with_masses
-from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.inference.map_fit import MassMeasurement
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_npz
 from chladni.search.detectable import detectable
 from chladni.search.question import Question
 from chladni_specimens.plates import plate
@@ -18,19 +20,13 @@ SENSORS = (2, 4, 7, 18, 30, 43)
 PREDICTED = ["point-mass", "stiffness-patch", "thickness-distribution"]
 
 
-def dofs(*grids):
-    rows = MADE.rows(list(grids))
-    return MeasuredDofs(
-        tuple(f"{g}:+Z" for g in grids), np.array(grids), MADE.points[rows],
-        np.tile([0.0, 0, 1], (len(grids), 1)), np.zeros(len(grids)), np.zeros(len(grids)),
-    )  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def question():
     mass = MADE.parts[0].section.membrane.rho * 0.3 * 0.22 * 1e-3
     weighed = MassMeasurement(mass, 0.002 * mass)
-    return Question(MADE, dofs(*SENSORS), dofs(2), band=(20.0, 170.0), mass_measurement=weighed)
+    return Question(
+        MADE, across(MADE, SENSORS), across(MADE, [2]), band=(20.0, 170.0), mass_measurement=weighed
+    )
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +46,7 @@ def test_noise_hides(question, found):
 
 
 def test_sensors_find(question, found):
-    few = detectable(replace(question, outputs=dofs(*SENSORS[:2])))
+    few = detectable(replace(question, outputs=across(MADE, SENSORS[:2])))
     for name in ("mass", "softer", "thinner"):
         assert np.median(filled(getattr(few, name))) > np.median(filled(getattr(found, name))), name
 
@@ -83,16 +79,11 @@ def test_what_is_found_is_named_by_a_diagnosis(found, tmp_path):
 
 def a_case(folder, article):
     """The article's own responses with 1 % of noise, its deck without the mass, three families."""
-    from chladni.io.nastran import write_assembly
-    from chladni.io.tables.write_tables import write_npz
-
     folder.mkdir()
     write_assembly(MADE, folder / "plate.bdf")
     model = chladni.load(write_assembly(article, folder / "article.bdf"), "SI")
-    H = model.frf([f"{g}:+Z" for g in SENSORS], "2:+Z", np.linspace(15, 180, 450))
-    noise = np.random.default_rng(500).normal(size=(2, *H.values.shape)) / np.sqrt(2)
-    values = H.values * (1 + 0.01 * (noise[0] + 1j * noise[1]))
-    write_npz(folder / "frf.npz", replace(H, values=values))
+    H = model.frf([f"{g}:+Z" for g in SENSORS], "2:+Z", np.linspace(15, 180, 250))
+    write_npz(folder / "frf.npz", replace(H, values=noisy(H.values, 0.01, 500)))
     mass = chladni.modes(model, 7).mass
     (folder / "case.toml").write_text(
         '[model]\ndeck = "plate.bdf"\nunits = "SI"\n[test]\nrecordings = ["frf.npz"]\n'

@@ -6,10 +6,9 @@ from functools import partial
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.recordings import accelerances, across, noisy
 
-from chladni.dynamics.frf import FRF
 from chladni.effects.points import with_masses
-from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import modelled
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import MassMeasurement
@@ -81,41 +80,34 @@ GRIDS = np.array([2, 4, 6, 18, 20, 30, 33, 43, 45, 47])
 PLATE = plate(0.3, 0.22, 6, 6, 1e-3)
 
 
-def sites(grids: np.ndarray) -> MeasuredDofs:
-    n = len(grids)
-    return MeasuredDofs(
-        tuple(f"{g}:+Z" for g in grids), grids, PLATE.points[PLATE.rows(grids)],
-        np.tile([0.0, 0.0, 1.0], (n, 1)), np.zeros(n), np.zeros(n),
-    )  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def question() -> Question:
     """A plate that carries 25 g which the deck lacks, with 2 of 10 sensors held out."""
     model = modelled(with_masses(PLATE, (32,), 0.025), 900.0)
-    phi_o, phi_i = (sites(g).rows(model.structure) @ model.modes.shapes for g in (GRIDS, GRIDS[:1]))
-    f = np.linspace(15, 200, 350)
-    s, w = 2j * np.pi * f[:, None], 2 * np.pi * model.modes.frequency
-    H = np.einsum("or,fr,ir->foi", phi_o, s**2 / (s**2 + 0.02 * w * s + w**2), phi_i)
-    z = np.random.default_rng(3).normal(size=(2, *H.shape))
-    values = H * (1 + 0.005 * (z[0] + 1j * z[1]))
-    outputs, inputs = sites(GRIDS), sites(GRIDS[:1])
-    frf = FRF(values, f, outputs.labels, inputs.labels, "accelerance")
+    outputs, inputs = across(PLATE, GRIDS), across(PLATE, GRIDS[:1])
+    H = accelerances(model, outputs, inputs, np.linspace(15, 200, 350))
+    frf = replace(H, values=noisy(H.values, 0.007, 3))
     return Question(
         PLATE, outputs, inputs, frf=frf, band=(LOW, HIGH), effects=("point-mass",),
         mass_measurement=MassMeasurement(0.518 + 0.025, 0.001),
     )  # fmt: skip
 
 
-def test_no_decision_uses_data_that_report(question):
-    """Nonsense on all samples that report: every number of the decision stays, reported Q moves."""
+@pytest.fixture(scope="module")
+def answered(question):
+    """The question made ready, the null of its search, and what is answered."""
     ready = prepare(question)
+    return ready, *_answer(question, ready)
+
+
+def test_no_decision_uses_data_that_report(question, answered):
+    """Nonsense on all samples that report: every number of the decision stays, reported Q moves."""
+    ready, _, decision, Q = answered
     spoilt = replace(
         ready, score=_spoilt(ready.score, ready.held.reporting),
         problem=replace(ready.problem, data=_spoilt(ready.problem.data, ready.unseen.reporting)),
     )  # fmt: skip
-    answers = [_answer(question, p) for p in (ready, spoilt)]
-    (decision, Q), (again, worse) = answers
+    _, again, worse = _answer(question, spoilt)
     assert decision.named
     assert decision == again
     assert_allclose(Q[0].effect, worse[0].effect, rtol=1e-9)
@@ -123,16 +115,15 @@ def test_no_decision_uses_data_that_report(question):
     assert worse[1].effect > 100 * Q[1].effect
 
 
-def test_data_that_choose_speak_against_a_name(question):
+def test_data_that_choose_speak_against_a_name(question, answered):
     """Samples that choose are as the calibration without the mass predicts: they oppose it."""
-    ready = prepare(question)
+    ready, null, decision, _ = answered
     problem, at = ready.problem, ready.unseen.choosing[..., None]
-    null = diagnose(problem).null
     foretold = problem.data.rebased(null.model).model(null.fit.state)
     data = replace(problem.data, values=np.where(at, foretold, problem.data.values))
     spoilt = replace(ready, problem=replace(problem, data=data))
-    votes, opposed = (_answer(question, p)[0].votes.held_out for p in (ready, spoilt))
-    assert opposed < 0 < votes
+    opposed = _answer(question, spoilt)[1]
+    assert opposed.votes.held_out < 0 < decision.votes.held_out
 
 
 def _spoilt(data: Responses, at: np.ndarray) -> Responses:
@@ -143,4 +134,8 @@ def _answer(question, prepared):
     found = diagnose(prepared.problem)
     refine = partial(refined, question, prepared)
     decision, known = decided(prepared, found, refine)
-    return decision, fitted_scores(prepared, concluded(prepared, found, decision, known)[0])
+    return (
+        found.null,
+        decision,
+        fitted_scores(prepared, concluded(prepared, found, decision, known)[0]),
+    )

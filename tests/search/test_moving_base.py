@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.testing import assert_allclose
+from tests.builders.structures import held_along_x0
 
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect, MatrixTerm, Parameter, count
@@ -35,10 +36,7 @@ CLOSE = LIMIT / ZETA  # what a frequency error that still serves does on a reson
 @pytest.fixture(scope="module")
 def clamped():
     """A plate held along one edge."""
-    made = plate(0.4, 0.25, 8, 6, 1.5e-3)
-    edge = np.flatnonzero(made.points[:, 0] == 0)
-    held = np.array([(k, c) for k in edge for c in range(1, 7)])
-    return replace(made, supports=held)
+    return held_along_x0(plate(0.4, 0.25, 8, 6, 1.5e-3))
 
 
 @pytest.fixture(scope="module")

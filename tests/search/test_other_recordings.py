@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.recordings import accelerances, across, noisy
 
-from chladni.dynamics.frf import FRF
 from chladni.effects.points import with_masses
 from chladni.ema.identification import equalised, identify
 from chladni.ema.level_modes import AtLevel
 from chladni.ema.level_study import level_study
 from chladni.ema.level_words import level_notes
-from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import modelled
 from chladni.inference.map_fit import MassMeasurement
 from chladni.search.other_recordings import (
@@ -29,25 +28,11 @@ GRIDS = np.array([2, 4, 7, 18, 30, 43])
 F = np.linspace(15, 200, 700)
 
 
-def sites(assembly, grids):
-    n = len(grids)
-    return MeasuredDofs(
-        tuple(f"{g}:+Z" for g in grids), np.asarray(grids), assembly.points[assembly.rows(grids)],
-        np.tile([0.0, 0.0, 1.0], (n, 1)), np.zeros(n), np.zeros(n),
-    )  # fmt: skip
-
-
 def recorded(assembly, seed, stretch=1.0, noise=0.005):
     """Accelerances with every frequency stretched, 1 % damping and some noise."""
-    model = modelled(assembly, 900.0)
-    phi_o = sites(assembly, GRIDS).rows(model.structure) @ model.modes.shapes
-    phi_i = sites(assembly, [2]).rows(model.structure) @ model.modes.shapes
-    s, w = 2j * np.pi * F[:, None], 2 * np.pi * stretch * model.modes.frequency
-    H = np.einsum("or,fr,ir->foi", phi_o, s**2 / (s**2 + 0.02 * w * s + w**2), phi_i)
-    z = np.random.default_rng(seed).normal(size=(2, *H.shape))
-    values = H * (1 + noise * (z[0] + 1j * z[1]) / np.sqrt(2))
-    labels = tuple(f"{g}:+Z" for g in GRIDS)
-    return FRF(values, F, labels, ("2:+Z",), "accelerance")
+    ends = across(assembly, GRIDS), across(assembly, [2])
+    H = accelerances(modelled(assembly, 900.0), *ends, F, stretch=stretch)
+    return replace(H, values=noisy(H.values, noise, seed))
 
 
 DECK = plate(0.3, 0.22, 6, 6, 1e-3)
@@ -55,7 +40,7 @@ DECK = plate(0.3, 0.22, 6, 6, 1e-3)
 
 def asked(*others, level=None):
     return Question(
-        DECK, sites(DECK, GRIDS), sites(DECK, [2]), frf=recorded(DECK, 0), band=(20.0, 170.0),
+        DECK, across(DECK, GRIDS), across(DECK, [2]), frf=recorded(DECK, 0), band=(20.0, 170.0),
         mass_measurement=MassMeasurement(0.518, 0.001), others=others, level=level,
     )  # fmt: skip
 

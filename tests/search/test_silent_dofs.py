@@ -1,9 +1,8 @@
 """A drive or a sensor at which the model does not respond is refused with its label."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from tests.builders.structures import held_along_x0
 
 from chladni.errors import LabelError
 from chladni.fem.measured_dofs import MeasuredDofs
@@ -30,37 +29,32 @@ def free():
 
 @pytest.fixture(scope="module")
 def held():
-    whole = plate(0.4, 0.3, 8, 6, 1.5e-3)
-    edge = np.flatnonzero(whole.points[:, 0] == 0)
-    supports = np.array([(row, c) for row in edge for c in range(1, 7)])
-    return modelled(replace(whole, supports=supports), 300.0)
+    return modelled(held_along_x0(plate(0.4, 0.3, 8, 6, 1.5e-3)), 300.0)
 
 
 SENSORS = ((9, ACROSS), (33, ACROSS), (52, ACROSS))
 
 
-@pytest.mark.parametrize("structure", ["free", "held"])
-def test_a_force_in_the_plane_of_a_sheet_moves_no_sensor_across_it(request, structure):
+@pytest.mark.parametrize(
+    ("structure", "outputs", "drive", "said"),
+    [
+        # a force in the plane of a sheet moves no sensor across it
+        ("free", SENSORS, (18, ALONG), r"drive 18:\+X of the model.* along \+Z it would"),
+        ("held", SENSORS, (18, ALONG), r"drive 18:\+X of the model.* along \+Z it would"),
+        ("held", [(9, ACROSS), (33, ALONG)], (18, ACROSS),
+         r"sensor 33:\+X of the model.* along \+Z it would"),
+        ("held", [(3, ACROSS), (9, ACROSS)], (1, ACROSS), r"hold drive 1:\+Z and sensor 3:\+Z"),
+    ],
+)  # fmt: skip
+def test_what_is_silent_is_refused_with_its_label(request, structure, outputs, drive, said):
     model = request.getfixturevalue(structure)
-    with pytest.raises(LabelError, match=r"drive 18:\+X of the model.* along \+Z it would"):
-        refuse_silent(model, places(model, *SENSORS), places(model, (18, ALONG)))
-
-
-def test_a_sensor_in_the_plane_is_refused_where_no_force_is(held):
-    with pytest.raises(LabelError, match=r"sensor 33:\+X of the model.* along \+Z it would"):
-        refuse_silent(held, places(held, (9, ACROSS), (33, ALONG)), places(held, (18, ACROSS)))
-
-
-def test_what_supports_hold_is_named_on_both_sides(held):
-    with pytest.raises(LabelError, match=r"hold drive 1:\+Z and sensor 3:\+Z"):
-        refuse_silent(held, places(held, (3, ACROSS), (9, ACROSS)), places(held, (1, ACROSS)))
+    with pytest.raises(LabelError, match=said):
+        refuse_silent(model, places(model, *outputs), places(model, drive))
 
 
 def test_what_a_support_leaves_free_is_said():
     """Held across the sheet alone, an edge still moves along it."""
-    whole = plate(0.4, 0.3, 8, 6, 1.5e-3)
-    edge = np.flatnonzero(whole.points[:, 0] == 0)
-    model = modelled(replace(whole, supports=np.array([(row, 3) for row in edge])), 300.0)
+    model = modelled(held_along_x0(plate(0.4, 0.3, 8, 6, 1.5e-3), (3,)), 300.0)
     with pytest.raises(LabelError, match=r"along \+X or \+Y it would"):
         refuse_silent(model, places(model, (1, ACROSS), (9, ACROSS)), places(model, (33, ACROSS)))
 

@@ -7,7 +7,9 @@ import numpy as np
 import pandas
 import pytest
 import xarray
+from tests.builders.cases import changed_case
 from tests.builders.commands import ran, refused
+from tests.builders.structures import stiffer
 
 import chladni
 from chladni.io.tables.write_tables import write_npz
@@ -43,18 +45,7 @@ def folder(deck, tmp_path_factory):
     folder = tmp_path_factory.mktemp("case")
     (folder / "plate.bdf").write_bytes(deck.read_bytes())
     model = chladni.load(deck, "SI")
-    parts = model.assembly.parts
-    stiffer = model.assembly.with_parts(
-        tuple(
-            p.with_section(**{
-                side: type(m)(E=1.05 * m.E, nu=m.nu, rho=m.rho, id=m.id)
-                for side in ("membrane", "bending", "shear")
-                if (m := getattr(p.section, side)) is not None
-            })
-            for p in parts
-        )
-    )  # fmt: skip
-    article = type(model)(model.source, stiffer)
+    article = type(model)(model.source, stiffer(model.assembly, 1.05))
     made = chladni.frf(article, ["3:+Z", "8:+Z", "17:+Z"], ["1:+Z"], np.linspace(15, 100, 300))
     write_npz(folder / "frf.npz", made.frfs[0].to("accelerance"))
     (folder / "case.toml").write_text(CASE)
@@ -168,12 +159,8 @@ def test_mostly_failed_is_not_to_be_trusted(deck, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ['Ω \n,"E"', "E/rho <b>", "x" * 300, "$_$"])
 def test_any_name_goes_through_every_file(folder, tmp_path, name):
-    place = tmp_path / "Gehäuse Ω"
-    place.mkdir()
-    for file in ("plate.bdf", "frf.npz"):
-        (place / file).write_bytes((folder / file).read_bytes())
     quoted = json.dumps(name, ensure_ascii=False)
-    (place / "case.toml").write_text(CASE.replace('"sheet"', quoted), encoding="utf-8")
+    place = changed_case(folder, tmp_path / "Gehäuse Ω", ('"sheet"', quoted))
     ran("study", place, "--samples", 5, "--sampler", "oat", "--modes", 2, "--out", tmp_path / "x")
     table = pandas.read_csv(tmp_path / "x/samples.csv")
     assert name in table.columns
@@ -187,9 +174,5 @@ def test_any_name_goes_through_every_file(folder, tmp_path, name):
 
 @pytest.mark.parametrize("name", ["Q", "f1_hz", "sample", "mode"])
 def test_a_parameter_is_not_called_as_a_result(folder, tmp_path, name):
-    place = tmp_path / "case"
-    place.mkdir()
-    for file in ("plate.bdf", "frf.npz"):
-        (place / file).write_bytes((folder / file).read_bytes())
-    (place / "case.toml").write_text(CASE.replace('"sheet"', f'"{name}"'))
+    place = changed_case(folder, tmp_path / "case", ('"sheet"', f'"{name}"'))
     assert "cannot be called" in refused("study", place, "--samples", 5, "--out", tmp_path / "x")

@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.builders.cases import SENSORS, write_case
+from tests.builders.cases import NINE, SENSORS, write_case
 from tests.builders.quick_runs import quick_runs
-from tests.builders.shared_results import folder_of_run, shared_folder, shared_result
+from tests.builders.shared_results import shared_folder, shared_result
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem import modelled as fem_modelled
+
+TRIED = (  # by the diagnosis that is shared: rivals of every kind
+    "point-mass", "local-resonator", "stiffness-patch", "extra-support", "crack", "sensor-mass"
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -20,16 +24,22 @@ def _quick():
 
 
 @pytest.fixture(scope="session")
-def shared(tmp_path_factory):
-    """The folder of what all processes of this run share."""
-    return folder_of_run(tmp_path_factory)
+def folder(shared):
+    """Nothing is written here."""
+    lines = np.linspace(15, 200, 450)
+    return shared_folder(shared, "case", lambda place: write_case(place, 6, SENSORS, lines, 170.0))
 
 
 @pytest.fixture(scope="session")
-def folder(shared):
-    """Nothing is written here."""
-    lines = np.linspace(15, 200, 900)
-    return shared_folder(shared, "case", lambda place: write_case(place, 6, SENSORS, lines, 170.0))
+def place(shared):
+    """The folder of a plate that weighs a tenth less than its article; nine sensors."""
+    lines = np.linspace(15, 250, 300)
+    return shared_folder(shared, "nine", lambda place: write_case(place, 6, NINE, lines, 240.0))
+
+
+@pytest.fixture(scope="session")
+def sound(place):
+    return chladni.load_case(place)
 
 
 @pytest.fixture(scope="session")
@@ -50,7 +60,7 @@ def diagnosis(case, shared):
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(fem_modelled, "normal_modes", counted)
-            return chladni.diagnose(case), solved
+            return chladni.diagnose(replace(case, effects=TRIED)), solved
 
     return shared_result(shared, "diagnosis", made)
 

@@ -33,7 +33,7 @@ def deck(demo, tmp_path_factory):
     text = (demo / "deck.bdf").read_text(encoding="latin-1")
     (folder / "deck.bdf").write_text(text.replace("ENDDATA", "GENEL,99,1\nENDDATA"), "latin-1")
     rows = [r for r in (demo / "sensors.csv").read_text().splitlines() if r]
-    rows = [f"{rows[0]},position_sd", *(f"{r},0.002" for r in rows[1:])]
+    rows = [f"{rows[0]},position_sd", *(f"{r},0.002" for r in rows[1::2])]
     (folder / "sensors.csv").write_text("\n".join(rows) + "\n")
     return folder / "deck.bdf"
 

@@ -13,11 +13,10 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
+from tests.builders.commands import ran
 from tests.builders.quick_runs import coarse_pictures
-from typer.testing import CliRunner
 
 import chladni
-from chladni.cli.app import application
 from chladni.dynamics.frf import FRF
 from chladni.geometry.formed_mesh import FormedMesh
 from chladni.io.dyna import write_keyword
@@ -90,11 +89,9 @@ class Browser:
         self.devtools("Emulation.setEmulatedMedia", features=[feature])
 
     def complaints(self):
-        """Console messages of level SEVERE and WARNING since the last call."""
-        return [m["message"] for m in self.call("POST", "/se/log", {"type": "browser"})]
-
-    def screenshot(self, path):
-        path.write_bytes(b64decode(self.call("GET", "/screenshot")))
+        """Console messages of level SEVERE and WARNING since the last call, but for the GPU's."""
+        said = [m["message"] for m in self.call("POST", "/se/log", {"type": "browser"})]
+        return [m for m in said if "readback" not in m and "GPU stall" not in m]
 
     def pdf(self):
         return b64decode(self.call("POST", "/print", {"background": True}))
@@ -153,6 +150,7 @@ EVIL = (
 )
 READY = "return document.querySelector(`[data-name='${arguments[0]}']`).dataset.ready == 'yes'"
 PLOT = "const plot = document.querySelector(`[data-name='${arguments[0]}'] .plot`);"
+DRAWN = "return [...document.querySelectorAll('.live')].map(f => f.dataset.name)"
 NAMES = {"where", "frf", "mac", "shapes", "steps", "odds", "ladder", "left"}
 
 
@@ -204,10 +202,7 @@ def centre(page, name):
 
 
 def test_all_is_drawn_without_a_word_on_the_console_or_a_look_outside(page):
-    assert (
-        set(page.run("return [...document.querySelectorAll('.live')].map(f => f.dataset.name)"))
-        == NAMES
-    )
+    assert set(page.run(DRAWN)) == NAMES
     for name in sorted(NAMES):
         see(page, name)
     assert page.run(
@@ -215,7 +210,7 @@ def test_all_is_drawn_without_a_word_on_the_console_or_a_look_outside(page):
     )
     loaded = page.run("return performance.getEntriesByType('resource').map((e) => e.name)")
     assert all(name.startswith(("data:", "blob:")) for name in loaded)
-    assert not [m for m in page.complaints() if "readback" not in m and "GPU stall" not in m]
+    assert not page.complaints()
 
 
 def test_the_mesh_turns_where_it_is_dragged(page):
@@ -342,7 +337,7 @@ def test_names_are_shown_and_not_run(window, case, diagnosed, tmp_path):
         window.run("return document.querySelectorAll('img[src=x], a[href^=javascript]').length")
         == 0
     )
-    assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
+    assert not window.complaints()
 
 
 def curves_and_samples():
@@ -409,7 +404,7 @@ def test_a_box_over_an_axis_keeps_the_samples_within_it(sampled):
 
 
 def test_samples_and_curves_hold_at_every_width_and_run_no_name(sampled):
-    names = sampled.run("return [...document.querySelectorAll('.live')].map(f => f.dataset.name)")
+    names = sampled.run(DRAWN)
     for width, dark in ((1280, False), (390, False), (1280, True)):
         sampled.size(width, 900)
         sampled.dark(dark)
@@ -423,7 +418,7 @@ def test_samples_and_curves_hold_at_every_width_and_run_no_name(sampled):
     assert sampled.run(hover, "cloud")
     assert sampled.run("return window.hit") is None
     assert sampled.run("return document.querySelectorAll('img[src=x], a[href^=java]').length") == 0
-    assert not [m for m in sampled.complaints() if "readback" not in m and "GPU stall" not in m]
+    assert not sampled.complaints()
 
 
 # of the room next to the colour bar that the mesh takes, seen along the camera
@@ -441,78 +436,44 @@ SHARE_OF_WIDTH = (
 )
 
 
-@pytest.mark.parametrize(
-    ("command", "names"),
-    [
-        (("modes",), ["shapes"]),
-        (("check",), ["where"]),
-        (("test",), ["frf_grid"]),
-        (("frf", "--input", "2:+Z", "--output", "30:+Z", "--output", "7:+Z"), ["frf"]),
-        (("identify",), ["automac", "fit", "stabilisation"]),
-        (("correlate",), ["frf", "mac", "shapes", "where"]),
-        (("map", "plate.bdf", "formed.k", "--units", "SI"), ["change", "thickness"]),
-        (("plan", "--sensors", "6"), ["mac", "shapes", "where"]),
-        (
-            ("study", "--vary", "t=90%:110%", "--vary", "E=80%:120%", "--samples", "6"),
-            ["parallel", "responses", "slopes"],
-        ),
-        (
-            ("study", "--vary", "t=90%:110%", "--sampler", "morris", "--samples", "8"),
-            ["indices_mu_star", "parallel", "responses", "slopes"],
-        ),
-        (
-            (
-                "bench",
-                "--excitation",
-                "stepped-sine",
-                "--resolution",
-                "2",
-                "--sweeps",
-                "2",
-                "--band",
-                "20:60",
-            ),
-            ["frf", "schedule"],
-        ),
-        (
-            (
-                "bench",
-                "--excitation",
-                "hammer",
-                "--resolution",
-                "1",
-                "--averages",
-                "2",
-                "--band",
-                "20:60",
-            ),
-            ["frf", "time"],
-        ),
-    ],
-)
-def test_every_command_draws_its_page(window, folder, tmp_path, command, names):
+BENCH = "bench --band 20:60 --excitation"
+VARIED = "study --vary t=90%:110%"
+PAGES = {  # words of a command after which its case or deck comes: names of its drawings
+    "modes": "shapes",
+    "check": "where",
+    "test": "frf_grid",
+    "frf --input 2:+Z --output 30:+Z --output 7:+Z": "frf",
+    "identify": "automac fit stabilisation",
+    "correlate": "frf mac shapes where",
+    "map --units SI": "change thickness",
+    "plan --sensors 6": "mac shapes where",
+    f"{VARIED} --vary E=80%:120% --samples 6": "parallel responses slopes",
+    f"{VARIED} --sampler morris --samples 8": "indices_mu_star parallel responses slopes",
+    f"{BENCH} stepped-sine --resolution 2 --sweeps 2": "frf schedule",
+    f"{BENCH} hammer --resolution 1 --averages 2": "frf time",
+}
+
+
+@pytest.mark.parametrize("command", PAGES)
+def test_every_command_draws_its_page(window, folder, tmp_path, command):
     """With the same layout; at both widths, without a word on the console."""
-    name, *options = command
-    out = tmp_path / "out"
+    (name, *options), names, out = command.split(), PAGES[command].split(), tmp_path / "out"
+    given = [folder]
     if name == "map":
-        deck, formed, *options = options
-        form(folder / deck, tmp_path / formed)
-        options = [str(folder / deck), str(tmp_path / formed), *options]
-    else:
-        options = [str(folder), *options]
-    done = CliRunner().invoke(application(), [name, *options, "--out", str(out)])
-    assert done.exit_code == 0, done.output
+        given = [folder / "plate.bdf", tmp_path / "formed.k"]
+        form(*given)
+    ran(name, *given, *options, "--out", out)
     for width in (1280, 390):
         window.size(width, 900)
         window.open(out / "report.html")
-        seen = window.run("return [...document.querySelectorAll('.live')].map(f => f.dataset.name)")
+        seen = window.run(DRAWN)
         assert sorted(seen) == names
         for one in seen:
             see(window, one)
             if name == "map":
                 assert 0.3 < window.run(SHARE_OF_WIDTH, one) < 1
         assert window.run("return document.documentElement.scrollWidth") <= width
-    assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
+    assert not window.complaints()
     if name == "identify":
         click_a_pole(window)
 

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 from tests.builders.commands import ran
 from tests.builders.quick_runs import coarse_pictures
+from tests.builders.structures import stiffer
 
 import chladni
 from chladni.errors import ChladniError
@@ -39,6 +40,11 @@ def rewritten(place, old, new):
     assert old in text
     (place / "case.toml").write_text(text.replace(old, new))
     return place
+
+
+def weighed(place):
+    """The line of case.toml that says the mass."""
+    return next(x for x in (place / "case.toml").read_text().splitlines() if x.startswith("mass"))
 
 
 def test_a_good_case_is_not_blamed(case):
@@ -91,8 +97,7 @@ FAULTS = {  # how a case is spoilt: what must be said
 def test_what_cannot_be_right_is_exit_3_and_said(copied, tmp_path, spoilt):
     old, new, said = FAULTS[spoilt]
     if spoilt == "grams":
-        text = (copied / "case.toml").read_text()
-        mass = next(line for line in text.splitlines() if line.startswith("mass"))
+        mass = weighed(copied)
         old, new = mass, f"mass = {1e3 * float(mass.split('=')[1]):.4g}"
     rewritten(copied, old, new)
     done = ran("check", copied, "--out", tmp_path / "out", code=3)
@@ -103,15 +108,7 @@ def test_what_cannot_be_right_is_exit_3_and_said(copied, tmp_path, spoilt):
 
 def test_an_odd_material_is_the_users_own(case):
     """A modulus that is known in no system says nothing of the units."""
-    parts = tuple(
-        p.with_section(**{
-            side: replace(m, E=m.E * 1e-4)
-            for side in ("membrane", "bending", "shear")
-            if (m := getattr(p.section, side)) is not None
-        })
-        for p in case.assembly.parts
-    )  # fmt: skip
-    odd = replace(case, assembly=case.assembly.with_parts(parts))
+    odd = replace(case, assembly=stiffer(case.assembly, 1e-4))
     refuse_other_units(odd)
     (finding,) = (f for f in chladni.check(odd).findings if "usual in no unit" in f.text)
     assert not finding.fault
@@ -177,7 +174,8 @@ def test_of_a_long_recording_few_lines_are_identified(case, monkeypatch):
 
     monkeypatch.setattr(preparation, "identify", counted)
     ready(case, diagnosing=True)
-    monkeypatch.setattr("chladni.ema.screening_lines.LONG", 0)
+    for name, few in (("LONG", 0), ("BETWEEN", 100)):
+        monkeypatch.setattr(f"chladni.ema.screening_lines.{name}", few)
     assert not chladni.check(case).findings
     ready(case, diagnosing=True)
     assert lines[0] == lines[2] > lines[1] > 0
@@ -226,9 +224,7 @@ def solids(place):
     )
     cards = "MAT1,1,2.1+11,,0.3,7850.\nPSOLID,1,1\nCHEXA,1,1,1,2,4,3,5,6\n,8,7\n"
     (place / "plate.bdf").write_text(f"BEGIN BULK\n{block}\n{cards}ENDDATA\n")
-    text = (place / "case.toml").read_text()
-    mass = next(line for line in text.splitlines() if line.startswith("mass"))
-    return with_recording(rewritten(place, mass, ""), "poles.csv", poles)
+    return with_recording(rewritten(place, weighed(place), ""), "poles.csv", poles)
 
 
 def no_line(place):

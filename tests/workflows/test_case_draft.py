@@ -164,11 +164,6 @@ def test_the_place_of_a_force_at_node_0_is_asked_for(deck, frf, tmp_path):
     assert chladni.load_case(tmp_path / "case").inputs.grids.tolist() == [1]
 
 
-def test_numbers_of_grids_without_coordinates_are_said(deck, frf, tmp_path):
-    write_npz(tmp_path / "a.npz", frf)
-    assert any("no coordinates that confirm" in n for n in draft(deck, [tmp_path / "a.npz"]).notes)
-
-
 def test_a_number_is_not_used_where_the_places_say_otherwise(deck, frf, places, tmp_path):
     """One node of another place than its grid; a node without place among other numbers."""
     moved = {**places, 3: places[30]}
@@ -318,7 +313,7 @@ def test_nothing_is_replaced(deck, tmp_path):
     assert (tmp_path / "case.toml").read_text() == "mine"
 
 
-@pytest.mark.parametrize("word", ['quo"te', "new\nline", "back\\slash", "#[model]", "Blech Ä"])
+@pytest.mark.parametrize("word", ['quo"te', "new\nline", "back\\slash #[model] Ä"])
 def test_names_from_files_cannot_break_the_case(deck, frf, tmp_path, word):
     """A recording of any name, a part of any name."""
     name = word.replace("\n", " ")
@@ -354,12 +349,6 @@ def test_bad_input_is_one_sentence(deck, frf, tmp_path, arguments, named):
     assert named in refused(
         "init", *(known.get(a, a) for a in arguments), "--out", tmp_path / "out"
     )
-
-
-def test_errors_are_ours(tmp_path):
-    (tmp_path / "empty.bdf").write_text("")
-    with pytest.raises(ChladniError):
-        draft(tmp_path / "empty.bdf")
 
 
 def test_a_ring_down_alone_is_a_recording(deck, tmp_path):

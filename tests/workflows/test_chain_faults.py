@@ -6,35 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.builders.cases import write_case
+from tests.builders.cases import NINE
+from tests.builders.structures import stiffer
 
 import chladni
 from chladni.dynamics.frf import FRF
 from chladni.effects.points import with_masses
 from chladni.ema.finding import Finding, Screening
+from chladni.fem.modelled import modelled
 from chladni.inference.chain_hypotheses import chain_faults, without_modes
 from chladni.io.nastran import write_assembly
 from chladni.workflows.screening_of_case import instead_of_effects
 
-SENSORS = (2, 4, 7, 18, 24, 30, 36, 43, 47)
-
-
-@pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    """A plate whose article carries a mass of a tenth of it that the deck lacks."""
-    folder = tmp_path_factory.mktemp("chain")
-    write_case(folder, 6, SENSORS, np.linspace(15, 250, 450), 240.0)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def sound(place):
-    return chladni.load_case(place)
-
 
 @pytest.fixture(scope="module")
 def model(sound):
-    return chladni.workflows.screening_of_case.modelled(sound.assembly, 800.0)
+    return modelled(sound.assembly, 800.0)
 
 
 def with_frf(case, **change):
@@ -119,7 +106,7 @@ def test_an_error_of_the_chain_is_named_with_its_line(sound, model, spoilt):
 def test_a_mirrored_deck_is_named_where_the_structure_tells_left_from_right(sound):
     """The article of the recording, its mass in one corner; the deck without it is symmetric."""
     deck = chladni.load(sound.path.parent / "article.bdf", "SI").assembly
-    article = chladni.workflows.screening_of_case.modelled(deck, 800.0)
+    article = modelled(deck, 800.0)
     (finding,), _ = found_in(mirrored(sound), article)
     assert (finding.kind, finding.severity, finding.mend) == ("mirrored deck", "fault", ())
     assert finding.repair.startswith("reverse X of all places")
@@ -134,18 +121,9 @@ def test_physics_that_is_missing_is_no_error_of_the_chain(sound, model, level):
     assert check.passed
 
 
-@pytest.mark.parametrize("stiffer", [0.7, 1.4])
-def test_a_model_of_another_stiffness_is_no_error_of_the_chain(sound, stiffer):
-    made = sound.assembly
-    parts = tuple(
-        p.with_section(**{
-            side: replace(m, E=m.E * stiffer)
-            for side in ("membrane", "bending", "shear")
-            if (m := getattr(p.section, side)) is not None
-        })
-        for p in made.parts
-    )  # fmt: skip
-    other = chladni.workflows.screening_of_case.modelled(made.with_parts(parts), 800.0)
+@pytest.mark.parametrize("factor", [0.7, 1.4])
+def test_a_model_of_another_stiffness_is_no_error_of_the_chain(sound, factor):
+    other = modelled(stiffer(sound.assembly, factor), 800.0)
     assert found_in(sound, other)[0] == []
 
 
@@ -180,7 +158,7 @@ def spoil_files(place, to, spoilt):
     elif spoilt == "conjugated":
         held["values"] = held["values"].conj()
     elif spoilt == "grams":
-        rows = [f"{g}:+Z,{g},+Z,output,5" for g in SENSORS]
+        rows = [f"{g}:+Z,{g},+Z,output,5" for g in NINE]
         (to / "sensors.csv").write_text("\n".join(["label,grid,direction,role,mass", *rows, ""]))
         toml = toml.replace("[band]", 'sensors = "sensors.csv"\n[band]')
     elif spoilt == "pounds":

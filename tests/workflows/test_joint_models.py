@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.recordings import noisy
 from typer.testing import CliRunner
 
 from chladni.case import load_case
@@ -28,14 +29,12 @@ def write_case(folder, deck, article):
     """A deck and the responses of an article on the same grids, with 1 % noise."""
     write_assembly(deck, folder / "panel.bdf")
     write_assembly(article, folder / "article.bdf")
-    grids = deck.ids[np.unique(deck.shells.nodes)][::20]
+    grids = deck.ids[np.unique(deck.shells.nodes)][::30]
     outputs = [f"{g}:+Z" for g in grids]
-    lines = np.arange(BAND[0] - 5, BAND[1] + 80, 0.5)
+    lines = np.arange(BAND[0] - 5, BAND[1] + 80, 1.0)
     model = load_model(folder / "article.bdf", "SI")
     H = frf(model, outputs, outputs[:1], lines).frfs[0].to("accelerance")
-    noise = np.random.default_rng(3).normal(size=(2, *H.values.shape)) / np.sqrt(2)
-    values = H.values * (1 + 0.01 * (noise[0] + 1j * noise[1]))
-    write_npz(folder / "frf.npz", replace(H, values=values))
+    write_npz(folder / "frf.npz", replace(H, values=noisy(H.values, 0.01, 3)))
     (folder / "case.toml").write_text(
         '[model]\ndeck = "panel.bdf"\nunits = "SI"\n[test]\nrecordings = ["frf.npz"]\n'
         f"[band]\nfit = [{BAND[0]}, {BAND[1]}]\n[held_out]\nband = [220.0, 290.0]\n"
@@ -46,7 +45,7 @@ def write_case(folder, deck, article):
 
 @pytest.fixture(scope="module")
 def welded(tmp_path_factory):
-    deck = panel(0.04)
+    deck = panel(0.05)
     made = {v.name: v.assembly for v in joint_variants(deck)}
     return write_case(tmp_path_factory.mktemp("welded"), deck, made[TRUTH])
 

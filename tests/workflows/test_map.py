@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from tests.builders.cases import changed_case
 from tests.builders.commands import call, ran, refused
 
 import chladni
@@ -200,19 +201,15 @@ def test_a_missing_part_thins_as_its_curvature_lets_expect(tmp_path):
 
 def test_a_case_carries_the_thickness_into_the_deck_it_writes(folder, tmp_path):
     """Modes of a case with ``thickness`` are those of the mapped deck, and so is calibrated.bdf."""
-    for name in ("plate.bdf", "frf.npz"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
     own = chladni.load(folder / "plate.bdf", "SI").assembly
-    write_keyword(tmp_path / "formed.k", formed_of(own), "SI")
-    text = (folder / "case.toml").read_text()
-    text = text.replace('units = "SI"', 'units = "SI"\nthickness = "formed.k"')
-    text = text.replace("mass = ", "# mass = ")
-    (tmp_path / "case.toml").write_text(text)
-    case = chladni.load_case(tmp_path)
+    words = ('units = "SI"', 'units = "SI"\nthickness = "formed.k"'), ("mass = ", "# mass = ")
+    source = changed_case(folder, tmp_path / "case", *words)
+    write_keyword(source / "formed.k", formed_of(own), "SI")
+    case = chladni.load_case(source)
     middle = own.points[own.shells.nodes].mean(axis=1)
     np.testing.assert_allclose(case.assembly.thickness(), field(middle), rtol=1e-2)
     assert any("formed.k" in note for note in case.said("modes"))
-    done = call("calibrate", tmp_path, "--out", tmp_path / "out")
+    done = call("calibrate", source, "--out", tmp_path / "out")
     assert done.exit_code in (0, 3), done.output
     after = chladni.load(tmp_path / "out" / "calibrated.bdf", "SI").assembly
     ratio = after.thickness() / case.assembly.thickness()
@@ -229,14 +226,12 @@ def test_a_case_carries_the_thickness_into_the_deck_it_writes(folder, tmp_path):
     ],
 )
 def test_words_about_thickness_are_refused_by_a_sentence(folder, tmp_path, line, told):
-    for name in ("plate.bdf", "frf.npz"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
     own = chladni.load(folder / "plate.bdf", "SI").assembly
-    write_keyword(tmp_path / "formed.k", formed_of(own), "SI")
-    text = (folder / "case.toml").read_text().replace('units = "SI"', f'units = "SI"\n{line}')
-    (tmp_path / "case.toml").write_text(text)
+    words = ('units = "SI"', f'units = "SI"\n{line}')
+    source = changed_case(folder, tmp_path / "case", words)
+    write_keyword(source / "formed.k", formed_of(own), "SI")
     with pytest.raises(ChladniError, match=told):
-        chladni.load_case(tmp_path)
+        chladni.load_case(source)
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.builders.cases import write_case
-from tests.workflows.test_chain_faults import SENSORS, polar, with_frf
+from tests.workflows.test_chain_faults import SPOILT as OF_CHAIN
+from tests.workflows.test_chain_faults import with_frf
 
 import chladni
 from chladni.ema.frf_maps import mapped
@@ -16,23 +16,15 @@ from chladni.workflows.sign_of_gain import with_sign_of_gain
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory):
-    """A plate whose article carries a mass that the deck lacks."""
-    folder = tmp_path_factory.mktemp("mended")
-    write_case(folder, 6, SENSORS, np.linspace(15, 250, 500), 240.0)
-    toml = folder / "case.toml"
-    toml.write_text(toml.read_text() + '[search]\neffects = ["point-mass"]\n')
-    return chladni.load_case(folder)
+def sound(sound):
+    """A plate whose article carries a mass that the deck lacks; that alone is tried."""
+    return replace(sound, effects=("point-mass",))
 
 
-SPOILT = {
-    "reversed force": lambda c: with_frf(c, values=-c.frfs[0].values),
-    "conjugated FRFs": lambda c: with_frf(c, values=c.frfs[0].values.conj()),
-    "wrong quantity": lambda c: with_frf(c, quantity="mobility"),
-    "swapped parts": lambda c: with_frf(c, values=1j * c.frfs[0].values.conj()),
-    "phase in radians": lambda c: with_frf(
-        c, values=polar(c, np.radians(np.angle(c.frfs[0].values)))
-    ),
+MENDABLE = {
+    "reversed force", "conjugated FRFs", "wrong quantity", "swapped parts", "phase in radians"
+}  # fmt: skip
+SPOILT = {kind: change for change, kind, _ in OF_CHAIN.values() if kind in MENDABLE} | {
     "wrong units": lambda c: with_frf(c, values=c.frfs[0].values / 9.80665),
     "swapped channels": lambda c: with_frf(
         c, values=mapped(c.frfs[0], ("exchanged", "7:+Z", "43:+Z")).values
@@ -40,9 +32,14 @@ SPOILT = {
 }
 
 
+def few_lines(case, kind):
+    """The case in a narrow band where a recording is nonsense: its poles take long to be none."""
+    return replace(case, band=(20.0, 80.0)) if "phase" in kind else case
+
+
 @pytest.mark.parametrize("kind", SPOILT)
 def test_the_recording_is_what_it_was_before_the_fault(sound, kind):
-    spoilt = SPOILT[kind](sound)
+    spoilt = few_lines(SPOILT[kind](sound), kind)
     screening = screened_unprepared(spoilt)
     assert unmendable(screening)
     assert [f.kind for f in screening.faults if f.mend] == [kind]
@@ -56,19 +53,19 @@ def test_the_recording_is_what_it_was_before_the_fault(sound, kind):
 
 def test_a_fault_that_no_map_undoes_stops_the_diagnosis(sound):
     """The phase of magnitudes is nowhere in the file."""
-    lost = with_frf(sound, values=np.abs(sound.frfs[0].values) + 0j)
+    lost = few_lines(with_frf(sound, values=np.abs(sound.frfs[0].values) + 0j), "no phase")
     screening = screened_unprepared(lost)
     assert "no phase" in {f.kind for f in screening.faults}
     assert undone(lost, screening, ()) is None
 
 
-def test_a_diagnosis_goes_on_as_with_the_sound_recording_and_says_so(sound):
-    """Name, size and deck are those of the sound recording; JSON, notes and deck say the fault."""
-    good, found = (chladni.diagnose(c) for c in (sound, SPOILT["swapped parts"](sound)))
-    assert [e.name for e in found.effects] == [e.name for e in good.effects] == ["point-mass"]
-    sizes = [[p.value for p in r.effects[0].parameters] for r in (found, good)]
-    np.testing.assert_allclose(*sizes, rtol=1e-3)
-    assert found.distrust == good.distrust
+def test_a_diagnosis_goes_on_and_says_so(sound):
+    """Name and size are those of the article; JSON, notes and deck say the fault."""
+    found = chladni.diagnose(replace(SPOILT["swapped parts"](sound), band=(20.0, 170.0)))
+    (effect,) = found.effects
+    mass = next(p for p in effect.parameters if p.name == "M")
+    assert (effect.name, mass.value) == ("point-mass", pytest.approx(0.02, rel=0.02))
+    assert not found.distrust
     assert found.notes[0].startswith("Mended: ")
     assert "This was undone before the fit" in found.notes[0]
     (mended,) = (f for f in found.screening.findings if f.severity == "mended")
@@ -79,24 +76,25 @@ def test_a_diagnosis_goes_on_as_with_the_sound_recording_and_says_so(sound):
     assert any(c.startswith("Recording mended: ") for c in comments)
 
 
+def without_output(case, label):
+    kept = [k for k, name in enumerate(case.outputs.labels) if name != label]
+    labels = tuple(case.outputs.labels[k] for k in kept)
+    arrays = {n: getattr(case.outputs, n)[kept]
+              for n in ("grids", "points", "directions", "sd", "mass")}  # fmt: skip
+    (recording,) = case.recordings
+    fewer = replace(recording, frf=recording.frf.sel(outputs=list(labels)))
+    return replace(
+        case, outputs=replace(case.outputs, labels=labels, **arrays), recordings=(fewer,)
+    )
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("drive_point", [True, False])
 def test_an_unknown_gain_has_a_sign_of_its_own(sound, sign, drive_point):
     """A passive drive point decides it, elsewhere the model does; it is no fault."""
     case = replace(sound, gain_known=False)
     if not drive_point:
-        labels = [label for label in sound.frfs[0].outputs if label != "2:+Z"]
-        frf = sound.frfs[0].sel(outputs=labels)
-        at = [sound.outputs.labels.index(label) for label in labels]
-        outputs = replace(
-            sound.outputs,
-            labels=tuple(labels),
-            **{
-                n: getattr(sound.outputs, n)[at]
-                for n in ("grids", "points", "directions", "sd", "mass")
-            },
-        )
-        case = replace(case, outputs=outputs, recordings=(replace(case.recordings[0], frf=frf),))
+        case = without_output(case, "2:+Z")
     true = case.frfs[0].values
     case = with_frf(case, values=0.3 * sign * true)
     np.testing.assert_allclose(with_sign_of_gain(case).frfs[0].values, 0.3 * true)

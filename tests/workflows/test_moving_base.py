@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.builders.cases import case_text
+from tests.builders.cases import case_text, changed_case
 from tests.builders.commands import refused
 from tests.builders.plate_recordings import at
+from tests.builders.recordings import noisy
+from tests.builders.structures import held_along_x0
 
 import chladni
 from chladni.effects.points import with_masses
@@ -29,9 +31,7 @@ PLACE = (0.24, 0.15)  # of 20 g that the deck does not have
 
 def clamped(t=1.2e-3, finer=1):
     """A plate held along its edge x = 0."""
-    made = plate(0.3, 0.2, 10 * finer, 8 * finer, t)
-    edge = np.flatnonzero(made.points[:, 0] == 0)
-    return replace(made, supports=np.array([(k, c) for k in edge for c in range(1, 7)]))
+    return held_along_x0(plate(0.3, 0.2, 10 * finer, 8 * finer, t))
 
 
 def a_case(folder, article, seed):
@@ -41,11 +41,9 @@ def a_case(folder, article, seed):
     write_assembly(article, folder / "article.bdf")
     model = chladni.load(folder / "article.bdf", "SI")
     ends = [f"{g}:+Z" for g in at(article, SENSORS)]
-    T = chladni.frf(model, ends, ["base:+Z"], np.linspace(12, 480, 1200)).frfs[0]
-    noise = np.random.default_rng(seed).normal(size=(2, *T.values.shape))
-    values = T.values * (1 + 0.01 * (noise[0] + 1j * noise[1]) / np.sqrt(2))
+    T = chladni.frf(model, ends, ["base:+Z"], np.linspace(12, 480, 700)).frfs[0]
     labels = tuple(f"{g}:+Z" for g in at(clamped(), SENSORS))
-    write_npz(folder / "table.npz", replace(T, values=values, outputs=labels))
+    write_npz(folder / "table.npz", replace(T, values=noisy(T.values, 0.01, seed), outputs=labels))
     mass = round(chladni.modes(model, 3).mass, 5)
     tried = f"[search]\neffects = {TRIED}\n"
     (folder / "case.toml").write_text(case_text(15.0, 420.0, mass, "table.npz") + tried)
@@ -102,19 +100,17 @@ def test_a_null_stays_quiet(tmp_path):
 
 def test_the_reference_of_a_table_has_a_node_of_its_own(heavy, tmp_path):
     """Node 901 is the accelerometer on the table: sensors.csv says that it is the base."""
-    for name in ("plate.bdf", "case.toml"):
-        (tmp_path / name).write_bytes((heavy.path.parent / name).read_bytes())
-    write_npz(tmp_path / "table.npz", replace(heavy.frfs[0], inputs=("901:+Z",)))
-    text = (tmp_path / "case.toml").read_text().replace("[band]", 'sensors = "s.csv"\n[band]')
-    (tmp_path / "case.toml").write_text(text)
-    (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,base,input\n")
-    case = chladni.load_case(tmp_path)
+    words = ("[band]", 'sensors = "s.csv"\n[band]')
+    source = changed_case(heavy.path.parent, tmp_path / "case", words)
+    write_npz(source / "table.npz", replace(heavy.frfs[0], inputs=("901:+Z",)))
+    (source / "s.csv").write_text("label,grid,role\n901:+Z,base,input\n")
+    case = chladni.load_case(source)
     assert case.inputs.base.tolist() == [True]
     named, plain = (prepare(question_of(c)) for c in (case, heavy))
     assert_allclose(named.problem.data.values, plain.problem.data.values)
-    (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,bas,input\n")
+    (source / "s.csv").write_text("label,grid,role\n901:+Z,bas,input\n")
     with pytest.raises(FileError, match=r"s.csv, line 2: .*bas"):
-        chladni.load_case(tmp_path)
+        chladni.load_case(source)
 
 
 def test_what_is_compared_is_the_full_structures_transmissibility(heavy):
@@ -149,9 +145,8 @@ def test_the_page_and_the_deck(heavy, diagnosed, tmp_path):
 
 @pytest.mark.parametrize("command", ["calibrate", "diagnose", "correlate"])
 def test_a_base_without_supports_is_refused(heavy, tmp_path, command):
-    write_assembly(replace(clamped(), supports=np.zeros((0, 2), int)), tmp_path / "plate.bdf")
-    (tmp_path / "table.npz").write_bytes((heavy.path.parent / "table.npz").read_bytes())
-    (tmp_path / "case.toml").write_text(heavy.path.read_text())
+    source = changed_case(heavy.path.parent, tmp_path / "case")
+    write_assembly(replace(clamped(), supports=np.zeros((0, 2), int)), source / "plate.bdf")
     assert "the base moves, but the deck has no grid with SPC" in refused(
-        command, tmp_path, "--out", tmp_path / "x"
+        command, source, "--out", tmp_path / "x"
     )

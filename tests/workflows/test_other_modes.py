@@ -163,34 +163,24 @@ def test_modes_of_nastran_itself():
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("words", "text", "told"),
     [
-        ("none.pch", None, "no file"),
-        ("modes.txt", "", "modes are read from .op2, .pch"),
-        ("modes.pch", "$TITLE\n", "has no eigenvectors"),
-        ("modes.unv", "    -1\n    -1\n", "modes.unv"),
+        (["--modes", "none.pch"], None, "no file"),
+        (["--modes", "modes.txt"], "", "modes are read from .op2, .pch"),
+        (["--modes", "modes.pch"], "$TITLE\n", "has no eigenvectors"),
+        (["--modes", "modes.unv"], "    -1\n    -1\n", "modes.unv"),
+        (["--modes", "far.pch"], None, "belongs to this deck"),
+        ([], None, "--modes"),
     ],
 )
-def test_what_holds_no_modes_is_told(plain, tmp_path, name, text, told):
-    if text is not None:
-        (tmp_path / name).write_text(text)
-    words = ["correlate", plain[0].source, "--modes", tmp_path / name]
-    assert told in refused(*words, "--units", "SI", "--out", tmp_path / "out")
-
-
-def test_modes_of_another_deck_are_refused(plain, tmp_path):
+def test_what_is_no_comparison_of_modes_is_told(plain, tmp_path, words, text, told):
+    """Files without modes, modes of another deck, units alone."""
     model, f, motion = plain
-    far = punch(tmp_path / "far.pch", f, motion, model.assembly.ids + 5000)
-    assert "belongs to this deck" in refused(
-        "correlate", model.source, "--modes", far, "--out", tmp_path / "out"
-    )
-
-
-def test_a_deck_without_modes_is_told_what_is_due(plain, tmp_path):
-    assert "--modes with" in refused("correlate", plain[0].source, "--out", tmp_path / "out")
-
-
-def test_units_alone_are_no_comparison(plain, tmp_path):
-    assert "--modes" in refused(
-        "correlate", plain[0].source, "--units", "SI", "--out", tmp_path / "out"
-    )
+    punch(tmp_path / "far.pch", f, motion, model.assembly.ids + 5000)
+    if text is not None:
+        (tmp_path / words[1]).write_text(text)
+    given = [words[0], tmp_path / words[1]] if words else []
+    out = ("--out", tmp_path / "out")
+    assert told in refused("correlate", model.source, *given, "--units", "SI", *out)
+    if not words:
+        assert "--modes with" in refused("correlate", model.source, *out)

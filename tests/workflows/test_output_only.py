@@ -13,7 +13,7 @@ from chladni.errors import FileError
 from chladni.fem.assemble import structure
 from chladni_specimens.plates import plate
 
-RATE, SECONDS = 1024.0, 60.0
+RATE, SECONDS = 1024.0, 40.0
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,9 @@ from typing import cast
 
 import numpy as np
 import pytest
+from tests.builders.cases import changed_case
 from tests.builders.commands import call, ran, refused
+from tests.builders.recordings import noisy
 
 import chladni
 from chladni.dynamics.frf import FRF
@@ -30,7 +32,7 @@ from chladni_specimens.plates import plate
 
 LEVELS = (1.0, 4.0, 7.0, 10.0)
 SENSORS = (2, 7, 18, 43)
-F = np.arange(20, 75, 0.12)
+F = np.arange(20, 75, 0.2)
 SPRING = 5000.0  # [N/m], under each corner
 CASE = """
 [model]
@@ -66,8 +68,7 @@ def recorded(folder, level, joint, seed):
     w, W = 2 * np.pi * f, 2 * np.pi * F[:, None]
     q = -(W**2) / (w**2 * (1 + 1j * loss) - W**2)
     H = np.einsum("or,fr,r->fo", rows, q, rows[0])[:, :, None]
-    z = np.random.default_rng(seed).normal(size=(2, *H.shape)) / np.sqrt(2)
-    H = H * (1 + 0.01 * (z[0] + 1j * z[1]))
+    H = noisy(H, 0.01, seed)
     labels = tuple(f"{g}:+Z" for g in SENSORS)
     write_npz(folder / f"at_{level:g}.npz", FRF(H, F, labels, labels[:1], "accelerance"))
 
@@ -192,13 +193,8 @@ def test_linear_recordings_are_not_called_nonlinear(tmp_path):
 
 def test_what_is_held_must_have_a_level(folder, tmp_path):
     """One sentence, and no result."""
-    text = (folder / "case.toml").read_text().replace("level = 1.0\n", "")
-    (folder / "bad").mkdir(exist_ok=True)
-    for path in folder.glob("*.npz"):
-        (folder / "bad" / path.name).write_bytes(path.read_bytes())
-    (folder / "bad" / "plate.bdf").write_text((folder / "plate.bdf").read_text())
-    (folder / "bad" / "case.toml").write_text(text)
-    assert "has no level" in refused("diagnose", folder / "bad", "--out", tmp_path / "o")
+    bad = changed_case(folder, tmp_path / "bad", ("level = 1.0\n", ""))
+    assert "has no level" in refused("diagnose", bad, "--out", tmp_path / "o")
 
 
 def test_a_linear_effect_that_was_named_stays_and_is_said_to_be_of_its_level(folder):

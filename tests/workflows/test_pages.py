@@ -1,12 +1,11 @@
 """The page says what was done: what was calibrated, what was compared, and nothing else."""
 
 import json
-import shutil
 from dataclasses import replace
 
 import pytest
+from tests.builders.cases import changed_case
 from tests.builders.commands import ran
-from tests.builders.quick_runs import coarse_pictures
 
 import chladni
 from chladni.report.diagnosis_folder import write_diagnosis
@@ -17,8 +16,7 @@ from chladni.report.verdict import PLACES
 @pytest.fixture(scope="module")
 def run_folder(case, diagnosed, tmp_path_factory):
     out = tmp_path_factory.mktemp("run")
-    with coarse_pictures():
-        write_diagnosis(out, case, diagnosed)
+    write_diagnosis(out, case, diagnosed)
     return out
 
 
@@ -77,16 +75,13 @@ def test_figures_of_the_page_are_named_for_what_they_are(run_folder):
 
 def test_a_page_of_frequencies_claims_no_fitted_response(case, folder, tmp_path):
     """Places known to 2 cm only: frequencies are compared, responses are shown and said to be."""
-    source = tmp_path / "case"
-    shutil.copytree(folder, source)
+    words = ("[test]", '[test]\nsensors = "sensors.csv"')
+    source = changed_case(folder, tmp_path / "case", words)
     rows = [f"{o},{o.split(':')[0]},+Z,{role},0.02" for o, role in
             [(o, "output") for o in case.frfs[0].outputs] + [("2:+Z", "input")]]  # fmt: skip
     (source / "sensors.csv").write_text(
         "\n".join(["label,grid,direction,role,position_sd", *rows, ""])
     )
-    text = (source / "case.toml").read_text()
-    text = text.replace("[test]", '[test]\nsensors = "sensors.csv"')
-    (source / "case.toml").write_text(text)
     made = chladni.load_case(source)
     result = write_diagnosis(tmp_path / "out", made, chladni.calibrate(made))
     assert result.compared == "frequencies"

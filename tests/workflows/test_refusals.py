@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.builders.cases import changed_case
 from tests.builders.commands import ran
 
 import chladni
@@ -73,14 +74,11 @@ def test_a_result_that_is_trusted_hands_itself_out(diagnosed):
 
 def test_frfs_beside_the_poles_that_are_compared_are_screened_alone(case, tmp_path):
     """Where poles are compared the case knows places of its table alone, not those of the FRFs."""
-    source = tmp_path / "case"
-    shutil.copytree(case.path.parent, source)
+    named = '["frf.npz", "poles.csv"]\nuse = "poles.csv"\nsensors = "sensors.csv"'
+    source = changed_case(case.path.parent, tmp_path / "case", ('["frf.npz"]', named))
     (source / "poles.csv").write_text("mode,frequency_hz\n1,40.0\n2,80.0\n")
     rows = ["label,grid,direction,role", *(f"{g}:+Z,{g},+Z,input" for g in (30, 43))]
     (source / "sensors.csv").write_text("\n".join(rows) + "\n")
-    named = '["frf.npz", "poles.csv"]\nuse = "poles.csv"\nsensors = "sensors.csv"'
-    text = (source / "case.toml").read_text().replace('["frf.npz"]', named)
-    (source / "case.toml").write_text(text)
     (found,) = chladni.evaluate_recordings(chladni.load_case(source)).recordings
     assert found.screening.name == "frf.npz"
     assert "channels against the model" not in [check.name for check in found.screening.checks]

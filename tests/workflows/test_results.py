@@ -5,7 +5,6 @@ from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 import pytest
 
 import chladni
@@ -106,12 +105,3 @@ def test_a_result_of_a_file_says_that_it_holds_no_structure(diagnosed, tmp_path)
     for ask in (read.plot, lambda: read.save(tmp_path / "again")):
         with pytest.raises(ChladniError, match="was read from a file"):
             ask()
-
-
-def test_one_road_to_modes(case, folder):
-    """The function, the model and the path of the deck give the same frequencies."""
-    model = chladni.load(folder / "plate.bdf", "SI")
-    due = chladni.modes(case, 8).frequency
-    for found in (model.modes(8), chladni.modes(folder / "plate.bdf", 8, units="SI")):
-        np.testing.assert_allclose(found.frequency[6:], due[6:], rtol=1e-9)
-    assert type(model.modes(8)) is type(chladni.modes(case, 8))

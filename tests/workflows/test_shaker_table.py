@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.builders.commands import ran, refused
+from tests.builders.plate_recordings import labels as labels_at
+from tests.builders.structures import held_along_x0
 
 import chladni
 from chladni.errors import FileError, ModelError
@@ -33,12 +35,9 @@ BAND = (15.0, 300.0)
 def case(tmp_path_factory):
     """A clamped plate whose table and five sensors were recorded once."""
     folder = tmp_path_factory.mktemp("table")
-    made = plate(0.3, 0.2, 8, 6, 1.2e-3)
-    edge = np.flatnonzero(made.points[:, 0] == 0)
-    made = replace(made, supports=np.array([(k, c) for k in edge for c in range(1, 7)]))
+    made = held_along_x0(plate(0.3, 0.2, 8, 6, 1.2e-3))
     write_assembly(made, folder / "plate.bdf")
-    away = np.linalg.norm(made.points[None, :, :2] - np.array(PLACES)[:, None], axis=2)
-    labels = [f"{made.ids[k]}:+Z" for k in away.argmin(axis=1)]
+    labels = list(labels_at(made, PLACES))
     model = chladni.load(folder / "plate.bdf", "SI")
     frf = chladni.frf(model, labels, ["base:+Z"], np.linspace(*BAND, 400)).frfs[0]
     write_npz(folder / "once.npz", frf)
@@ -157,38 +156,31 @@ def test_responses_on_a_table_at_the_sensors_of_a_layout(case, tmp_path):
 QUICK = ["--excitation", "stepped-sine", "--band", "15:120", "--exact", "--units", "SI"]
 
 
-def test_a_bare_deck_asks_for_a_table(case, tmp_path):
-    """--input base:+Z beside a table of sensors: what a case with that input leaves, too."""
-    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
-    labels = case.outputs.labels
-    table.write_text("label,mass\n" + "".join(f"{name},0.001\n" for name in labels))
-    words = ("--sensors", table, "--input", "base:+Z", "--out", tmp_path / "o")
-    done = ran("bench", deck, *QUICK, *words)
-    assert "level [m/s²]" in done.output
-    (frf,) = chladni.load_case(tmp_path / "o" / "case").frfs
-    assert (frf.quantity, frf.inputs) == ("transmissibility", ("base:+Z",))
-    assert frf.outputs == labels
+@pytest.fixture
+def table(case, tmp_path):
+    """The sensors of the case as a table, each of 1 g."""
+    rows = "".join(f"{name},0.001\n" for name in case.outputs.labels)
+    (tmp_path / "places.csv").write_text(f"label,mass\n{rows}")
+    return "--sensors", tmp_path / "places.csv"
 
 
-def test_sensors_are_planned_for_a_table(case, tmp_path):
-    """Of the plan the sensors; neither its shaker nor its cords are there."""
-    deck = case.path.parent / "plate.bdf"
-    ran("bench", deck, *QUICK, "--input", "base:+Z", "--out", tmp_path / "o")
-    left = chladni.load_case(tmp_path / "o" / "case")
-    assert left.inputs.labels == ("base:+Z",)
-    assert len(left.outputs.labels) > 5
-    assert "hangers" not in (tmp_path / "o" / "case" / "case.toml").read_text()
+@pytest.mark.parametrize("planned", [False, True])
+@pytest.mark.parametrize("on_table", [True, False])
+def test_a_bare_deck_is_driven_where_input_says(case, table, tmp_path, on_table, planned):
+    """The base or a grid, at the sensors of a table or of a plan, whose shaker and cords are none.
 
-
-def test_a_deck_is_driven_where_input_says(case, tmp_path):
-    """A grid in place of the planned shaker, by force."""
-    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
-    table.write_text("label\n" + "\n".join(case.outputs.labels))
-    here = case.outputs.labels[-1]
-    words = ("--sensors", table, "--input", here, "--out", tmp_path / "o")
-    ran("bench", deck, *QUICK, *words)
-    (frf,) = chladni.load_case(tmp_path / "o" / "case").frfs
-    assert (frf.quantity, frf.inputs) == ("accelerance", (here,))
+    The case that is left has the same input.
+    """
+    drive, out = "base:+Z" if on_table else case.outputs.labels[-1], tmp_path / "o"
+    words = (*(() if planned else table), "--input", drive, "--out", out)
+    done = ran("bench", case.path.parent / "plate.bdf", *QUICK, *words)
+    left = chladni.load_case(out / "case")
+    (frf,) = left.frfs
+    assert frf.quantity == ("transmissibility" if on_table else "accelerance")
+    assert frf.inputs == left.inputs.labels == (drive,)
+    assert frf.outputs == case.outputs.labels or (planned and len(frf.outputs) > 5)
+    assert ("level [m/s²]" in done.output) == on_table
+    assert not on_table or "hangers" not in (out / "case" / "case.toml").read_text()
 
 
 @pytest.mark.parametrize(
@@ -202,11 +194,9 @@ def test_a_deck_is_driven_where_input_says(case, tmp_path):
         (("--input", "base:+Z", "--excitation", "hammer"), "which has no"),
     ],
 )
-def test_an_input_that_is_none_is_one_sentence(case, tmp_path, words, said):
-    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
-    table.write_text("label\n" + "\n".join(case.outputs.labels))
-    given = ("bench", deck, *QUICK, "--sensors", table, *words, "--out", tmp_path / "o")
-    assert said in refused(*given)
+def test_an_input_that_is_none_is_one_sentence(case, table, tmp_path, words, said):
+    given = ("bench", case.path.parent / "plate.bdf", *QUICK, *table, *words)
+    assert said in refused(*given, "--out", tmp_path / "o")
 
 
 def test_what_drives_is_said_once(case, tmp_path):

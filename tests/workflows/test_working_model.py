@@ -86,9 +86,3 @@ def test_a_shape_is_drawn(model, tmp_path):
 def test_what_is_not_there_is_told(model, ask, told):
     with pytest.raises(ChladniError, match=told):
         ask(model)
-
-
-def test_help_names_every_public_name():
-    """`__all__` is what the module imports under its own name, and all of it is there."""
-    assert all(hasattr(chladni, name) for name in chladni.__all__)
-    assert set(chladni.__all__) <= set(dir(chladni))
