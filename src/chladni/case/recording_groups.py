@@ -6,15 +6,15 @@ several inputs: their columns are stacked. Driven at the same places they are re
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 
 from ..dynamics.frf import FRF
-from ..ema.setup import Control, Recording
+from ..ema.setup import Recording
 from ..errors import FileError
-from .schema import key
-from .toml_sections import TomlSection
+from .request import Stated
+from .schema import RecordingWords
 
 Relation = Literal["state", "article", "level", "repeat"]
 LEAST_SHARED = 0.5  # of the lines of each recording that all must have to be stacked
@@ -23,7 +23,7 @@ SAME_NUMBER = 1e-5  # relative: text keeps six digits
 
 
 def described(
-    sections: Sequence[TomlSection], file: str, read: Sequence[Recording]
+    stated: Sequence[Stated[RecordingWords]], file: str, read: Sequence[Recording]
 ) -> list[Recording]:
     """The recordings of a file with what its [[recording]] says of them.
 
@@ -32,38 +32,33 @@ def described(
     FileError
         If a word of a [[recording]] is said twice, or differently by the file itself.
     """
-    found = [s for s in sections if s.text("file", due=True) == file]
+    found = [s for s in stated if s.words["file"] == file]
     if len(found) > 1:
-        raise FileError(f"{found[1].at('file')} = {file!r} is described twice")
-    if not found:
-        return list(read)
-    return [_with_stated_words(found[0], r) for r in read]
+        raise FileError(f"{found[1].places['file']} = {file!r} is described twice")
+    return [_with_stated_words(s, r) for s in found for r in read] if found else list(read)
 
 
-def _with_stated_words(section: TomlSection, r: Recording) -> Recording:
-    article, state = section.text("article") or r.article, section.text("state") or r.state
-    level = section.number("level", low=0.0)
+def _with_stated_words(stated: Stated[RecordingWords], r: Recording) -> Recording:
+    words, at = stated.words, stated.places
+    article, state = words.get("article") or r.article, words.get("state") or r.state
+    level, control = words.get("level"), words.get("control")
     for word, said, own in (("article", article, r.article), ("level", level, r.level)):
         if own not in ("", None) and said not in (None, own):
-            raise FileError(f"{section.at(word)} = {said!r}, but {r.name} states {own!r}")
-    if state and r.poles is not None and any(r.poles.states):
-        raise FileError(f"{section.at('state')}: {r.name} has its own column state")
-    if state and r.poles is not None:
-        r = replace(r, poles=replace(r.poles, state=(state,) * len(r.poles.state)))
-    mass = section.number("mass", low=1e-9)
-    r = _held(section, replace(r, level=r.level if level is None else level))
-    return replace(r, article=article, state=state, mass=mass)
-
-
-def _held(section: TomlSection, r: Recording) -> Recording:
-    """The recording with what was held at its level."""
-    control = section.text("control", among=key("recording", "control").choices)
-    if control is None:
-        return r
-    if r.level is None:
-        raise FileError(f"{section.at('control')} = {control!r}, but {r.name} has no level")
-    said = f"{r.name}: the {control} was held at level {r.level:g}"
-    return replace(r, control=cast(Control, control), notes=(*r.notes, said))
+            raise FileError(f"{at[word]} = {said!r}, but {r.name} states {own!r}")
+    level = r.level if level is None else level
+    poles, notes = r.poles, r.notes
+    if state and poles is not None:
+        if any(poles.states):
+            raise FileError(f"{at['state']}: {r.name} has its own column state")
+        poles = replace(poles, state=(state,) * len(poles.state))
+    if control is not None:
+        if level is None:
+            raise FileError(f"{at['control']} = {control!r}, but {r.name} has no level")
+        notes = (*notes, f"{r.name}: the {control} was held at level {level:g}")
+    return replace(
+        r, article=article, state=state, level=level, mass=words.get("mass"), poles=poles,
+        control=control or r.control, notes=notes,
+    )  # fmt: skip
 
 
 def relation(first: Recording, other: Recording) -> Relation:
