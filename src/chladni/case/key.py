@@ -54,7 +54,7 @@ class Key:
 
 
 def refuse_other(at: str, value: str, among: Sequence[str]) -> None:
-    """Refuse a word that is none of these."""
+    """Refuse a word outside of a list."""
     if value not in among:
         hint = did_you_mean(value, among)
         raise FileError(f"{at} = {_short(value)}; {hint}there are {', '.join(among)}")

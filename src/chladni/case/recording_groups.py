@@ -154,7 +154,6 @@ def _joined(a: Recording, b: Recording) -> Recording:
             "articles ([[recording]] article)"
         )
     outputs = _shared(a.frf, b.frf)
-    parts = [_rows(a.frf, i, outputs), _rows(b.frf, j, outputs)]
     left = sorted(set(a.frf.outputs) ^ set(b.frf.outputs))
     inputs = len(a.frf.inputs) + len(b.frf.inputs)
     said = f"{b.name}: stacked with {a.name} as one test with {inputs} inputs"
@@ -162,8 +161,9 @@ def _joined(a: Recording, b: Recording) -> Recording:
         said += f"; outputs in only one of them are left out: {', '.join(left[:6])}"
     if len(i) < most:
         said += f"; {most - len(i)} lines in only one of them are left out"
+    frf = _side_by_side((a.frf, b.frf), (i, j), outputs)
     return replace(
-        a, name=f"{a.name} + {b.name}", frf=_side_by_side(parts), nodes={**b.nodes, **a.nodes},
+        a, name=f"{a.name} + {b.name}", frf=frf, nodes={**b.nodes, **a.nodes},
         axes={**b.axes, **a.axes}, functions=(*a.functions, *b.functions),
         notes=(*a.notes, *b.notes, said), mass=a.mass or b.mass,
     )  # fmt: skip
@@ -176,30 +176,16 @@ def _lines(f: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return i, near[i]
 
 
-def _rows(frf: FRF, lines: np.ndarray, outputs: Sequence[str]) -> FRF:
-    """Some lines and outputs of an FRF."""
-    at = np.array([frf.outputs.index(o) for o in outputs])
-    part = {name: a[lines][:, at] for name, a in _arrays(frf).items()}
+def _side_by_side(frfs: Sequence[FRF], lines: Sequence[np.ndarray], outputs: Sequence[str]) -> FRF:
+    """The columns of all on lines of each; variance and coherence where every one has them."""
+    chosen = [frf.sel(outputs) for frf in frfs]
+    arrays: dict[str, np.ndarray] = {}
+    for name in ("values", "variance", "coherence"):
+        each = [getattr(frf, name) for frf in chosen]
+        if all(a is not None for a in each):
+            parts = [a[k] for a, k in zip(each, lines, strict=True)]
+            arrays[name] = np.concatenate(parts, axis=2)
     return FRF(
-        frequency=frf.frequency[lines], outputs=tuple(outputs), inputs=frf.inputs,
-        quantity=frf.quantity, **part,
+        frequency=chosen[0].frequency[lines[0]], outputs=tuple(outputs),
+        inputs=tuple(i for frf in frfs for i in frf.inputs), quantity=chosen[0].quantity, **arrays,
     )  # fmt: skip
-
-
-def _side_by_side(parts: Sequence[FRF]) -> FRF:
-    """The columns of all; variance and coherence where every one has them."""
-    arrays = [_arrays(p) for p in parts]
-    common = [name for name in arrays[0] if all(name in a for a in arrays)]
-    whole = {name: np.concatenate([a[name] for a in arrays], axis=2) for name in common}
-    first = parts[0]
-    inputs = tuple(i for p in parts for i in p.inputs)
-    return FRF(
-        frequency=first.frequency, outputs=first.outputs, inputs=inputs,
-        quantity=first.quantity, **whole,
-    )  # fmt: skip
-
-
-def _arrays(frf: FRF) -> dict[str, np.ndarray]:
-    """Everything over lines, outputs and inputs that an FRF has."""
-    every = {"values": frf.values, "variance": frf.variance, "coherence": frf.coherence}
-    return {name: a for name, a in every.items() if a is not None}

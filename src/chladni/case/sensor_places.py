@@ -75,8 +75,8 @@ def placed(made: Assembly, sensors: Sequence[Sensor], where: str) -> MeasuredDof
         grids=np.array([r[0] for r in rows], dtype=np.int64),
         points=np.array([r[1] for r in rows]).reshape(-1, 3),
         directions=np.array([r[2] for r in rows]).reshape(-1, 3),
-        sd=np.array([r[3].position_sd for r in rows]),
-        mass=np.array([r[3].mass for r in rows]),
+        sd=np.array([s.position_sd for s in sensors]),
+        mass=np.array([s.mass for s in sensors]),
     )
 
 
@@ -206,17 +206,15 @@ def weight_of_sensors(
     return f"The model carries {' and '.join(said)} ({table})"
 
 
-def _place(
-    where: str, sensor: Sensor, made: Assembly
-) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
-    """(grid or 0, place, direction, sensor) of one dof."""
+def _place(where: str, sensor: Sensor, made: Assembly) -> tuple[int, np.ndarray, np.ndarray]:
+    """(grid or 0, place, direction) of one dof."""
     if sensor.grid is None and sensor.place is None:
-        return 0, np.full(3, np.nan), _base(made, sensor, where), sensor
+        return 0, np.full(3, np.nan), _base(made, sensor, where)
     if sensor.grid is None:
         return _free(made, sensor, where)
     row = grid_row(made, sensor.grid, where)
     vector = _normal(made, row, where) if sensor.direction is None else sensor.direction
-    return sensor.grid, made.points[row], vector, sensor
+    return sensor.grid, made.points[row], vector
 
 
 def _base(made: Assembly, sensor: Sensor, where: str) -> np.ndarray:
@@ -227,17 +225,14 @@ def _base(made: Assembly, sensor: Sensor, where: str) -> np.ndarray:
     return sensor.direction
 
 
-def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
+def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, np.ndarray]:
     """A place on the nearest shell, or where there are no shells at the nearest grid."""
     place = np.asarray(sensor.place)
     size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
     if len(made.shells) == 0:
         row = int(np.linalg.norm(made.points - place, axis=1).argmin())
-        away, normal, grid = (
-            float(np.linalg.norm(made.points[row] - place)),
-            None,
-            int(made.ids[row]),
-        )
+        away, normal = float(np.linalg.norm(made.points[row] - place)), None
+        grid = int(made.ids[row])
     else:
         found = ShellSurface.whole(made).closest_points(place)
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
@@ -252,7 +247,7 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
         raise LabelError(
             f"{where}: it has no shell and so no normal; give +X, +Y, +Z or nx, ny, nz"
         )
-    return grid, place if grid == 0 else made.points[row], vector, sensor
+    return grid, place if grid == 0 else made.points[row], vector
 
 
 def _of_other_units(made: Assembly, place: np.ndarray, reach: float) -> str:
