@@ -3,12 +3,13 @@
 import sys
 from collections.abc import Sequence
 
-from chladni.case.schema import COLUMNS, COMMANDS, SCHEMA, Key, sections
+from chladni.case.key import Key
+from chladni.case.schema import COLUMNS, COMMANDS, SCHEMA, SECTIONS
 
 
 def page() -> str:
     """``docs/case.md``."""
-    return "\n".join([_HEAD, *(_section(name) for name in sections()), _TAIL, _columns(), _FILES])
+    return "\n".join([_HEAD, *(_section(name) for name in SECTIONS), _TAIL, _columns(), _FILES])
 
 
 def _section(name: str) -> str:
@@ -27,10 +28,16 @@ def _columns() -> str:
 def _table(keys: Sequence[Key]) -> str:
     rows = ["| key | value | default | meaning |", "|" + "---|" * 4]
     for k in keys:
-        what = f"{k.kind}: {', '.join(k.choices)}" if k.choices else k.kind
         unit = f" [{k.unit}]" if k.unit else ""
-        rows.append(f"| `{k.name}` | {what}{unit} | {k.default} | {k.meaning} |")
+        rows.append(
+            f"| `{k.name}` | {k.in_words}{unit} | {k.default} | {k.meaning}{_argument(k)} |"
+        )
     return "\n".join(rows) + "\n"
+
+
+def _argument(key: Key) -> str:
+    """The name in Python, where it is another one."""
+    return f" In Python `{key.argument}`." if key.argument not in ("", key.name) else ""
 
 
 def _used(keys: Sequence[Key]) -> str:

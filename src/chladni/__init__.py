@@ -39,7 +39,7 @@ _LATER = {  # public name: module that holds it, loaded at the first use
     "Assembly": ".model.assembly",
     "BenchSettings": "chladni_bench",
     "Case": ".case",
-    "CaseWords": ".case.make_case",
+    "CaseWords": ".case.schema",
     "EstimateSettings": ".ema.frf_estimate",
     "FRF": ".dynamics.frf",
     "ModalModel": ".dynamics.modes",
@@ -94,7 +94,7 @@ if _typing.TYPE_CHECKING:
     from .ema.setup import Sensor as Sensor
     from .case import Case as Case
     from .case import load_case as load_case
-    from .case.make_case import CaseWords as CaseWords
+    from .case.schema import CaseWords as CaseWords
     from .case.make_case import make_case as make_case
     from .workflows.working_model import WorkingModel as WorkingModel
     from .workflows.working_model import load as load

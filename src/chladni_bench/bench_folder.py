@@ -2,12 +2,14 @@
 
 import json
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from chladni.case import Case
+from chladni.case.schema import ONCE
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.io.nastran import write_deck
 from chladni.io.nastran.edit.model_changes import changes
@@ -114,15 +116,16 @@ def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
         lines += [f"band = [{held[0]:g}, {held[1]:g}]"] if held is not None else []
     if search := _kept(case, "search"):
         lines += ["", "[search]", *_words(search)]
-    for section in case.keys.tables.get("parameter", []):
-        lines += ["", "[[parameter]]", *_words(section.values)]
+    for stated in case.asked.parameters:
+        lines += ["", "[[parameter]]", *_words(dict(stated.words))]
     return "\n".join([*lines, ""])
 
 
 def _kept(case: Case, section: str) -> dict[str, Any]:
     """Return the words of a section that also apply to the new recordings."""
-    found = case.keys.tables.get(section, [])
-    return {k: v for s in found for k, v in s.values.items() if k not in RENEWED[section]}
+    said: Mapping[str, Any] = case.asked.said.words
+    kept = [k for k in ONCE if k.section == section and k.name not in RENEWED[section]]
+    return {k.name: said[k.argument] for k in kept if k.argument in said}
 
 
 def _words(values: dict[str, Any]) -> list[str]:

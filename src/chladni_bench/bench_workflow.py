@@ -8,7 +8,7 @@ import numpy as np
 
 from chladni.arguments import checked, refuse_fields
 from chladni.case import Case
-from chladni.case.make_case import CaseWords
+from chladni.case.schema import CaseWords
 from chladni.dynamics.modes import rigid_modes
 from chladni.effects.family import Article
 from chladni.effects.registry import family

@@ -7,7 +7,8 @@ file of other types, binary data under another head, and cases that declare what
 import random
 from collections.abc import Iterator, Sequence
 
-from chladni.case.schema import SCHEMA, Key
+from chladni.case.key import Key
+from chladni.case.schema import SCHEMA
 from chladni.io.nastran.read.beam_profiles import SHAPES
 
 from .fuzz_input import FuzzInput, Maker

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from chladni.case import Case
-from chladni.case.make_case import CaseWords
+from chladni.case.schema import CaseWords
 from chladni.dynamics.frf import FRF
 from chladni.geometry.formed_mesh import FormedMesh
 from chladni.geometry.sampling import nearest_points

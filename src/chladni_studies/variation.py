@@ -2,14 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from chladni.case.free_parameters import free_parameter
-from chladni.case.schema import FIELDS
-from chladni.case.toml_sections import TomlSection
+from chladni.case.request import Stated
+from chladni.case.schema import FIELDS, PARAMETER, ParameterWords
 from chladni.effects.user_parameters import (
     FARTHEST,
     SD,
@@ -88,7 +86,7 @@ def of_parts(
     Plain numbers are in the deck's own units, as in its cards; per cent are of the deck's own
     value.
     """
-    free = free_parameter(_section(request, assembly), assembly, deck)
+    free = free_parameter(_stated(request, assembly), assembly, deck)
     if request.grid is not None or free.field not in FIELDS:
         raise request.refused(
             f'{request.name} is a number of parts; write "{request.name} of PART=LOW:HIGH"'
@@ -100,19 +98,14 @@ def of_parts(
     return Variation(_called(free), free, nominal, low, high, unit, request.log)
 
 
-class _Wish(TomlSection):
-    """A parameter of the command line, read like a [[parameter]]."""
-
-    def at(self, key: str) -> str:
-        return f"{self.name} ({key})"
-
-
-def _section(request: VaryText, assembly: Assembly) -> TomlSection:
-    values: dict[str, Any] = {"field": request.name}
+def _stated(request: VaryText, assembly: Assembly) -> Stated[ParameterWords]:
+    """The option as the words of a [[parameter]]."""
+    words: ParameterWords = {"field": request.name}
     if (parts := request.parts) is not None:
         whole = any(parts == p.name for p in assembly.parts)
-        values["parts"] = [parts] if whole else [p.strip() for p in parts.split(",")]
-    return _Wish(Path("--vary"), f"--vary {request.text!r}", values, {}, 0)
+        words["parts"] = [parts] if whole else [p.strip() for p in parts.split(",")]
+    places = {k.argument: f"--vary {request.text!r} ({k.argument})" for k in PARAMETER}
+    return Stated(words, places)
 
 
 def _called(free: FreeParameter) -> str:

@@ -1,7 +1,6 @@
 """Recordings that are one test are stacked; what a [[recording]] says is heard, once."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +8,8 @@ import pytest
 from chladni.case import load_case
 from chladni.case.recording_groups import described, refuse_copies, relation, stacked
 from chladni.case.recordings import notes_of
-from chladni.case.toml_sections import TomlSection
+from chladni.case.request import Stated
+from chladni.case.schema import RecordingWords
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import PoleTable, Recording
 from chladni.errors import FileError
@@ -21,7 +21,7 @@ OUT = ("12:+Z", "16:+Z", "22:+Z")
 
 
 def told(**values):
-    return TomlSection(Path("case.toml"), "recording", dict(values), {}, 1)
+    return Stated(values, {name: name for name in RecordingWords.__annotations__})
 
 
 def one(name, input, **more):

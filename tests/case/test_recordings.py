@@ -1,15 +1,14 @@
 """Of several recordings one is compared; what is not used is named."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from chladni.case import load_case
 from chladni.case.recordings import compared_first, deviation, notes_of, without_dead_channels
+from chladni.case.request import Stated
 from chladni.case.sensor_places import places
-from chladni.case.toml_sections import TomlSection
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import PoleTable, Recording, Shapes, TestSetup
 from chladni.errors import ChladniError, LabelError
@@ -19,8 +18,13 @@ from chladni.units import UNITS
 from .test_case import a_frf, deck
 
 
-def section(**values):
-    return TomlSection(Path("case.toml"), "test", dict(values), {}, 1)
+def stated(**words):
+    return Stated(words, dict.fromkeys(("use", "recordings"), "here"))
+
+
+def placed(made, labels, recorded, notes):
+    with_frf = replace(recorded, frf=a_frf(labels))
+    return places("here", TestSetup(), made, [with_frf], "output", notes)
 
 
 def poles(*states):
@@ -35,16 +39,16 @@ TABLE = Recording("p.csv", poles=poles("bare", "loaded", "bare"))
 
 
 def test_the_first_with_responses_is_compared():
-    assert compared_first(section(), [TABLE, FIRST, SECOND])[0] is FIRST
+    assert compared_first(stated(), [TABLE, FIRST, SECOND])[0] is FIRST
 
 
 @pytest.mark.parametrize("name", ["b.npz", "B"])
 def test_the_one_that_is_named_is_compared(name):
-    assert compared_first(section(use=name), [FIRST, SECOND])[0] is SECOND
+    assert compared_first(stated(use=name), [FIRST, SECOND])[0] is SECOND
 
 
 def test_a_state_is_named():
-    first = compared_first(section(use="loaded"), [FIRST, TABLE])[0]
+    first = compared_first(stated(use="loaded"), [FIRST, TABLE])[0]
     assert first.poles.states == ("loaded", "bare")
     assert first.poles.of("loaded").frequency.tolist() == [2.0]
     assert any("'loaded' are compared; not used: 'bare'" in n for n in notes_of([first]))
@@ -52,7 +56,7 @@ def test_a_state_is_named():
 
 def test_a_name_nobody_has_is_refused_with_those_there_are():
     with pytest.raises(ChladniError, match=r"no recording is so named; there are .*b.npz, B"):
-        compared_first(section(use="c.npz"), [FIRST, SECOND])
+        compared_first(stated(use="c.npz"), [FIRST, SECOND])
 
 
 def test_the_others_are_measured_against_it():
@@ -95,7 +99,7 @@ def test_nodes_and_axes_of_a_recording_are_used(tmp_path):
         axes={12: turned},
     )
     notes: list[str] = []
-    found = places(section(), TestSetup(), made, ("12:+X", "900:+Z"), "output", [recorded], notes)
+    found = placed(made, ("12:+X", "900:+Z"), recorded, notes)
     np.testing.assert_allclose(found.directions, [[0, 1, 0], [0, 0, 1]], atol=1e-12)
     np.testing.assert_array_equal(found.grids, [12, 0])
     np.testing.assert_allclose(found.points[1], [0.22, 0.11, 0.0])
@@ -111,8 +115,7 @@ def test_places_count_where_numbers_coincide_by_chance(tmp_path, factor):
     notes: list[str] = []
     labels, there = ("1:+Z", "2:+Z", "3:+Z"), made.points[made.rows([12, 30, 34])]
     nodes = dict(zip((1, 2, 3), factor * there, strict=True))
-    recorded = [Recording("a.uff", nodes=nodes)]
-    found = places(section(), TestSetup(), made, labels, "output", recorded, notes)
+    found = placed(made, labels, Recording("a.uff", nodes=nodes), notes)
     np.testing.assert_allclose(found.points, there, atol=1e-9)
     assert any("3 of 3 differ): the places were used" in n for n in notes)
     assert any("read in mm, which fits the deck" in n for n in notes) == (factor != 1)
@@ -125,13 +128,13 @@ def test_labels_that_count_are_channels(tmp_path, nodes):
     made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
     labels, recorded = ("1:+Z", "2:+Z", "3:+Z"), Recording("a.uff", nodes=nodes)
     with pytest.raises(LabelError, match="taken as channel numbers"):
-        places(section(), TestSetup(), made, labels, "output", [recorded], [])
+        placed(made, labels, recorded, [])
     known = dict(zip((1, 2, 3), made.points[made.rows([1, 2, 3])], strict=True))
     recorded = replace(recorded, nodes=known)
-    found = places(section(), TestSetup(), made, labels, "output", [recorded], [])
+    found = placed(made, labels, recorded, [])
     assert found.grids.tolist() == [1, 2, 3]
     some = ("1:+Z", "3:+Z", "4:+Z")
-    found = places(section(), TestSetup(), made, some, "output", [Recording("a.npz")], [])
+    found = placed(made, some, Recording("a.npz"), [])
     assert found.grids.tolist() == [1, 3, 4]
 
 

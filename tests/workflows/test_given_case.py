@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.case.make_case import WORDS
-from chladni.case.schema import SCHEMA
+from chladni.case.schema import ARGUMENTS, SCHEMA
 from chladni.errors import ChladniError
 from chladni.search.preparation import prepare
 from chladni.workflows.given_case import given_case
 from chladni.workflows.question_of_case import question_of
 
-FILE_ALONE = {("model", "deck"), ("model", "outside"), ("test", "recordings")}
+FILE_ALONE = {"deck", "outside", "recordings"}
 
 
 def arrays(value, at="") -> dict[str, np.ndarray]:
@@ -36,8 +35,8 @@ def same_question_of(one, other):
 
 def test_every_word_of_a_case_is_an_argument():
     """A word that a file may hold, a program may say."""
-    once = {(k.section, k.name) for k in SCHEMA if k.section not in ("recording", "parameter")}
-    assert set(WORDS.values()) == (once - FILE_ALONE) | {("parameter", "")}
+    once = {k.argument for k in SCHEMA if k.section not in ("recording", "parameter")}
+    assert set(ARGUMENTS) == once - FILE_ALONE | {"parameters"}
 
 
 def test_arguments_ask_what_the_file_asks(case, folder):

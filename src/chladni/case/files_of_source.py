@@ -11,7 +11,7 @@ from ..io.nastran.text.source_files import sources
 from ..io.tables.read_tables import ENDINGS
 from .schema import SCHEMA
 
-_FILES = [(k.section, k.name) for k in SCHEMA if k.kind in ("file", "list of files")]
+_FILES = [(k.section, k.name) for k in SCHEMA if k.in_words.startswith(("file", "list of files"))]
 
 
 def files_of(source: Path) -> tuple[Path, ...]:

@@ -6,15 +6,15 @@ several inputs: their columns are stacked. Driven at the same places they are re
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 
 from ..dynamics.frf import FRF
-from ..ema.setup import Control, Recording
+from ..ema.setup import Recording
 from ..errors import FileError
-from .schema import key
-from .toml_sections import TomlSection
+from .request import Stated
+from .schema import RecordingWords
 
 Relation = Literal["state", "article", "level", "repeat"]
 LEAST_SHARED = 0.5  # of the lines of each recording that all must have to be stacked
@@ -23,7 +23,7 @@ SAME_NUMBER = 1e-5  # relative: text keeps six digits
 
 
 def described(
-    sections: Sequence[TomlSection], file: str, read: Sequence[Recording]
+    stated: Sequence[Stated[RecordingWords]], file: str, read: Sequence[Recording]
 ) -> list[Recording]:
     """The recordings of a file with what its [[recording]] says of them.
 
@@ -32,38 +32,33 @@ def described(
     FileError
         If a word of a [[recording]] is said twice, or differently by the file itself.
     """
-    found = [s for s in sections if s.text("file", due=True) == file]
+    found = [s for s in stated if s.words["file"] == file]
     if len(found) > 1:
-        raise FileError(f"{found[1].at('file')} = {file!r} is described twice")
-    if not found:
-        return list(read)
-    return [_with_stated_words(found[0], r) for r in read]
+        raise FileError(f"{found[1].places['file']} = {file!r} is described twice")
+    return [_with_stated_words(s, r) for s in found for r in read] if found else list(read)
 
 
-def _with_stated_words(section: TomlSection, r: Recording) -> Recording:
-    article, state = section.text("article") or r.article, section.text("state") or r.state
-    level = section.number("level", low=0.0)
+def _with_stated_words(stated: Stated[RecordingWords], r: Recording) -> Recording:
+    words, at = stated.words, stated.places
+    article, state = words.get("article") or r.article, words.get("state") or r.state
+    level, control = words.get("level"), words.get("control")
     for word, said, own in (("article", article, r.article), ("level", level, r.level)):
         if own not in ("", None) and said not in (None, own):
-            raise FileError(f"{section.at(word)} = {said!r}, but {r.name} states {own!r}")
-    if state and r.poles is not None and any(r.poles.states):
-        raise FileError(f"{section.at('state')}: {r.name} has its own column state")
-    if state and r.poles is not None:
-        r = replace(r, poles=replace(r.poles, state=(state,) * len(r.poles.state)))
-    mass = section.number("mass", low=1e-9)
-    r = _held(section, replace(r, level=r.level if level is None else level))
-    return replace(r, article=article, state=state, mass=mass)
-
-
-def _held(section: TomlSection, r: Recording) -> Recording:
-    """The recording with what was held at its level."""
-    control = section.text("control", among=key("recording", "control").choices)
-    if control is None:
-        return r
-    if r.level is None:
-        raise FileError(f"{section.at('control')} = {control!r}, but {r.name} has no level")
-    said = f"{r.name}: the {control} was held at level {r.level:g}"
-    return replace(r, control=cast(Control, control), notes=(*r.notes, said))
+            raise FileError(f"{at[word]} = {said!r}, but {r.name} states {own!r}")
+    level = r.level if level is None else level
+    poles, notes = r.poles, r.notes
+    if state and poles is not None:
+        if any(poles.states):
+            raise FileError(f"{at['state']}: {r.name} has its own column state")
+        poles = replace(poles, state=(state,) * len(poles.state))
+    if control is not None:
+        if level is None:
+            raise FileError(f"{at['control']} = {control!r}, but {r.name} has no level")
+        notes = (*notes, f"{r.name}: the {control} was held at level {level:g}")
+    return replace(
+        r, article=article, state=state, level=level, mass=words.get("mass"), poles=poles,
+        control=control or r.control, notes=notes,
+    )  # fmt: skip
 
 
 def relation(first: Recording, other: Recording) -> Relation:
@@ -159,7 +154,6 @@ def _joined(a: Recording, b: Recording) -> Recording:
             "articles ([[recording]] article)"
         )
     outputs = _shared(a.frf, b.frf)
-    parts = [_rows(a.frf, i, outputs), _rows(b.frf, j, outputs)]
     left = sorted(set(a.frf.outputs) ^ set(b.frf.outputs))
     inputs = len(a.frf.inputs) + len(b.frf.inputs)
     said = f"{b.name}: stacked with {a.name} as one test with {inputs} inputs"
@@ -167,8 +161,9 @@ def _joined(a: Recording, b: Recording) -> Recording:
         said += f"; outputs in only one of them are left out: {', '.join(left[:6])}"
     if len(i) < most:
         said += f"; {most - len(i)} lines in only one of them are left out"
+    frf = _side_by_side((a.frf, b.frf), (i, j), outputs)
     return replace(
-        a, name=f"{a.name} + {b.name}", frf=_side_by_side(parts), nodes={**b.nodes, **a.nodes},
+        a, name=f"{a.name} + {b.name}", frf=frf, nodes={**b.nodes, **a.nodes},
         axes={**b.axes, **a.axes}, functions=(*a.functions, *b.functions),
         notes=(*a.notes, *b.notes, said), mass=a.mass or b.mass,
     )  # fmt: skip
@@ -181,30 +176,16 @@ def _lines(f: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return i, near[i]
 
 
-def _rows(frf: FRF, lines: np.ndarray, outputs: Sequence[str]) -> FRF:
-    """Some lines and outputs of an FRF."""
-    at = np.array([frf.outputs.index(o) for o in outputs])
-    part = {name: a[lines][:, at] for name, a in _arrays(frf).items()}
+def _side_by_side(frfs: Sequence[FRF], lines: Sequence[np.ndarray], outputs: Sequence[str]) -> FRF:
+    """The columns of all on lines of each; variance and coherence where every one has them."""
+    chosen = [frf.sel(outputs) for frf in frfs]
+    arrays: dict[str, np.ndarray] = {}
+    for name in ("values", "variance", "coherence"):
+        each = [getattr(frf, name) for frf in chosen]
+        if all(a is not None for a in each):
+            parts = [a[k] for a, k in zip(each, lines, strict=True)]
+            arrays[name] = np.concatenate(parts, axis=2)
     return FRF(
-        frequency=frf.frequency[lines], outputs=tuple(outputs), inputs=frf.inputs,
-        quantity=frf.quantity, **part,
+        frequency=chosen[0].frequency[lines[0]], outputs=tuple(outputs),
+        inputs=tuple(i for frf in frfs for i in frf.inputs), quantity=chosen[0].quantity, **arrays,
     )  # fmt: skip
-
-
-def _side_by_side(parts: Sequence[FRF]) -> FRF:
-    """The columns of all; variance and coherence where every one has them."""
-    arrays = [_arrays(p) for p in parts]
-    common = [name for name in arrays[0] if all(name in a for a in arrays)]
-    whole = {name: np.concatenate([a[name] for a in arrays], axis=2) for name in common}
-    first = parts[0]
-    inputs = tuple(i for p in parts for i in p.inputs)
-    return FRF(
-        frequency=first.frequency, outputs=first.outputs, inputs=inputs,
-        quantity=first.quantity, **whole,
-    )  # fmt: skip
-
-
-def _arrays(frf: FRF) -> dict[str, np.ndarray]:
-    """Everything over lines, outputs and inputs that an FRF has."""
-    every = {"values": frf.values, "variance": frf.variance, "coherence": frf.coherence}
-    return {name: a for name, a in every.items() if a is not None}

@@ -10,17 +10,18 @@ from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
 from .recording_groups import relation, same_numbers, states
-from .toml_sections import TomlSection
+from .request import Stated
+from .schema import OnceWords
 
 DEAD = "is zero throughout and left out"  # so ends what is said of a dead channel
 
 
-def compared_first(test: TomlSection, read: Sequence[Recording]) -> tuple[Recording, ...]:
+def compared_first(stated: Stated[OnceWords], read: Sequence[Recording]) -> tuple[Recording, ...]:
     """The recordings with the one that is compared in front.
 
     That is the one ``use`` names; else the first with FRFs, else the first with poles.
     """
-    wanted = test.text("use")
+    wanted, at = stated.words.get("use"), stated.places["use"]
     ranked = sorted(read, key=lambda r: (r.frf is None, r.poles is None))
     if not wanted:
         return tuple(ranked)
@@ -28,11 +29,11 @@ def compared_first(test: TomlSection, read: Sequence[Recording]) -> tuple[Record
     if len(chosen) != 1:
         known = ", ".join(dict.fromkeys(n for r in read for n in _names(r))) or "none"
         count = f"{len(chosen)} recordings are" if chosen else "no recording is"
-        raise FileError(f"{test.at('use')} = {wanted!r}: {count} so named; there are {known}")
+        raise FileError(f"{at} = {wanted!r}: {count} so named; there are {known}")
     first = chosen[0]
     rest = [r for r in ranked if r is not first]
     if first.frf is None and first.poles is None:
-        raise FileError(f"{test.at('use')} = {wanted!r} has neither FRFs nor poles")
+        raise FileError(f"{at} = {wanted!r} has neither FRFs nor poles")
     if first.poles is not None and wanted in first.poles.states:
         first = replace(first, poles=_state_first(first.poles, wanted))
     return (first, *rest)

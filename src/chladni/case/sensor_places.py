@@ -24,51 +24,45 @@ from .node_numbers import (
     scaled,
     size_of,
 )
-from .toml_sections import TomlSection
 
 ROLES: tuple[Role, ...] = ("output", "input")
 _FAR = 0.1  # of the structure's size: a place farther from it is a mistake of units
 
 
-def labels(recordings: Sequence[Recording], setup: TestSetup, role: Role) -> tuple[str, ...]:
-    """Dofs of the compared FRFs; where only poles are known, those of the table of sensors."""
-    frf = recordings[0].frf if recordings else None
-    if frf is not None:
-        return frf.outputs if role == "output" else frf.inputs
-    return tuple(s.label for s in (setup.outputs if role == "output" else setup.inputs))
-
-
 def places(
-    test: TomlSection,
+    where: str,
     setup: TestSetup,
     made: Assembly,
-    labels: Sequence[str],
+    recordings: Sequence[Recording],
     role: Role,
-    recorded: Sequence[Recording],
     notes: list[str],
 ) -> MeasuredDofs:
-    """Every label on the structure, by the table of sensors or by what the recording says of it."""
+    """The dofs of the compared FRFs on the structure; where only poles are known, of the table.
+
+    The table of sensors says where a dof is, else the recording does.
+    """
     table = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
+    recorded = recordings[:1]
+    frf = recorded[0].frf if recorded else None
+    labels = tuple(table) if frf is None else frf.outputs if role == "output" else frf.inputs
     unit, nodes = scaled(made, {n: x for r in recorded for n, x in r.nodes.items()})
     axes = {n: A for r in recorded for n, A in r.axes.items()}
     spoken = [label for label in labels if label not in table]
     seated = on_structure(made, nodes)
     elsewhere = seated and not numbers_agree(made, nodes)
-    frf = recorded[0].frf if recorded else None
     numbers = [label for label in spoken if not label.startswith("base:")]
     outputs, inputs = (numbers, ()) if frf is None else (frf.outputs, frf.inputs)
-    least = 1 if "sensors" in test else ENOUGH
+    least = 1 if setup.outputs or setup.inputs else ENOUGH
     counted = number_channels(outputs, inputs, made.ids.tolist(), least)
     if not seated and numbers and counted:
         raise LabelError(
-            f"{test.at('recordings')}: the labels {named(numbers, 3)} are taken as channel "
-            "numbers, because no coordinates show that they are grids; give each its grid or "
-            "place in sensors.csv"
+            f"{where}: the labels {named(numbers, 3)} are taken as channel numbers, because no "
+            "coordinates show that they are grids; give each its grid or place in sensors.csv"
         )
-    known = {**table, **{n: _spoken(n, test, made, nodes, axes, elsewhere) for n in spoken}}
+    known = {**table, **{n: _spoken(n, where, made, nodes, axes, elsewhere) for n in spoken}}
     notes += _nodes_said(made, spoken, nodes, axes, elsewhere, unit)
     notes += _off_said(made, role, [x for n in labels if (x := known[n].place) is not None])
-    found = placed(made, [known[label] for label in labels], test.at("recordings"))
+    found = placed(made, [known[label] for label in labels], where)
     notes += ways_said(made, found, table)
     return found
 
@@ -81,14 +75,14 @@ def placed(made: Assembly, sensors: Sequence[Sensor], where: str) -> MeasuredDof
         grids=np.array([r[0] for r in rows], dtype=np.int64),
         points=np.array([r[1] for r in rows]).reshape(-1, 3),
         directions=np.array([r[2] for r in rows]).reshape(-1, 3),
-        sd=np.array([r[3].position_sd for r in rows]),
-        mass=np.array([r[3].mass for r in rows]),
+        sd=np.array([s.position_sd for s in sensors]),
+        mass=np.array([s.mass for s in sensors]),
     )
 
 
 def _spoken(
     label: str,
-    test: TomlSection,
+    where: str,
     made: Assembly,
     nodes: Mapping[int, np.ndarray],
     axes: Mapping[int, np.ndarray],
@@ -100,7 +94,6 @@ def _spoken(
     in the deck. A node that is not a grid, or has the number of another grid (``elsewhere``), is at
     its place in the recording.
     """
-    where = test.at("recordings")
     node = label.partition(":")[0].strip()
     if node != "base" and not (node.isdecimal() and node.isascii()):
         raise LabelError(f"{where}: {label!r} names no grid; give its place in sensors.csv")
@@ -213,17 +206,15 @@ def weight_of_sensors(
     return f"The model carries {' and '.join(said)} ({table})"
 
 
-def _place(
-    where: str, sensor: Sensor, made: Assembly
-) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
-    """(grid or 0, place, direction, sensor) of one dof."""
+def _place(where: str, sensor: Sensor, made: Assembly) -> tuple[int, np.ndarray, np.ndarray]:
+    """(grid or 0, place, direction) of one dof."""
     if sensor.grid is None and sensor.place is None:
-        return 0, np.full(3, np.nan), _base(made, sensor, where), sensor
+        return 0, np.full(3, np.nan), _base(made, sensor, where)
     if sensor.grid is None:
         return _free(made, sensor, where)
     row = grid_row(made, sensor.grid, where)
     vector = _normal(made, row, where) if sensor.direction is None else sensor.direction
-    return sensor.grid, made.points[row], vector, sensor
+    return sensor.grid, made.points[row], vector
 
 
 def _base(made: Assembly, sensor: Sensor, where: str) -> np.ndarray:
@@ -234,17 +225,14 @@ def _base(made: Assembly, sensor: Sensor, where: str) -> np.ndarray:
     return sensor.direction
 
 
-def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
+def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, np.ndarray]:
     """A place on the nearest shell, or where there are no shells at the nearest grid."""
     place = np.asarray(sensor.place)
     size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
     if len(made.shells) == 0:
         row = int(np.linalg.norm(made.points - place, axis=1).argmin())
-        away, normal, grid = (
-            float(np.linalg.norm(made.points[row] - place)),
-            None,
-            int(made.ids[row]),
-        )
+        away, normal = float(np.linalg.norm(made.points[row] - place)), None
+        grid = int(made.ids[row])
     else:
         found = ShellSurface.whole(made).closest_points(place)
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
@@ -259,7 +247,7 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
         raise LabelError(
             f"{where}: it has no shell and so no normal; give +X, +Y, +Z or nx, ny, nz"
         )
-    return grid, place if grid == 0 else made.points[row], vector, sensor
+    return grid, place if grid == 0 else made.points[row], vector
 
 
 def _of_other_units(made: Assembly, place: np.ndarray, reach: float) -> str:

@@ -17,6 +17,7 @@ from ..progress import Progress, within
 from ..report.blocks import Block, Code, Items, Links, PageParts, Section, Table
 from ..report.drawings import Drawings
 from ..report.page import write_sections
+from ..units import UNITS
 from .console import console, say, say_results, say_table, watched
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ DeckOrCase = Annotated[
 ]
 Units = Annotated[
     str | None,
-    typer.Option(help="Unit system of a bare deck: SI, mm-t-s, mm-kg-ms, mm-kg-s, in-lb-s."),
+    typer.Option(help=f"Unit system of a bare deck: {', '.join(UNITS)}."),
 ]
 Allow = Annotated[
     list[str] | None,

@@ -12,6 +12,7 @@ import numpy as np
 from ..case.files_of_source import files_of
 from ..case.free_parameters import fields_of
 from ..case.mended_recordings import with_frf
+from ..case.schema import KEYS
 from ..ema.response_correlations import responses
 from ..ema.setup import Recording
 from ..errors import FileError
@@ -199,25 +200,31 @@ def case_text(made: CaseDraft, folder: Path) -> str:
         *([f"allow = {json.dumps(list(made.allow))}"] if made.allow else []),
         *_comment(made.units_why),
         f'units = "{made.units.name}"',
-        "# damping = 0.01  # damping ratio for drawn or scored responses",
+        _off("model", "damping"),
         "",
         "[test]",
         *_of_recordings(made, name),
         _of_mass(made),
-        "# mass_sd = 0.005  # standard deviation of the weighing [kg]",
-        "# hangers = [101, 102]  # grids of the cords",
-        '# gain = "unknown"  # frees one real factor common to all channels',
+        *(_off("test", name) for name in ("mass_sd", "hangers", "gain")),
         "",
         *_of_band(made),
         "",
         "[held_out]",
-        "# sensors = 6  # held-out outputs; default: a fifth of them",
+        _off("held_out", "sensors"),
         "",
         *_of_parts(made),
     ]  # fmt: skip
     missing = [line for text in made.missing for line in _comment(f"MISSING {text}")]
     notes = [line for text in made.notes for line in _comment(f"NOTE {text}")]
     return "\n".join([*lines, *([""] if missing or notes else []), *missing, *notes, ""])
+
+
+def _off(section: str, name: str, example: str = "") -> str:
+    """Return a word that is off: an example, its meaning and what holds without it."""
+    key = KEYS[section, name]
+    unit = f" [{key.unit}]" if key.unit else ""
+    meaning = key.meaning.partition(". ")[0].rstrip(".")
+    return f"# {name} = {example or key.example}  # {meaning}{unit}; default: {key.default}"
 
 
 def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
@@ -300,8 +307,8 @@ def _of_band(made: CaseDraft) -> list[str]:
     ends = (frf.frequency[frf.frequency > 0][[0, -1]]) if frf is not None else (20.0, 200.0)
     return [
         "[band]",
-        f"# fit = [{ends[0]:g}, {ends[1]:g}]  # Hz; default: the whole recording",
-        "# exclude = [[23.0, 27.5]]  # excluded bands: cords, mains",
+        _off("band", "fit", f"[{ends[0]:g}, {ends[1]:g}]"),
+        _off("band", "exclude"),
     ]
 
 

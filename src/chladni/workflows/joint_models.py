@@ -133,7 +133,7 @@ def with_joints(case: Case, made: Assembly) -> Case:
         path = write_assembly(made, Path(folder) / case.deck.path.name, case.units)
         deck = read_deck(path)
     read = assembly(deck, case.units)
-    parameters = free_parameters(case.keys.tables.get("parameter", []), read, deck)
+    parameters = free_parameters(case.asked.parameters, read, deck)
     return replace(case, deck=deck, assembly=read, as_deck=read, parameters=parameters)
 
 

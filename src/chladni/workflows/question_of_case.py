@@ -17,7 +17,9 @@ from .unit_check import refuse_other_units
 def nothing_measured(case: Case) -> FileError:
     """Return the error for a case without data to compare a model with."""
     if not case.recordings:
-        how = case.keys.written("test", "recordings", '["recording.uff"]')
+        how = 'recordings = ["recording.uff"] under [test]'
+        if case.asked.by_program:
+            how = "the argument recording"
         return FileError(
             f"{case.path} has no recording to compare with the model; give it as {how}"
         )
