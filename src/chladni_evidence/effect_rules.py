@@ -68,8 +68,7 @@ def exact_slopes(acting: ActingEffect) -> str:
     assert state.dK is not None
     assert state.dM is not None
     phi = state.vectors
-    moved = phi.T @ state.dK @ phi - state.lam * (phi.T @ state.dM @ phi)
-    slopes = np.einsum("prr->pr", moved)[:, acting.flexible]
+    slopes = (state.dK.along(phi) - state.lam * state.dM.along(phi))[:, acting.flexible]
     rounding = 30 * np.finfo(float).eps * float(state.lam.max())
     worst, heavier = 0.0, _weight_slopes(acting)
     for k, parameter in enumerate(acting.effect.parameters):

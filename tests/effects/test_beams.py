@@ -23,7 +23,6 @@ from chladni.model.assembly import Beams
 from chladni.model.free_parameter import FreeParameter
 from chladni.model.properties import BeamSection, Part
 from chladni.reduced.accuracy import products
-from chladni.reduced.matrix_stack import weighted
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.forms import FORMS
@@ -199,8 +198,8 @@ def test_a_stiffened_plate_frees_both_and_its_sheet_alone_is_patched():
     assert (reduced.grids.line < 0).all()  # the tube's grids are the sheet's
     system = reduced.structure.system
     split = reduced.model.with_components()
-    K = sum(weighted(A, np.ones((1, len(groups))))[0] for A in split.linear.values())
-    K = K + sum(weighted(A, np.ones((1, len(groups))))[0] for A in split.cubic.values())
+    K = sum(A.weighted(np.ones(len(groups))) for A in split.linear.values())
+    K = K + sum(A.weighted(np.ones(len(groups))) for A in split.cubic.values())
     Phi = reduced.model.basis
     due = Phi.T @ (system.K.real @ Phi) - reduced.model.K0
     assert_allclose(K, due, atol=1e-8 * abs(due).max())

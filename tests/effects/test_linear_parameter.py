@@ -35,7 +35,7 @@ def test_spring_constant():
     got = products(reduced.model, [effect], x, q)[0]
     assert_allclose(got, K @ q, atol=1e-9 * np.abs(K @ q).max())
     state = evaluate(reduced.model, [effect], x)
-    slope = np.diag(state.vectors.T @ state.dK[0] @ state.vectors)
+    slope = state.dK.along(state.vectors)[0]
     up, down = (evaluate(reduced.model, [effect], x + s, False).lam for s in (h, -h))
     scale = np.abs(slope).max()
     assert_allclose(slope, (up - down) / (2 * h), atol=1e-5 * scale)
@@ -80,7 +80,7 @@ def test_reduced_slope_is_that_of_every_mode_of_the_structure(name):
     effect = linear_scale(name, name, "-", value, slope)
     state = evaluate(reduced.model, [effect], np.zeros(1))
     phi = state.vectors
-    dK, dM = (np.diag(phi.T @ d[0] @ phi) for d in (state.dK, state.dM))
+    dK, dM = (d.along(phi)[0] for d in (state.dK, state.dM))
     h = 1e-4 * value
     up, down = (
         (2 * np.pi * normal_modes(structure(change(value + s)).system, 12).frequency) ** 2

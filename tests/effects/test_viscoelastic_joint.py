@@ -31,7 +31,6 @@ from chladni.inference.map_fit import constants, prior_residuals
 from chladni.model.assembly import Bushes
 from chladni.reduced.accuracy import products
 from chladni.reduced.frequency_dependent_stiffness import Dissipated
-from chladni.reduced.matrix_stack import along
 from chladni.reduced.reduced_model import evaluate
 
 FLEXIBLE = slice(6, 12)
@@ -90,7 +89,7 @@ def test_damping_is_half_the_loss_factor_times_the_slope_of_the_eigenvalue(masti
     effect = replace(effect, band=(effect.reference,) * 2)  # of one stiffness at all frequencies
     state = evaluate(model, [effect], X)
     eta = effect.exponent(X)[0]
-    share = along(state.dK, state.vectors)[0, FLEXIBLE] / state.lam[FLEXIBLE]
+    share = state.dK.along(state.vectors)[0, FLEXIBLE] / state.lam[FLEXIBLE]
     assert_allclose(state.dissipated.ratio[FLEXIBLE], eta / 2 * share, rtol=1e-10)
     assert share.max() > 0.05
     assert_allclose(state.dissipated.ratio[:6], 0, atol=1e-12)

@@ -20,7 +20,6 @@ from chladni.effects.search_context import Candidate
 from chladni.effects.weld_compliance import WeldCompliance, of_one
 from chladni.fem.modelled import modelled
 from chladni.model.assembly import Assembly
-from chladni.reduced.matrix_stack import along
 from chladni.reduced.real_modes import flexible
 from chladni.reduced.reduced_model import Reduced, evaluate
 from chladni.reduced.reduced_problem import ReducedProblem, reduced_problem
@@ -180,7 +179,7 @@ def test_two_joints_of_one_family_multiply():
 def slopes(model, effects, x):
     state = evaluate(model, effects, x)
     phi = state.vectors
-    return state.lam, along(state.dK, phi) - state.lam * along(state.dM, phi)
+    return state.lam, state.dK.along(phi) - state.lam * state.dM.along(phi)
 
 
 def test_slopes_are_exact_where_everything_is_multiplied():

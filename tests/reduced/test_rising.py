@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.effect import MatrixTerm, Rise
 from chladni.reduced.frequency_dependent_stiffness import Rising
+from chladni.reduced.matrix_slopes import MatrixSlopes
 
 R, X = 8, np.array([0.3, 0.2, 0.1])  # coefficient, power, and a parameter of the rest
 RNG = np.random.default_rng(6)
@@ -24,9 +25,10 @@ def risen(x, top, gradient=False):
     K = np.diag((2 * np.pi * HERTZ) ** 2) + x[0] * OPERATOR + x[2] * SOFT
     M = np.eye(R) + x[2] * HEAVY
     lam, phi = sl.eigh(K, M)
-    some = 3 if gradient else 0
-    dK = np.stack([OPERATOR, np.zeros((R, R)), SOFT])[:some]
-    dM = np.stack([np.zeros((R, R)), np.zeros((R, R)), HEAVY])[:some]
+    dK, dM = MatrixSlopes(3), MatrixSlopes(3)
+    dK.add_operator(OPERATOR, np.eye(3)[0])
+    dK.add_operator(SOFT, np.eye(3)[2])
+    dM.add_operator(HEAVY, np.eye(3)[2])
     rising = Rising()
     rising.add(part, OPERATOR, slice(0, 2))
     return rising.over_basis(lam, phi, dK, dM, M, gradient)
@@ -35,8 +37,7 @@ def risen(x, top, gradient=False):
 @pytest.mark.parametrize("top", [90.0, 400.0], ids=["some modes above", "all modes within"])
 def test_slopes_are_those_by_differences(top):
     state, h = risen(X, top, True), 1e-5
-    slope = np.einsum("ij,pik,kj->pj", state.phi, state.dK, state.phi, optimize=True)
-    slope -= state.lam * np.einsum("ij,pik,kj->pj", state.phi, state.dM, state.phi, optimize=True)
+    slope = state.dK.along(state.phi) - state.lam * state.dM.along(state.phi)
     seen = state.lam < (2 * np.pi * 2 * top) ** 2
     for p, e in enumerate(h * np.eye(3)):
         above, below = risen(X + e, top), risen(X - e, top)

@@ -13,7 +13,8 @@ import numpy as np
 from ..dynamics.modal_sum import modal_sum
 from ..ema.correlation import wrapped
 from ..ema.identification import DERIVATIVES
-from ..reduced.matrix_stack import EVERY, each_times
+from ..reduced.matrix_slopes import spanned
+from ..reduced.matrix_stack import EVERY
 from ..reduced.reduced_model import Reduced, State
 from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
 from .sensor_errors import SensorErrors, columns, variance
@@ -202,9 +203,9 @@ class Responses:
     ) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
-        dK and dM are multiplied in the basis with Φ D φ_i on their right, which avoids a full
-        projection on the modes. dφ_i is that of a moving base. dφ_o and dφ_i also occur
-        if shapes change where they are measured.
+        dK and dM are multiplied with the few vectors that Φ D φ_i and s² Φ D φ_i span.
+        dφ_i is that of a moving base. dφ_o and dφ_i also occur if shapes change where they are
+        measured.
         """
         phi_o, phi_i, d = self.modal(state)
         phi_o, d, s = phi_o[outputs], d[lines], self.s[lines]
@@ -212,13 +213,16 @@ class Responses:
         H = self.receptance(state, phi_o, phi_i, d, s) + direct / s[:, None, None] ** self.power
         assert state.dK is not None
         assert state.dM is not None
-        out = np.empty((len(state.dK), *H.shape), complex)
+        out = np.empty((state.dK.count, *H.shape), complex)
         left = phi_o * d[:, None]  # φ_o D (n_f, n_out, r)
-        from_basis, vectors = left @ state.vectors.T, state.vectors
+        q = state.vectors @ np.stack([(phi * d).T for phi in phi_i])  # (n_in, m, n_f)
+        span, parts = spanned(np.concatenate([*q, *(q * s**2)], axis=1))
+        of_K, of_M = np.split(parts.reshape(len(span.T), 2, len(q), -1), 2, axis=1)
+        slopes = np.concatenate([state.dK.times(span), state.dM.times(span)], axis=2)
+        from_basis = left @ state.vectors.T
         for j in range(len(phi_i)):
-            q = vectors @ (phi_i[j] * d).T
-            W = each_times(state.dK, q)
-            W += each_times(state.dM, q * s**2)
+            both = np.concatenate([of_K[:, 0, j], of_M[:, 0, j]])
+            W = (slopes @ np.ascontiguousarray(both).view(float)).view(complex)
             W = np.ascontiguousarray(W.transpose(2, 1, 0))  # or it is no product of BLAS
             out[:, :, :, j] = -(from_basis @ W).transpose(2, 0, 1)
             if state.ddrive is not None:

@@ -14,7 +14,6 @@ import numpy as np
 from ..effects.effect import Effect, Parameter
 from ..errors import ModelError
 from ..reduced.effect_dofs import slices
-from ..reduced.matrix_stack import along
 from ..reduced.reduced_model import Reduced, State, evaluate
 from .likelihood import Data
 from .linear_model import LinearModel, Squares
@@ -122,8 +121,10 @@ def _by_effects(
         known = effect.damping.residual(x[at], effect.traits.level, state.lam, lost.ratio)
         slope = np.zeros((len(known.r), len(x)))
         if state.dK is not None and state.dM is not None:
-            dlam = along(state.dK, state.vectors) - state.lam * along(state.dM, state.vectors)
-            slope = known.by_lam @ dlam.T + known.by_dissipated @ lost.slopes.T
+            near = np.flatnonzero(known.by_lam.any(axis=0))
+            phi = state.vectors[:, near]
+            dlam = state.dK.along(phi) - state.lam[near] * state.dM.along(phi)
+            slope = known.by_lam[:, near] @ dlam.T + known.by_dissipated @ lost.slopes.T
             slope[:, at] += known.gradient
         yield known.r, slope
 

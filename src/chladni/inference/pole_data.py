@@ -9,7 +9,6 @@ from typing import Self
 
 import numpy as np
 
-from ..reduced.matrix_stack import along
 from ..reduced.pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from ..reduced.reduced_model import Reduced, State
 
@@ -113,8 +112,8 @@ class Poles:
             return r[use], np.zeros((int(use.sum()), 0))
         assert state.dK is not None
         assert state.dM is not None
-        J, phi = np.zeros((len(r), len(state.dK))), state.vectors[:, model]
-        dlam = along(state.dK, phi) - lam * along(state.dM, phi)
+        J, phi = np.zeros((len(r), state.dK.count)), state.vectors[:, model]
+        dlam = state.dK.along(phi) - lam * state.dM.along(phi)
         J[test] = (dlam / (2 * lam) / sd[test]).T
         return r[use], J[use]
 

@@ -14,6 +14,7 @@ import numpy as np
 from ..dynamics.modal_sum import modal_sum
 from ..effects.effect import Effect, FieldChange, Parameter
 from ..effects.effect_context import ElementGrids
+from ..reduced.matrix_slopes import MatrixSlopes
 from ..reduced.reduced_model import Reduced, State, evaluate
 from .likelihood import LN10, Data, Responses
 from .map_fit import MassMeasurement, unknowns
@@ -202,21 +203,23 @@ def bending_slopes(
     base: Baseline, model: Reduced, data: Data, sets: Sequence[np.ndarray]
 ) -> np.ndarray:
     """∂r/∂a of a·B added to K, with B the bending stiffness of each set of shells (n, n_sets)."""
-    groups, r, m = model.groups, model.vectors.shape[1], len(base.state.lam)
+    groups, r = model.groups, model.vectors.shape[1]
     dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), 24)
+    # stiffness changes no load of a base, and no shapes except those of the modes
+    lost = None if base.state.dissipated is None else base.state.dissipated.held
+    still = replace(base.state, doffset=None, ddrive=None, dmoved={}, dissipated=lost)
     out = [np.zeros((len(base.residual), 0))]
     for k in range(0, len(sets), AT_ONCE):
         chunk = sets[k : k + AT_ONCE]
-        dK = np.zeros((len(chunk), m, m))
-        for j, shells in enumerate(chunk):
-            V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
-            bent = groups.cubic[shells] @ V.reshape(len(shells), 24, r)
-            dK[j, :r, :r] = V.T @ bent.reshape(-1, r)
-        # stiffness changes no load of a base, and no shapes except those of the modes
-        lost = None if base.state.dissipated is None else base.state.dissipated.held
-        still = replace(base.state, doffset=None, ddrive=None, dmoved={}, dissipated=lost)
-        state = replace(still, dK=dK, dM=np.zeros_like(dK))
-        J = data.scaled(state, True)[1]
+
+        def bent(z: np.ndarray, forces: np.ndarray, chunk: Sequence[np.ndarray] = chunk) -> None:
+            for force, shells in zip(forces, chunk, strict=True):
+                V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
+                own = groups.cubic[shells] @ (V @ z[:r]).reshape(len(shells), 24, -1)
+                force[:r] += V.T @ own.reshape(len(V), -1)
+
+        dK, dM = MatrixSlopes(len(chunk), [bent]), MatrixSlopes(len(chunk))
+        J = data.scaled(replace(still, dK=dK, dM=dM), True)[1]
         rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
     return np.concatenate(out, axis=1)

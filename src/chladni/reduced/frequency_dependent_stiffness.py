@@ -26,6 +26,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..effects.effect import MatrixTerm, Rise
+from .matrix_slopes import MatrixSlopes, Part
 from .matrix_stack import EVERY
 
 CLOSE = 1e-7  # relative distance of λ within which a divided difference is a derivative
@@ -99,12 +100,12 @@ class Dissipated:
 
 
 class Risen(NamedTuple):
-    """λ, φ (r, m), ∂K and ∂M over the basis (n_p, m, m), and the dissipation."""
+    """λ, φ (r, m), ∂K and ∂M over the basis, and the dissipation."""
 
     lam: np.ndarray
     phi: np.ndarray
-    dK: np.ndarray
-    dM: np.ndarray
+    dK: MatrixSlopes
+    dM: MatrixSlopes
     dissipated: Dissipated | None
 
 
@@ -119,15 +120,16 @@ class Rising:
         """Take an operator A (r, r); ``at``: its parameters in x."""
         self.parts.append((part, A, at))
 
-    def add_plain(self, K: np.ndarray, dK: np.ndarray) -> None:
-        """Add the parts without their rise to K (r, r) and its slopes (n_p, r, r)."""
+    def add_plain(self, K: np.ndarray, dK: MatrixSlopes) -> None:
+        """Add the parts without their rise to K (r, r) and its slopes."""
         for part, A, at in self.parts:
             K += part.coefficient * A
-            if len(dK):
-                dK[at] += part.gradient[:, None, None] * A
+            gradient = np.zeros(dK.count)
+            gradient[at] = part.gradient
+            dK.add_operator(A, gradient)
 
     def over_basis(
-        self, lam: np.ndarray, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray, M: np.ndarray,
+        self, lam: np.ndarray, phi: np.ndarray, dK: MatrixSlopes, dM: MatrixSlopes, M: np.ndarray,
         gradient: bool,
     ) -> Risen:  # fmt: skip
         """The modes with the rise, from those without it; φ⁻ᵀ is M φ."""
@@ -136,9 +138,10 @@ class Rising:
         modes, mixing, slopes = phi @ V, None, []
         if gradient:
             slopes = [one.slopes(phi, dK, dM) for one in parts]
-            dK = dK + sum(each.over_basis(M @ phi) for each in slopes)
+            dK = replace(dK, parts=[*dK.parts, *(each.over_basis(M @ phi) for each in slopes)])
             mixing = _mixing(risen, modes, dK, dM, parts)
-        return Risen(risen, modes, dK, dM, _dissipated(parts, slopes, risen, V, mixing, len(dK)))
+        count = dK.count if gradient else 0
+        return Risen(risen, modes, dK, dM, _dissipated(parts, slopes, risen, V, mixing, count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,15 +174,15 @@ class _RisenPart:
         """c A."""
         return self.part.coefficient * self.A
 
-    def slopes(self, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray) -> "_RisenSlopes":
-        """Slopes of c G A G - c A; dK, dM (n_p, m, m) are over the basis."""
+    def slopes(self, phi: np.ndarray, dK: MatrixSlopes, dM: MatrixSlopes) -> "_RisenSlopes":
+        """Slopes of c G A G - c A; dK, dM are over the basis."""
         L, c, lam = self.rise.log_frequency(self.lam), self.part.coefficient, self.lam
         both = self.rise.gradient[:, None, None] * (L + L[:, None])
         gradient = self.part.gradient[:, None, None]
         risen = self.A * self.g * self.g[:, None]
         low = np.flatnonzero(lam < (2 * np.pi * self.rise.band[1]) ** 2)  # one factor above
         D = _divided(self.g, lam, self.rise)
-        K, M = ((phi[:, low].T @ each) @ phi for each in (dK, dM))
+        K, M = (each.between(phi, phi[:, low]).swapaxes(1, 2) for each in (dK, dM))
         flow = K.swapaxes(1, 2) - M.swapaxes(1, 2) * lam[low]
         flow[:, low] = 0.0
         return _RisenSlopes(
@@ -218,12 +221,18 @@ class _RisenSlopes:
         out = side[:, self.low] @ (self.rows[p] @ right)
         return np.asarray(out + (side @ self.columns[p]) @ right[self.low])
 
-    def over_basis(self, back: np.ndarray) -> np.ndarray:
+    def over_basis(self, back: np.ndarray) -> Part:
         """The slopes over the basis, with φ⁻ᵀ (m, m)."""
-        half = self.half(back, back.T)
-        out = self.c * (half + half.swapaxes(1, 2))
-        out[self.at] += back @ (self.own - self.plain) @ back.T
-        return np.asarray(out)
+        side, low = back @ self.GA, self.low
+
+        def part(z: np.ndarray, out: np.ndarray) -> None:
+            y, t = back.T @ z, side.T @ z
+            out += self.c * (side[:, low] @ (self.rows @ y) + side @ (self.columns @ y[low]))
+            out += self.c * (back @ (self.rows.swapaxes(1, 2) @ t[low]))
+            out += self.c * (back[:, low] @ (self.columns.swapaxes(1, 2) @ t))
+            out[self.at] += back @ ((self.own - self.plain) @ y)
+
+        return part
 
     def diagonal(self, V: np.ndarray) -> np.ndarray:
         """∂(c G A G)/∂x along each of some vectors V (m, k): (n_p, k)."""
@@ -267,14 +276,18 @@ class _Mixing(NamedTuple):
 
 
 def _mixing(
-    lam: np.ndarray, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray, parts: Sequence[_RisenPart]
+    lam: np.ndarray,
+    phi: np.ndarray,
+    dK: MatrixSlopes,
+    dM: MatrixSlopes,
+    parts: Sequence[_RisenPart],
 ) -> _Mixing:
     """Modes nearer than ``APART`` do not mix with each other: any mixture of them is a mode."""
     highest = 2 * np.pi * VISIBLE * max(one.rise.band[1] for one in parts)
     seen = np.flatnonzero(lam <= highest**2)
     gap = lam[seen] - lam[:, None]
     inverse = gap / (gap**2 + (APART * np.maximum(np.abs(lam[seen]), RIGID * lam[-1])) ** 2)
-    K, M = ((phi.T @ (each @ phi[:, seen])) for each in (dK, dM))
+    K, M = (each.between(phi, phi[:, seen]) for each in (dK, dM))
     k = np.arange(len(seen))
     scaled = M[:, seen, k]
     growth = K[:, seen, k] - lam[seen] * scaled

@@ -4,141 +4,66 @@ Every hypothesis has a basis of its own: the common one and a few further vector
 of its matrices is its own.  The common block is held once for all hypotheses.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 EVERY = slice(None)
-
-
-class MatrixStack(Protocol):
-    """Matrices (g, r, r), symmetric."""
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(g, r)."""
-
-    def add_to(
-        self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
-    ) -> None:
-        """Add Σ_g w_g A_g over the groups ``among`` to each target (r, r), weights (p, n)."""
-
-
-def weighted(stack: MatrixStack, weights: np.ndarray) -> np.ndarray:
-    """Σ_g w_g A_g of each row of weights (p, g) -> (p, r, r)."""
-    out = np.zeros((len(weights), stack.shape[1], stack.shape[1]))
-    stack.add_to(tuple(out), weights)
-    return out
-
-
-def add_slopes(stack: MatrixStack, change: np.ndarray, slopes: np.ndarray) -> None:
-    """Add Σ_g c_gp A_g to the slope of every parameter p (n_p, r, r), over the groups it moves."""
-    for among, parameters in felt_alike(change):
-        stack.add_to([slopes[p] for p in parameters], change[among, parameters].T, among)
-
-
-def felt_alike(change: np.ndarray) -> Iterator[tuple[slice, list[int]]]:
-    """Slices of consecutive groups with the parameters that move them, from change (g, n_p)."""
-    felt = change != 0
-    ends = np.stack([felt.argmax(axis=0), len(felt) - felt[::-1].argmax(axis=0)], axis=1)
-    for first, stop in np.unique(ends[felt.any(axis=0)], axis=0):
-        alike = felt.any(axis=0) & (ends == (first, stop)).all(axis=1)
-        yield slice(first, stop), list(np.flatnonzero(alike))
+COLUMNS = 64  # of a block
 
 
 @dataclass(frozen=True, eq=False)
-class Whole:
-    """All of the matrices, without the half below the diagonal.
+class MatrixStack:
+    """Matrices (g, r, r), symmetric.
 
     Attributes
     ----------
-    upper : (g, r (r + 1) / 2)     rows of the upper triangle, one after the other
-    at : (r, r) int                position in it of each entry
+    blocks : (g, end, k) each   columns of the upper triangle, which end with the k of the diagonal
     """
 
-    upper: np.ndarray
-    at: np.ndarray
+    blocks: tuple[np.ndarray, ...]
 
     @property
     def shape(self) -> tuple[int, int]:
         """(g, r)."""
-        return len(self.upper), len(self.at)
+        return self.blocks[-1].shape[:2]
 
-    def add_to(
-        self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
-    ) -> None:
-        """Add Σ_g w_g A_g over the groups ``among`` to each target (r, r)."""
-        for target, upper in zip(targets, weights @ self.upper[among], strict=True):
-            target += upper[self.at]
+    def bordered(self, border: np.ndarray) -> "MatrixStack":
+        """Extend the stack by the columns (g, r + k, k) of further basis vectors."""
+        return MatrixStack((*self.blocks, border))
+
+    def weighted(self, weights: np.ndarray) -> np.ndarray:
+        """Σ_g w_g A_g (r, r) of weights (g,)."""
+        out = np.empty(2 * self.shape[1:])
+        for at, block in self._placed():
+            g, end, k = block.shape
+            out[:end, at] = (weights @ block.reshape(g, end * k)).reshape(end, k)
+            out[at, : at.start] = out[: at.start, at].T
+            out[at, at] = (out[at, at] + out[at, at].T) / 2
+        return out
+
+    def times(self, z: np.ndarray) -> np.ndarray:
+        """A_g z of every group (g, r, n), for vectors z (r, n)."""
+        out = np.zeros((*self.shape, z.shape[1]))
+        for at, block in self._placed():
+            g, end, k = block.shape
+            out[:, :end] += (block.reshape(g * end, k) @ z[at]).reshape(g, end, -1)
+            if at.start:
+                out[:, at] += block[:, : at.start].swapaxes(1, 2) @ z[: at.start]
+        return out
+
+    def _placed(self) -> Iterator[tuple[slice, np.ndarray]]:
+        """Every block with the positions of its columns."""
+        yield from ((slice(b.shape[1] - b.shape[2], b.shape[1]), b) for b in self.blocks)
 
 
-def whole(values: np.ndarray) -> Whole:
-    """The stack of symmetric matrices (g, r, r)."""
+def stacked(values: np.ndarray) -> MatrixStack:
+    """The stack of symmetric matrices (g, r, r), without most of the half below the diagonal."""
     r = values.shape[1]
-    rows, columns = np.triu_indices(r)
-    at = np.empty((r, r), np.intp)
-    at[rows, columns] = at[columns, rows] = np.arange(len(rows))
-    return Whole(np.ascontiguousarray(values[:, rows, columns]), at)
-
-
-def _summed(weights: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Σ_g w_pg A_g of weights (p, g) and matrices (g, m, n): (p, m, n)."""
-    g, m, n = values.shape
-    return np.asarray(weights @ values.reshape(g, m * n)).reshape(-1, m, n)
-
-
-def bordered(inner: MatrixStack, border: np.ndarray) -> "Bordered":
-    """Extend a stack by the columns (g, r + k, k) of further basis vectors."""
-    r = inner.shape[1]
-    corner = border[:, r:]
-    return Bordered(inner, border[:, :r], (corner + corner.transpose(0, 2, 1)) / 2)
-
-
-@dataclass(frozen=True, eq=False)
-class Bordered:
-    """[[A, S], [Sᵀ, C]] for every group.
-
-    Attributes
-    ----------
-    inner : A, shared
-    side : S (g, r, k)
-    corner : C (g, k, k)
-    """
-
-    inner: MatrixStack
-    side: np.ndarray
-    corner: np.ndarray
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(g, r + k)."""
-        g, r, k = self.side.shape
-        return g, r + k
-
-    def add_to(
-        self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
-    ) -> None:
-        """Add Σ_g w_g A_g over the groups ``among`` to each target (r + k, r + k)."""
-        r = self.side.shape[1]
-        self.inner.add_to([target[:r, :r] for target in targets], weights, among)
-        sides, corners = _summed(weights, self.side[among]), _summed(weights, self.corner[among])
-        for target, side, corner in zip(targets, sides, corners, strict=True):
-            target[:r, r:] += side
-            target[r:, :r] += side.T
-            target[r:, r:] += corner
-
-
-def along(A: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """φ_kᵀ A_p φ_k of matrices (n_p, r, r) and each column of φ (r, k): (n_p, k)."""
-    return np.einsum("rk,prk->pk", phi, A @ phi)
-
-
-def each_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """A_p z of real matrices (n_p, r, r), many of them zero, and a complex z (r, n_f)."""
-    out = np.zeros((*A.shape[:2], z.shape[1]), complex)
-    both = np.ascontiguousarray(z).view(float)  # real and imaginary parts side by side
-    for p in np.flatnonzero(A.any(axis=(1, 2))):
-        out[p] = (A[p] @ both).view(complex)
-    return out
+    ends = [min(k + COLUMNS, r) for k in range(0, r, COLUMNS)]
+    starts = [0, *ends[:-1]]
+    return MatrixStack(tuple(
+        np.ascontiguousarray(values[:, :end, start:end])
+        for start, end in zip(starts, ends, strict=True)
+    ))  # fmt: skip

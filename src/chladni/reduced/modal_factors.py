@@ -12,9 +12,10 @@ import scipy.sparse as sp
 
 from ..effects.effect import ModalFactor, of
 from .effect_dofs import Acting
+from .matrix_slopes import MatrixSlopes
 
-CLOSE = 1e-9  # distance of two logarithms within which a divided difference is a derivative
 TOUCHED = 1e-12  # coordinate of a vector of the basis in a mode; less is rounding
+CLOSE = 1e-9  # distance of two logarithms within which a divided difference is a derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,37 +33,39 @@ class ModalFactors:
     W: np.ndarray
     slopes: dict[int, np.ndarray]
 
-    def multiply(self, U: np.ndarray, V: np.ndarray, K: np.ndarray, dK: np.ndarray) -> None:
-        """Make GᵀKG of K (m, m), and its slopes of dK (n_p, m, m), in place.
+    def multiply(
+        self, U: np.ndarray, V: np.ndarray, K: np.ndarray, dK: MatrixSlopes
+    ) -> MatrixSlopes:
+        """Make GᵀKG of K (m, m) in place; return its slopes from ∂K.
 
         Parameters
         ----------
         U, V : (r, k), (k, r)   the modes over a basis, and its coordinates in them
         """
         a, b = _touched(U.T), _touched(V)  # the modes are among the vectors of most bases
-        U, V = U[a], V[:, b]
-        WV = self.W @ V
-        KU = K[:, a] @ U
-        KU[b] += WV.T @ (U.T @ KU[a])
-        _congruent(K, a, b, U, WV)
-        for slope in dK:
-            if slope.any():
-                _congruent(slope, a, b, U, WV)
-        for p, dW in self.slopes.items() if len(dK) else ():
-            half = KU @ (dW @ V)
-            dK[p][:, b] += half
-            dK[p][b] += half.T
+        U, WV = U[a], self.W @ V[:, b]
+
+        def G(z: np.ndarray) -> np.ndarray:
+            z = z.copy()
+            z[a] += U @ (WV @ z[b])
+            return z
+
+        def G_transposed(z: np.ndarray) -> np.ndarray:
+            z[..., b, :] += WV.T @ (U.T @ z[..., a, :])
+            return z
+
+        out = dK.transformed(G, G_transposed)
+        half = G_transposed(K[:, a] @ U)
+        for p, dW in self.slopes.items():
+            out.add_half(p, half, b, dW @ V[:, b])
+        K[:, b] += (K[:, a] @ U) @ WV
+        G_transposed(K)
+        return out
 
 
 def _touched(rows: np.ndarray) -> np.ndarray:
     """Columns that some row (k, m) has an entry in."""
     return np.flatnonzero(np.abs(rows).max(axis=0, initial=0.0) > TOUCHED)
-
-
-def _congruent(A: np.ndarray, a: np.ndarray, b: np.ndarray, U: np.ndarray, WV: np.ndarray) -> None:
-    """Make (I + U W V)ᵀ A (I + U W V) of A; only rows a of U and columns b of V are not zero."""
-    A[:, b] += (A[:, a] @ U) @ WV
-    A[b] += WV.T @ (U.T @ A[a])
 
 
 def modal_factors(acting: Acting) -> list[ModalFactors]:

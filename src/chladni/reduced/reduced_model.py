@@ -33,7 +33,8 @@ from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
 from .field_factors import log_fields, mass_log, multiplied
 from .frequency_dependent_stiffness import Dissipated, Rising
-from .matrix_stack import MatrixStack, bordered, whole
+from .matrix_slopes import MatrixSlopes
+from .matrix_stack import MatrixStack, stacked
 from .modal_factors import modal_factors
 from .real_modes import real_modes
 from .running_sums import RunningSums
@@ -185,9 +186,9 @@ class Reduced:
 
         return replace(
             self, vectors=basis,
-            linear={name: bordered(self.linear[name], A) for name, (A, _) in stiff.items()},
-            cubic={name: bordered(self.cubic[name], B) for name, (_, B) in stiff.items()},
-            mass=bordered(self.mass, heavy),
+            linear={name: self.linear[name].bordered(A) for name, (A, _) in stiff.items()},
+            cubic={name: self.cubic[name].bordered(B) for name, (_, B) in stiff.items()},
+            mass=self.mass.bordered(heavy),
             K0=rest(self.K0, system.elastic, [A for pair in stiff.values() for A in pair]),
             M0=rest(self.M0, system.M, [heavy]),
             base=None if self.base is None else self.base.extended(self.groups, new), _seen={},
@@ -213,7 +214,7 @@ class Reduced:
         linear: dict[str, MatrixStack] = {}
         cubic: dict[str, MatrixStack] = {}
         for name, pair in self.groups.components():
-            linear[name], cubic[name] = map(whole, self.groups.project(pair, self.vectors))
+            linear[name], cubic[name] = map(stacked, self.groups.project(pair, self.vectors))
         made = self._split[""] = replace(self, linear=linear, cubic=cubic)
         return made
 
@@ -229,7 +230,7 @@ def reduce(groups: ElementGroups, basis: np.ndarray, base: BaseMotion | None = N
     K, M = vectors.reduced(system.elastic), vectors.reduced(system.M)
     rest = mass_properties(groups.structure.assembly)[0] - float(groups.weight.sum())
     return Reduced(
-        groups, vectors, {"": whole(linear)}, {"": whole(cubic)}, whole(mass),
+        groups, vectors, {"": stacked(linear)}, {"": stacked(cubic)}, stacked(mass),
         K - linear.sum(axis=0) - cubic.sum(axis=0), M - mass.sum(axis=0), max(rest, 0.0),
         None if base is None else participation(groups, vectors, base),
     )  # fmt: skip
@@ -244,7 +245,7 @@ class State:
     lam : (m,)             ω² [rad²/s²]; m = r plus the degrees of freedom that effects add
     phi : (r, m)           eigenvectors in the basis
     own : (m - r, m)       eigenvectors at the degrees of freedom of effects
-    dK, dM : (n_p, m, m)   ∂K, ∂M over the basis and dofs of effects; None where not requested
+    dK, dM                 ∂K, ∂M over the basis and dofs of effects; None where not requested
     weight, dweight        weighed mass [kg] and its gradient (n_p,)
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
     drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
@@ -256,8 +257,8 @@ class State:
     lam: np.ndarray
     phi: np.ndarray
     own: np.ndarray
-    dK: np.ndarray | None
-    dM: np.ndarray | None
+    dK: MatrixSlopes | None
+    dM: MatrixSlopes | None
     weight: float
     dweight: np.ndarray
     offset: np.ndarray | None
@@ -274,7 +275,7 @@ class State:
         return np.concatenate([self.phi, self.own])
 
     def without_slopes(self) -> Self:
-        """The state without ∂K and ∂M, which take ten times the memory of the rest."""
+        """The state without ∂K and ∂M, which hold the matrices that they are made of."""
         lost = self.dissipated
         return replace(self, dK=None, dM=None, dissipated=None if lost is None else lost.held)
 
@@ -296,7 +297,7 @@ def evaluate(
     r, n_own = len(model.K0), sum(effect.traits.own_dofs for effect in effects)
     sums = RunningSums.of_fields(
         model.K0, model.M0, (model.linear, model.cubic), model.mass, logs, slopes,
-        n_p if gradient else 0, n_own,
+        n_own,
     )  # fmt: skip
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
@@ -314,7 +315,7 @@ def evaluate(
     sums.limit_geometric()
     for factors in modal_factors(acting):
         U, V = model.modes_of(factors.rows), model.rows(factors.rows, strained=True)
-        factors.multiply(U, V, sums.K, sums.dK)
+        sums.dK = factors.multiply(U, V, sums.K, sums.dK)
     rising.add_plain(sums.K, sums.dK)
     for (effect, at, terms), first in zip(acting, own_positions(effects), strict=True):
         for term in of(PointTerm, terms):

@@ -55,7 +55,7 @@ class ReducedProblem:
         )
         b, K = self.model.rows(where.rows), self.model.K0.copy()
         for stack in (*self.model.linear.values(), *self.model.cubic.values()):
-            stack.add_to([K], np.ones((1, stack.shape[0])))
+            K += stack.weighted(np.ones(stack.shape[0]))
         shifted_K = K + (2 * np.pi * self.hertz) ** 2 * np.eye(len(K))
         inside = np.einsum("kr,kr->k", b, np.linalg.solve(shifted_K, b.T).T)
         return np.maximum(exact - inside, 0.0)

@@ -88,8 +88,7 @@ def seen(
 
 
 def _state(lam: np.ndarray, phi: np.ndarray) -> State:
-    none = np.zeros(0)
-    return State(lam, phi, np.zeros((0, len(lam))), none, none, 0.0, none, None, None)
+    return State(lam, phi, np.zeros((0, len(lam))), None, None, 0.0, np.zeros(0), None, None)
 
 
 def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None) -> float | None:
