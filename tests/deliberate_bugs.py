@@ -50,7 +50,7 @@ BUGS = (
         "tests/fem/test_spring.py",
     ),
     DeliberateBug(  # the mass is written at the grid, its offset is lost
-        "src/chladni/effects/point_mass.py", "(grid,), m, offset)", "(grid,), m)",
+        "src/chladni/effects/masses.py", "(grid,), m, offset)", "(grid,), m)",
         "tests/effects/test_families.py",
     ),
     DeliberateBug(  # half of the gain that a name costs

@@ -9,26 +9,21 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects import discretisation as mesh
+from chladni.effects import channels as sensors
+from chladni.effects import model_errors as mesh
 from chladni.effects import registry
-from chladni.effects import sensor_fault as sensors
 from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.crack import LineFinder, crack
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.element_groups import element_groups
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.fold_bending import FoldBending
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.mass_patch import MassPatch
+from chladni.effects.joint_stiffness import model_families
+from chladni.effects.masses import LocalResonator, PointMass, sensor_mass
 from chladni.effects.membrane_prestress import prestress
-from chladni.effects.model_families import model_families
-from chladni.effects.orthotropic_material import material_axes
-from chladni.effects.point_mass import PointMass
-from chladni.effects.sensor_mass import sensor_mass
-from chladni.effects.stiffness_patch import StiffnessPatch
-from chladni.effects.suspension import suspension
-from chladni.effects.thickness_distribution import ThicknessDistribution
+from chladni.effects.model_errors import FoldBending
+from chladni.effects.orthotropy import material_axes
+from chladni.effects.sheets import MassPatch, StiffnessPatch, ThicknessDistribution
+from chladni.effects.springs import ExtraSupport, suspension
 from chladni.effects.user_parameters import user_parameter
 from chladni.effects.weld_patch import RigidPatch, WeldPatch
 from chladni.fem.assemble import structure

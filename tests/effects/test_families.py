@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from chladni.effects import registry
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.point_mass import PointMass
+from chladni.effects.masses import LocalResonator, PointMass
+from chladni.effects.springs import ExtraSupport
 from chladni.reduced.reduced_model import evaluate
 from chladni_evidence.effect_check import RULES
 from chladni_evidence.effect_ground import usual_grounds

@@ -10,6 +10,7 @@ from scipy.linalg import block_diag
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.joint_stiffness import joint_families
 from chladni.effects.joints import (
     MOST_RUN,
     Connection,
@@ -19,8 +20,7 @@ from chladni.effects.joints import (
     with_factor_on,
     without_joint,
 )
-from chladni.effects.model_families import joint_families
-from chladni.effects.weld_compliance import WeldCompliance, WeldMissing, of_one, proposed
+from chladni.effects.welds import WeldCompliance, WeldMissing, of_one, proposed
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
 from chladni.inference.scan import baseline

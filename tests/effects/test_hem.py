@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.contact_stiffness import close_places, contacts
-from chladni.effects.hem_contact import along_stretch, everywhere
-from chladni.effects.hem_line import hem_lines
+from chladni.effects.contacts import close_places, contacts
+from chladni.effects.hems import along_stretch, everywhere, hem_lines
 from chladni.fem.assemble import structure
 from chladni.fem.energy import rigid_motions
 from chladni.reduced.reduced_model import evaluate

@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.adhesive import SEALANT, beads_of
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.contact_stiffness import close_places
+from chladni.effects.contacts import close_places
+from chladni.effects.joint_stiffness import joint_families
 from chladni.effects.joints import alone, beads, fasteners, with_factor_on, without_joint
-from chladni.effects.model_families import joint_families
-from chladni.effects.viscoelastic_joint import SEALANT, beads_of
-from chladni.effects.weld_compliance import (
+from chladni.effects.welds import (
     GONE,
     MOST_LN_LEFT,
     NONE_LEFT,

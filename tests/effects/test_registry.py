@@ -7,16 +7,16 @@ import pytest
 from typer.testing import CliRunner
 
 from chladni.cli.app import application
-from chladni.effects import point_mass, registry
+from chladni.effects import masses, registry
 from chladni.errors import ExtensionError, LabelError, ModelError
 
 
-class Bolt(point_mass.PointMass):
+class Bolt(masses.PointMass):
     name = "loose-bolt"
     claim = "a bolt is loose"
 
 
-BOLT = replace(point_mass.FAMILY, effect=Bolt)
+BOLT = replace(masses.POINT, effect=Bolt)
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def test_a_program_adds_a_family_and_takes_it_back(bolt):
 
 
 def test_a_name_belongs_to_one_family(bolt):
-    for known in (BOLT, point_mass.FAMILY):
+    for known in (BOLT, masses.POINT):
         with pytest.raises(ExtensionError, match=f"'{known.name}' is registered already"):
             registry.register(known)
 
@@ -58,7 +58,7 @@ FAULTS = {
     "is not there": ("nowhere:FAMILY", "", "ModuleNotFoundError"),
     "is something else": ("broken:FAMILY", "FAMILY = 3", "is a int, not a chladni"),
     "takes a name": (
-        "broken:FAMILY", "from chladni.effects.point_mass import FAMILY", "another effect has this",
+        "broken:POINT", "from chladni.effects.masses import POINT", "another effect has this",
     ),
 }  # fmt: skip
 

@@ -8,8 +8,8 @@ import pytest
 from chladni.decision.decision_rules import TIED
 from chladni.effects.effect import Parameter
 from chladni.effects.estimate import Remarks
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.model_families import ModelFamily
+from chladni.effects.joint_stiffness import ModelFamily
+from chladni.effects.masses import LocalResonator
 from chladni.effects.registry import families
 from chladni.inference.adequacy import FitTest
 from chladni.search.diagnosis import Diagnosis

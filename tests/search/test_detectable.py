@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.effects.points import with_masses
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.inference.map_fit import MassMeasurement
+from chladni.model.point_masses import with_masses
 from chladni.search.detectable import detectable
 from chladni.search.question import Question
 from chladni_specimens.plates import plate

@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.frf import FRF
-from chladni.effects.points import with_masses
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import modelled
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import MassMeasurement
+from chladni.model.point_masses import with_masses
 from chladni.search.basis_refinement import refined
 from chladni.search.deciding import decided
 from chladni.search.decision_in_words import concluded

@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.frf import FRF
-from chladni.effects.points import with_masses
 from chladni.ema.identification import equalised, identify
 from chladni.ema.level_modes import AtLevel
 from chladni.ema.level_study import level_study
@@ -15,6 +14,7 @@ from chladni.ema.level_words import level_notes
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import modelled
 from chladni.inference.map_fit import MassMeasurement
+from chladni.model.point_masses import with_masses
 from chladni.search.other_recordings import (
     levels,
     measured_spread,

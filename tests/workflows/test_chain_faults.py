@@ -10,10 +10,10 @@ from tests.builders.cases import write_case
 
 import chladni
 from chladni.dynamics.frf import FRF
-from chladni.effects.points import with_masses
 from chladni.ema.finding import Finding, Screening
 from chladni.inference.chain_hypotheses import chain_faults, without_modes
 from chladni.io.nastran import write_assembly
+from chladni.model.point_masses import with_masses
 from chladni.workflows.screening_of_case import instead_of_effects
 
 SENSORS = (2, 4, 7, 18, 24, 30, 36, 43, 47)

@@ -39,21 +39,13 @@ TAKEN = 0.05, 0.25  # share of stiffness lost by that mode, for each spring of a
 
 @dataclass(frozen=True, eq=False)
 class SupportDirection:
-    """One compliance of a clamp: along the first axis of a frame, and about the second.
+    """One compliance of a clamp: along the first axis of a frame, and about the second."""
 
-    Attributes
-    ----------
-    clamp : position among the clamps of the structure
-    frame : (3, 3)     rows are unit vectors in the basic frame
-    components : 1, or 1 and 5: along and about these axes
-    rigid : (k,)       springs that are as good as rigid [N/m, N m/rad]
-    pull : (k, r)      f²/λ of each mode: a spring k reduces its stiffness by the share pull/k
-    """
-
-    clamp: int
-    frame: np.ndarray
-    components: tuple[int, ...]
-    rigid: np.ndarray
+    clamp: int  # position among the clamps of the structure
+    frame: np.ndarray  # (3, 3) rows are unit vectors in the basic frame
+    components: tuple[int, ...]  # 1, or 1 and 5: along and about these axes
+    rigid: np.ndarray  # (k,) springs that are as good as rigid [N/m, N m/rad]
+    # (k, r) f²/λ of each mode: a spring k reduces its stiffness by the share pull/k
     pull: np.ndarray
 
     @property

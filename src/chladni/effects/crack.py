@@ -17,12 +17,11 @@ from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
 from .effect import Effect, MatrixTerm, Parameter, Traits, Within
-from .element_groups import ElementGroups
+from .element_groups import ElementGroups, shear_matrices
 from .estimate import Estimate, in_mm
 from .family import Article, Family
-from .model_families import within_shear
+from .joint_stiffness import within_shear
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
-from .shell_components import shear_matrices
 
 LEAST_LEFT = 0.1  # of the bending stiffness always remains, so that K stays positive
 SHELLS = 3  # in a line at least
@@ -46,42 +45,25 @@ AROUND = (-0.7, 0.0, 0.7)  # strengths about that of the fit
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Adjacent shells along a line on a part, as drawn by :meth:`LineFinder.through`.
+    """Adjacent shells along a line on a part, as drawn by :meth:`LineFinder.through`."""
 
-    Attributes
-    ----------
-    shells : (k,) int
-    centre : (3,)        of these shells [m]
-    part, through : int  its part, and the shell whose middle it goes through
-    direction : (3,)     unit vector along it there
-    times : float        its length, in units of the usual one
-    """
-
-    shells: np.ndarray
-    centre: np.ndarray
-    part: int
-    through: int
-    direction: np.ndarray
-    times: float
+    shells: np.ndarray  # (k,) int
+    centre: np.ndarray  # (3,) of these shells [m]
+    part: int  # its part, and the shell whose middle it goes through
+    through: int  # its part, and the shell whose middle it goes through
+    direction: np.ndarray  # (3,) unit vector along it there
+    times: float  # its length, in units of the usual one
 
 
 @dataclass(frozen=True, eq=False)
 class LineFinder:
-    """Geometry of the shells of an assembly, from which lines of shells are drawn.
+    """Geometry of the shells of an assembly, from which lines of shells are drawn."""
 
-    Attributes
-    ----------
-    middle, normal : (m, 3)   [m], -
-    part : (m,) int
-    width : (m,)              square root of the area [m]
-    size : {part: square root of its area [m]}
-    """
-
-    middle: np.ndarray
-    normal: np.ndarray
-    part: np.ndarray
-    width: np.ndarray
-    size: dict[int, float]
+    middle: np.ndarray  # (m, 3) [m], -
+    normal: np.ndarray  # (m, 3) [m], -
+    part: np.ndarray  # (m,) int
+    width: np.ndarray  # (m,) square root of the area [m]
+    size: dict[int, float]  # {part: square root of its area [m]}
 
     @classmethod
     def of(cls, assembly: Assembly) -> "LineFinder":

@@ -22,18 +22,11 @@ LEAST_REACH = 0.005  # [m] lever arm of rotations where a tie holds one grid onl
 
 @dataclass(frozen=True, eq=False)
 class RigidTie:
-    """Some dependent points of a rigid element.
+    """Some dependent points of a rigid element."""
 
-    Attributes
-    ----------
-    rows : rows of their points
-    lead : row of the element's independent point
-    reach : root mean square distance of the followers from their middle [m]
-    """
-
-    rows: tuple[int, ...]
-    lead: int
-    reach: float
+    rows: tuple[int, ...]  # rows of their points
+    lead: int  # row of the element's independent point
+    reach: float  # root mean square distance of the followers from their middle [m]
 
     def within(self, assembly: Assembly) -> tuple[int, RigidBody]:
         """Position of the rigid element that contains the tie, and the element."""

@@ -21,12 +21,11 @@ from ..geometry.sampling import nearest_points
 from ..model.assembly import Assembly, Average, RigidBody, Shells
 from ..model.free_parameter import FreeParameter
 from .effect import Effect, MatrixTerm, Parameter, Traits, Within
-from .element_groups import ElementGroups
+from .element_groups import ElementGroups, shear_matrices
+from .joint_stiffness import within_shear
 from .joints import fasteners
-from .model_families import within_shear
-from .property_bands import in_bands
-from .shell_components import shear_matrices
-from .stiffness_patch import softened
+from .sheet_patch import in_bands
+from .sheets import softened
 
 FIELD, SPIDERS = "weld-patch", "rigid-patch"
 PATCHES = FIELD, SPIDERS

@@ -23,23 +23,16 @@ class BeamLine(Effect):
     """K + r² K_A + r⁴ K_I and M likewise, r the size of the section over that of ``section``.
 
     Areas grow with r² and second moments of area with r⁴. The first parameter is the size.
-
-    Attributes
-    ----------
-    section : of r = 1
-    up : (3,) or None   direction of plane 1
-    offset : (3,)       place of the beams from their grids [m]
-    length : of the line [m]
-    operators : K_A, K_I, M_A and M_I with their powers of r
     """
 
     traits = Traits(elastic=True)
 
-    section: BeamSection | None = None
-    up: tuple[float, float, float] | None = None
+    section: BeamSection | None = None  # of r = 1
+    up: tuple[float, float, float] | None = None  # (3,) or None direction of plane 1
+    # (3,) place of the beams from their grids [m]
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    length: float = 0.0
-    operators: tuple[Operator, ...] = ()
+    length: float = 0.0  # of the line [m]
+    operators: tuple[Operator, ...] = ()  # K_A, K_I, M_A and M_I with their powers of r
 
     @classmethod
     def along(
