@@ -10,6 +10,8 @@ from chladni.cli.app import application
 from chladni.effects import masses, registry
 from chladni.errors import ExtensionError, LabelError, ModelError
 
+from .conftest import installed_examples
+
 
 class Bolt(masses.PointMass):
     name = "loose-bolt"
@@ -47,9 +49,10 @@ def test_unknown_names_are_told_the_known_ones():
         registry.unregister("point-mass")
 
 
-def test_an_installed_package_adds_its_family(example_edge_mass):
-    assert registry.names() == (*(f.name for f in registry.BUILT_IN), "edge-mass")
-    assert example_edge_mass.effect.__module__ == "edge_mass"
+def test_an_installed_package_adds_its_family(tmp_path):
+    with installed_examples(tmp_path, ["edge_mass"]):
+        assert registry.names() == (*(f.name for f in registry.BUILT_IN), "edge-mass")
+        assert registry.family("edge-mass").effect.__module__ == "edge_mass"
 
 
 FAULTS = {

@@ -68,7 +68,7 @@ def at_its_own_frequency(deck, effect, x, mode):
     """A mode of the full structure, its bead as stiff as it is at that mode's own frequency."""
     _, a, _ = effect.exponent(x)
     f = effect.reference
-    for _ in range(12):
+    for _ in range(6):
         made = with_factor_on(deck, effect.joint, float(np.exp(x[0])) * (f / effect.reference) ** a)
         f = normal_modes(structure(made).system, 14).frequency[mode]
     return f
