@@ -77,6 +77,16 @@ def test_the_reduced_hem_is_that_of_the_deck(deck, reduced, line, x):
     assert written[0] > normal_modes(reduced.structure.system, 14).frequency[6]
 
 
+def test_a_line_costs_its_stiffness_per_length(deck, reduced, line):
+    """Sliding u of all of it stores ½ k L u², by the terms and by the bushes that are written."""
+    effect, x = everywhere(line, line.relative_rows(reduced.structure), 1), np.array([0.7])
+    n = len(line)  # each solid has its own pitch, the length is from first middle to last
+    due = effect.reported(x, np.zeros(1))[0].value * line.length * n / (n - 1)
+    assert effect.terms(x)[0].coefficient.sum() == pytest.approx(due, rel=0.05)
+    bushes = effect.apply(deck, x).bushes.stiffness[len(deck.bushes) :]
+    assert bushes.sum() == pytest.approx(due, rel=0.05)
+
+
 def test_a_stretch_as_long_as_the_line_is_all_of_it(reduced, line):
     rows = line.relative_rows(reduced.structure)
     whole, some = everywhere(line, rows, 1), along_stretch(line, rows, 1)

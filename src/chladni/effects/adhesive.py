@@ -182,13 +182,7 @@ def modulus_of(assembly: Assembly, bead: Connection) -> float | None:
 def softened_bead(
     assembly: Assembly, rng: np.random.Generator, ln_factor: tuple[float, float]
 ) -> tuple[Connection, float, float]:
-    """Draw a bead to conceal, the factor on its E from a range of its logarithm, and E [Pa].
-
-    Raises
-    ------
-    ModelError
-        If there is no bead.
-    """
+    """Draw a bead to conceal, the factor on its E from a range of its logarithm, and E [Pa]."""
     found = beads(structure(assembly))
     if not found:
         raise ModelError("the structure has no bead of adhesive")

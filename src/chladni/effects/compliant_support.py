@@ -6,7 +6,7 @@ its foundation; for a bolted root the rotation matters most (Gorman 1975, Free V
 Beams and Shafts, ch. 1). With base excitation the springs are between the base and the clamp.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -68,13 +68,11 @@ class CompliantSupport(Effect):
     claim = "a clamp is compliant where the deck is rigid"
     traits = Traits(rounds=1)
 
-    direction: SupportDirection | None = None
-    rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure
+    direction: SupportDirection = field(kw_only=True)
+    rows: sp.csr_array = field(kw_only=True)  # motions of the clamp over the dofs with it released
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """(k - k_rigid) gᵀg for each compliant motion g of the clamp."""
-        assert self.rows is not None
-        assert self.direction is not None
         k = self.springs(x)
         return (PointTerm("K", self.rows, k - self.direction.rigid, np.diag(k)),)
 
@@ -84,7 +82,6 @@ class CompliantSupport(Effect):
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Replace the supports by GRID, RBE2 and CELAS2 to ground."""
-        assert self.direction is not None
         assert self.release is not None
         clamp = self.release.clamps[self.direction.clamp]
         return on_springs(assembly, clamp, self.direction, self.springs(x))

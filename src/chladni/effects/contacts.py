@@ -6,7 +6,7 @@ rotation would load the spring.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -51,14 +51,18 @@ class SheetPairs:
         where = (means.dof[means.row], means.on)
         n = 6 * len(bare.points)
         G = sp.csr_array((means.factor, where), shape=(n, n))[:, : built.T.shape[0]]
-        first, second = (self._pick(end, n) for end in ends.T)
+        k = len(ends)
+        first, second = (
+            sp.csr_array(
+                (
+                    self.along.ravel(),
+                    (np.repeat(np.arange(k), 3), (6 * end[:, None] + np.arange(3)).ravel()),
+                ),
+                shape=(k, n),
+            )
+            for end in ends.T
+        )
         return sp.csr_array((second - first) @ G @ built.T)
-
-    def _pick(self, rows: np.ndarray, n: int) -> sp.csr_array:
-        k = len(rows)
-        columns = (6 * rows[:, None] + np.arange(3)).ravel()
-        where = (np.repeat(np.arange(k), 3), columns)
-        return sp.csr_array((self.along.ravel(), where), shape=(k, n))
 
     def tied(self, assembly: Assembly, on: np.ndarray | None = None) -> tuple[Assembly, np.ndarray]:
         """Add both ends of springs at some places (default all); return also their rows (k, 2)."""
@@ -115,11 +119,10 @@ class ContactStiffness(AtPoints):
     name = "contact-stiffness"
     claim = "two sheets touch where the model has a gap"
 
-    place: ClosePlaces | None = None
+    place: ClosePlaces = field(kw_only=True)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CBUSH between two RBE3 at the place."""
-        assert self.place is not None
         return self.place.gripped(assembly, np.array([self.parameters[0].value(x[0])]))
 
 
@@ -180,7 +183,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
         return best_places(context, chosen, FOLLOWED, extended=True)
     places = ElementGrids(
         np.array([e.grids[0] for e in effects]),
-        np.array([e.place.along[0] for e in effects if e.place is not None]),
+        np.array([e.place.along[0] for e in effects]),
         points,
         sp.csr_array(sp.vstack([e.rows for e in effects])),
         np.full(len(effects), -1),

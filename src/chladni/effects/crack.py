@@ -15,7 +15,7 @@ from ..fem.sparse_assembly import blocks, congruence
 from ..geometry.facets import cell_areas, cell_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.assembly import Assembly
-from ..model.properties import Part, ShellSection
+from ..model.properties import ShellSection
 from .effect import Effect, MatrixTerm, Parameter, Traits, Within
 from .element_groups import ElementGroups, shear_matrices
 from .estimate import Estimate, in_mm
@@ -158,11 +158,15 @@ class Crack(Effect):
         "annealed bend"
     )
 
-    shells: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    bending: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    shear: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    within: tuple[Within, Within] = (Within(), Within())  # of bending, and of shear
-    line: Line | None = None
+    line: Line = field(kw_only=True)
+    bending: sp.csr_array = field(kw_only=True)
+    shear: sp.csr_array = field(kw_only=True)
+    within: tuple[Within, Within] = field(kw_only=True)  # of bending, and of shear
+
+    @property
+    def shells(self) -> np.ndarray:
+        """Rows of the shells of the line."""
+        return self.line.shells
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """(f - 1) B, bending and the shear that comes with it."""
@@ -183,8 +187,7 @@ class Crack(Effect):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Remaining 12I/t³ with its 95 % interval."""
-        value, high, low = (left(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
-        return (Estimate("12I/T3", value, "-", low, high),)
+        return (self.estimate(x, sd, lambda y: left(y[0])),)
 
 
 def left(x: float) -> float:
@@ -212,7 +215,7 @@ def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     return Crack(
         (unknown,), f"on {name} through ({in_mm(line.centre)} mm)", (name,), point=(x, y, z),
         radius=float(reach), grids=tuple(assembly.ids[np.unique(groups.nodes[on])].tolist()),
-        trials_factor=tried, shells=on, bending=bending, shear=shear, within=within, line=line,
+        trials_factor=tried, bending=bending, shear=shear, within=within, line=line,
     )  # fmt: skip
 
 
@@ -222,15 +225,11 @@ def cracked(assembly: Assembly, shells: np.ndarray, f: float) -> Assembly:
     for k in np.unique(part[shells]):
         mine = shells[assembly.shells.part[shells] == k]
         part[mine] = len(parts)
-        new, name = weakened(parts[k], f), f"crack in {parts[k].name}"
+        section, name = parts[k].section, f"crack in {parts[k].name}"
+        assert isinstance(section, ShellSection)
+        new = parts[k].with_section(bending_ratio=section.bending_ratio * f)
         parts.append(replace(new, id=1 + max(p.id for p in parts), name=name))
     return replace(assembly, parts=tuple(parts), shells=replace(assembly.shells, part=part))
-
-
-def weakened(part: Part, f: float) -> Part:
-    """Multiply the bending stiffness of a part by f."""
-    assert isinstance(part.section, ShellSection)
-    return part.with_section(bending_ratio=part.section.bending_ratio * f)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
@@ -284,7 +283,7 @@ def _at_rest(
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
     """Move a fitted crack to neighbouring lines, in a few steps, each evaluated exactly."""
-    if not isinstance(effect, Crack) or effect.line is None or context.scan is None:
+    if not isinstance(effect, Crack) or context.scan is None:
         return None
     groups, line, tried = context.where.groups, effect.line, effect.trials_factor
     lines, best = LineFinder.of(groups.structure.assembly), effect

@@ -11,10 +11,18 @@ def in_mm(place: Iterable[float]) -> str:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A physical value with the interval that holds it with 95 % if the explanation is right."""
+    """A physical value with its 95 % interval.
 
-    name: str  # of the parameter
-    value: float  # the most probable one
+    Attributes
+    ----------
+    name : of the parameter
+    unit : in which the value is given
+    value : the most probable one
+    low, high : ends of the interval that holds the value with 95 % if the explanation is right
+    """
+
+    name: str
+    value: float
     unit: str = ""
     low: float | None = None
     high: float | None = None
@@ -22,22 +30,41 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Location:
-    """Place of an effect in words and, if known, in numbers."""
+    """Place of an effect in words and, if known, in numbers.
 
-    text: str = ""  # in words
-    parts: tuple[str, ...] = ()  # names of parts
-    grids: tuple[int, ...] = ()  # ids of grids
-    point_m: tuple[float, ...] | None = None  # in the basic frame [m]
-    radius_m: float | None = None  # [m] of a distributed effect, or uncertainty of a local place
-    band_hz: tuple[float, float] | None = None  # that it concerns [Hz]
-    channels: tuple[str, ...] = ()  # labels of those that it concerns
+    Attributes
+    ----------
+    text : in words
+    parts : names of parts
+    grids : ids of grids
+    point_m : place in the basic frame [m]
+    radius_m : extent of a distributed effect, or uncertainty of the place of a local one [m]
+    band_hz : band that it concerns [Hz]
+    channels : labels of the channels that it concerns
+    """
+
+    text: str = ""
+    parts: tuple[str, ...] = ()
+    grids: tuple[int, ...] = ()
+    point_m: tuple[float, ...] | None = None
+    radius_m: float | None = None
+    band_hz: tuple[float, float] | None = None
+    channels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Remarks:
-    """Text on a fitted effect; "" where there is nothing to say."""
+    """Text on a fitted effect; "" where there is nothing to say.
 
-    becomes: str = ""  # name of the simpler effect that the data cannot distinguish from it
-    nearly: str = ""  # name of the simpler effect to which it reduces within its intervals
-    implausible: str = ""  # why its value is physically impossible
-    comment: str = ""  # what the cards of the deck do not represent
+    Attributes
+    ----------
+    becomes : name of the simpler effect that the data cannot distinguish from it
+    nearly : name of the simpler effect to which it reduces within its intervals
+    implausible : why its value is physically impossible
+    comment : note on what the cards of the deck do not represent
+    """
+
+    becomes: str = ""
+    nearly: str = ""
+    implausible: str = ""
+    comment: str = ""

@@ -7,7 +7,7 @@ hem, a far stiffer sealant changes all frequencies in the same way; along a stre
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -113,7 +113,13 @@ def _line(assembly: Assembly, group: int, rows: np.ndarray) -> HemLine | None:
     closed = gap < CLOSED * pitch
     along = np.gradient(middle, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    carriers, part = _carriers(assembly), _part_of(assembly)
+    carriers = {
+        mean.reference: np.array([row for row, _, _ in mean.terms])
+        for mean in assembly.rigid
+        if isinstance(mean, Average)
+    }
+    part = np.full(len(assembly.points), -1)  # of shells at each point
+    part[assembly.shells.nodes.ravel()] = np.repeat(assembly.shells.part, 4)
     sides = tuple(_sides(part, carriers, nodes) for nodes in solids.nodes[rows])
     if any(len(a) < 3 or len(b) < 3 for a, b in sides):
         return None
@@ -124,22 +130,6 @@ def _line(assembly: Assembly, group: int, rows: np.ndarray) -> HemLine | None:
     share = np.minimum(np.gradient(s), 2 * pitch)
     length = float(s[-1]) + gap * closed
     return HemLine(middle, along, sides, name, sheets, share, s, length, closed)
-
-
-def _carriers(assembly: Assembly) -> dict[int, np.ndarray]:
-    """{row of an averaged point: rows of the points in its mean}."""
-    return {
-        mean.reference: np.array([row for row, _, _ in mean.terms])
-        for mean in assembly.rigid
-        if isinstance(mean, Average)
-    }
-
-
-def _part_of(assembly: Assembly) -> np.ndarray:
-    """Position of a part of shells at each point (n,), -1 without shells."""
-    out = np.full(len(assembly.points), -1)
-    out[assembly.shells.nodes.ravel()] = np.repeat(assembly.shells.part, 4)
-    return out
 
 
 def _sides(
@@ -166,8 +156,8 @@ class HemContact(Effect):
     name = "hem-contact"
     claim = "the sheets of a hem cannot slide along it as they would with soft sealant alone"
 
-    line: HemLine | None = None
-    rows: sp.csr_array | None = None
+    line: HemLine = field(kw_only=True)
+    rows: sp.csr_array = field(kw_only=True)  # b (k, n)
 
     @property
     def local(self) -> bool:
@@ -176,7 +166,6 @@ class HemContact(Effect):
 
     def weights(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """w (k,) and ∂ln w/∂x of the middle and of ln ℓ (k, 2)."""
-        assert self.line is not None
         if not self.local:
             return np.ones(len(self.line)), np.zeros((len(self.line), 0))
         _, middle, reach = self.parameters
@@ -187,8 +176,6 @@ class HemContact(Effect):
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """The springs along the line."""
-        assert self.line is not None
-        assert self.rows is not None
         w, slopes = self.weights(x)
         c = self.parameters[0].value(x[0]) * self.line.share * w
         gradient = c[:, None] * np.column_stack([np.ones(len(c)), slopes])
@@ -196,8 +183,6 @@ class HemContact(Effect):
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """Hat functions along the line, as weights on the loads of the springs."""
-        assert self.line is not None
-        assert self.rows is not None
         count = min(len(self.line), max(2, round(self.line.length / HAT)))
         at = np.arange(count) * self.line.length / (count - (not self.line.closed))
         hats = [np.maximum(1 - np.abs(self.line.from_place(a)) / (at[1] - at[0]), 0) for a in at]
@@ -205,23 +190,20 @@ class HemContact(Effect):
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CBUSH between two RBE3 at each place where the hem holds."""
-        assert self.line is not None
         k = self.terms(x)[0].coefficient
         return self.line.gripped(assembly, np.where(k > END * k.max(), k, 0.0))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Sliding stiffness per length, and the length of a stretch."""
-        k, *rest = super().reported(x, sd)
+        k = super().reported(x, sd)[0]
         if not self.local:
             return (k,)
-        L = rest[1]
-        assert L.low is not None
-        assert L.high is not None
-        return k, Estimate("L", 2 * L.value, "m", 2 * L.low, 2 * L.high)
+        length = self.estimate(x, sd, lambda y: 2 * self.parameters[2].value(y[2]), k=2)
+        return k, length
 
     def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The stretch, from one end to the other."""
-        if not self.local or self.line is None:
+        if not self.local:
             return self.where()
         _, middle, reach = self.parameters
         s0, ell = middle.value(x[1]), reach.value(x[2])
@@ -232,7 +214,6 @@ class HemContact(Effect):
 
     def _at(self, s: float) -> tuple[float, ...]:
         """The place (3,) of the line nearest to an arc length."""
-        assert self.line is not None
         k = int(np.abs(self.line.from_place(s)).argmin())
         return tuple(float(v) for v in self.line.middle[k])
 

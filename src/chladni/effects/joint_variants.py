@@ -107,13 +107,7 @@ def _remade(
 
 
 def _blocks(assembly: Assembly, group: int, rows: np.ndarray) -> Iterator[Block]:
-    """Blocks of some solids.
-
-    Raises
-    ------
-    ModelError
-        If a solid is no hexahedron between two sheets.
-    """
+    """Blocks of some solids, all of them hexahedra between two sheets."""
     solids, carriers = assembly.solids[group], _carriers(assembly)
     part = dict(zip(assembly.shells.nodes.ravel().tolist(),
                     np.repeat(assembly.shells.part, 4).tolist(), strict=True))  # fmt: skip

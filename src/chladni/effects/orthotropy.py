@@ -88,12 +88,8 @@ class OrthotropicMaterial(Effect):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """E1, E2, G12 and nu12."""
-        moduli = super().reported(x, sd)[:3]
-        nu = [
-            self.moduli(np.append(x[:3], x[3] + s * 1.96 * self.widened(sd)[3]))[3]
-            for s in (-1, 0, 1)
-        ]
-        return *moduli, Estimate("nu12", nu[1], "-", nu[0], nu[2])
+        nu12 = self.estimate(x, sd, lambda y: self.moduli(y)[3], "nu12", k=3)
+        return *super().reported(x, sd)[:3], nu12
 
     def _logs(self, x: np.ndarray) -> np.ndarray:
         """ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
@@ -147,11 +143,6 @@ def _replaced(
     return out
 
 
-def _about(mean: float, sd: float) -> tuple[float, ...]:
-    """Starts of a search: the prior's mean and one standard deviation to either side."""
-    return mean - sd, mean, mean + sd
-
-
 def orthotropic(
     groups: ElementGroups, positions: tuple[int, ...], axis: np.ndarray
 ) -> OrthotropicMaterial:
@@ -170,7 +161,7 @@ def orthotropic(
     E, G, prior = material.E, material.shear_modulus, orthotropy(material)
     unknown = (
         *(
-            Parameter(name, "Pa", mean, sd, scale, step=0.3, starts=_about(mean, sd))
+            Parameter(name, "Pa", mean, sd, scale, step=0.3, starts=(mean - sd, mean, mean + sd))
             for name, mean, sd, scale in zip(
                 ("E1", "E2", "G12"), prior.shift(E, G), prior.sd, (E, E, G), strict=True
             )
@@ -197,20 +188,20 @@ def material_axes(where: EffectContext) -> list[OrthotropicMaterial]:
     """Orthotropy of every isotropic material, axis 1 along the longest extent of its parts."""
     groups = where.groups
     parts = groups.structure.assembly.parts
-    by_material: dict[object, list[int]] = {}
+    by_material: dict[Isotropic, list[int]] = {}
     for k in sorted(set(groups.part.tolist())):
         if (material := isotropic(parts[k])) is not None:
             by_material.setdefault(material, []).append(k)
     return [
         orthotropic(groups, tuple(positions), axis)
         for material, positions in by_material.items()
-        for axis in _extents(groups, np.isin(groups.part, positions))[: _ways(material)]
+        for axis in _extents(groups, np.isin(groups.part, positions))[
+            : 1
+            + orthotropy(
+                material
+            ).directed  # both if the prior distinguishes them
+        ]
     ]
-
-
-def _ways(material: object) -> int:
-    """Number of axes tried: both if the prior of the material distinguishes them."""
-    return 2 if isinstance(material, Isotropic) and orthotropy(material).directed else 1
 
 
 def isotropic(part: Part) -> Isotropic | None:
@@ -230,12 +221,8 @@ def _extents(groups: ElementGroups, inside: np.ndarray) -> list[np.ndarray]:
     if len(centre) < 3:
         return list(np.eye(3))
     X = centre - np.average(centre, axis=0, weights=area)
-    return [_nearest_axis(direction) for direction in np.linalg.svd(X, full_matrices=False)[2]]
-
-
-def _nearest_axis(direction: np.ndarray) -> np.ndarray:
-    k = int(np.argmax(np.abs(direction)))
-    return np.eye(3)[k] if abs(direction[k]) > 0.98 else direction
+    at = [(d, int(np.argmax(np.abs(d)))) for d in np.linalg.svd(X, full_matrices=False)[2]]
+    return [np.eye(3)[k] if abs(d[k]) > 0.98 else d for d, k in at]
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:

@@ -99,13 +99,7 @@ def bell(R: float, distance: np.ndarray, variance: np.ndarray) -> tuple[np.ndarr
 
 
 def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
-    """Return the patch about all welds or spiders of the structure, or of the named parts.
-
-    Raises
-    ------
-    ModelError
-        If no shell of these parts touches such a joint.
-    """
+    """Return the patch about all welds or spiders of the structure, or of the named parts."""
     built = groups.structure
     assembly, shells = built.assembly, built.assembly.shells
     kind, what, each = (
@@ -119,7 +113,8 @@ def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
     if not touching.any():
         raise ModelError(f"the deck has no shells that touch {what}; leave {kind.name} out")
     part &= np.isin(shells.part, shells.part[touching])
-    area = groups_area(groups)
+    X = assembly.points[shells.nodes]  # of a quadrilateral half the product of its diagonals
+    area = np.linalg.norm(np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]), axis=1) / 2
     R = float(np.sqrt(area[touching].mean()) / 2)
     middle = assembly.points[shells.nodes].mean(axis=1)
     points = np.array([point for point, _ in each])
@@ -170,13 +165,6 @@ def spiders(assembly: Assembly) -> list[tuple[np.ndarray, np.ndarray]]:
     return out
 
 
-def groups_area(groups: ElementGroups) -> np.ndarray:
-    """Area of every shell [m²], from the diagonals of its quadrilateral."""
-    assembly = groups.structure.assembly
-    X = assembly.points[assembly.shells.nodes]
-    return np.asarray(np.linalg.norm(np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]), axis=1) / 2)
-
-
 def _rings(inside: np.ndarray, touching: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """Ring of each shell: those that touch a weld first, the rest by distance; -1 outside."""
     ring = np.where(touching, 0, -1)
@@ -195,10 +183,8 @@ def _stiffness(
     shear = shear_matrices(built.assembly, rows).sum(axis=0)
     rest = groups.linear[rows] + groups.cubic[rows] - shear
     n, nodes = len(built.assembly.points), groups.nodes[rows]
-    return (
-        congruence(built.T, blocks(shear, nodes, n)),
-        congruence(built.T, blocks(rest, nodes, n)),
-    )
+    first, second = (congruence(built.T, blocks(A, nodes, n)) for A in (shear, rest))
+    return first, second
 
 
 def _within(shells: Shells, rows: np.ndarray) -> tuple[Within, Within]:

@@ -76,8 +76,7 @@ class WeldCompliance(Fastener):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Remaining share of the joint's stiffness."""
-        low, here, high = (self.left(x[0] + k * 1.96 * self.widened(sd)[0])[0] for k in (-1, 0, 1))
-        return (Estimate("K", here, "of the deck's", low, high),)
+        return (self.estimate(x, sd, lambda y: self.left(y[0])[0]),)
 
     def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
         """A missing weld, where the joint carries nearly no load."""
@@ -247,13 +246,7 @@ def missing(context: SearchContext) -> list[Candidate]:
 
 
 def drawn(article: Article, rng: np.random.Generator) -> Connection:
-    """A random fastener of the article.
-
-    Raises
-    ------
-    ModelError
-        If there is none.
-    """
+    """A random fastener of the article."""
     found = fasteners(structure(article.assembly))
     if not found:
         raise ModelError("the structure has no weld, screw or bush")
