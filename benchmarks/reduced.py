@@ -18,11 +18,12 @@ import time
 import numpy as np
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.attachments import strength
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import count
-from chladni.effects.points import MassEffect, strength
-from chladni.effects.suspension import Suspension
-from chladni.effects.thickness_distribution import ThicknessDistribution
+from chladni.effects.masses import MassEffect
+from chladni.effects.sheets import ThicknessDistribution
+from chladni.effects.springs import Suspension
 from chladni.fem.assemble import structure
 from chladni.reduced.accuracy import accuracy
 from chladni.reduced.reduced_model import evaluate

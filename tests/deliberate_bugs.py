@@ -62,8 +62,24 @@ BUGS = (
         'names["nu12"] = ("NU12", 1.001)', "tests/formats/nastran/test_model_changes.py",
     ),
     DeliberateBug(  # the mass is written at the grid, its offset is lost
-        "src/chladni/effects/point_mass.py", "(grid,), m, offset)", "(grid,), m)",
-        "tests/effects/test_families.py",
+        "src/chladni/effects/masses.py", "(grid,), m, offset)", "(grid,), m)",
+        "tests/effects/test_contract.py",
+    ),
+    DeliberateBug(  # the place of a moved mass is mirrored at its grid
+        "src/chladni/effects/masses.py", "offset = self.at(x) - assembly.points[",
+        "offset = -self.at(x) + assembly.points[", "tests/effects/test_contract.py",
+    ),
+    DeliberateBug(  # springs along a hem hold half of what they should
+        "src/chladni/effects/hems.py", "self.parameters[0].value(x[0]) * self.line.share * w",
+        "0.5 * self.parameters[0].value(x[0]) * self.line.share * w", "tests/effects/test_hem.py",
+    ),
+    DeliberateBug(  # the card of a support has the nominal stiffness, not the fitted one
+        "src/chladni/effects/springs.py", "k, d = self.parameters[0].value(x[0]), self.pushes(x)",
+        "k, d = self.parameters[0].value(0.0), self.pushes(x)", "tests/effects/test_contract.py",
+    ),
+    DeliberateBug(  # a slope of the moved place in metres, not in units of the patch
+        "src/chladni/effects/attachments.py", "self.patch.slope(at, k) * size for k",
+        "self.patch.slope(at, k) for k", "tests/effects/test_contract.py",
     ),
     DeliberateBug(  # half of the gain that a name costs
         "src/chladni/decision/decision_rules.py", "return 2 * math.log(tried / chance)",

@@ -14,8 +14,8 @@ from chladni.effects.effect_context import Setup, element_grids
 from chladni.effects.element_groups import element_groups
 from chladni.effects.family import Article, Family
 from chladni.effects.identified_damping import IdentifiedDamping
+from chladni.effects.joint_stiffness import model_families
 from chladni.effects.joints import beads, stiffness
-from chladni.effects.model_families import model_families
 from chladni.effects.rigid_ties import on_firm_springs
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure

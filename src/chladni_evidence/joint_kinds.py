@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.effects.hem_line import HemLine, hem_lines
+from chladni.effects.hems import HemLine, hem_lines
 from chladni.errors import ModelError
 from chladni.model.assembly import Assembly, Solids
 from chladni.model.properties import Isotropic, SolidSection

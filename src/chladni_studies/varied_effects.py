@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from chladni.case import Case
+from chladni.effects.attachments import MovableAttachment
 from chladni.effects.effect import Effect
 from chladni.effects.effect_context import EffectContext, Setup, element_grids
 from chladni.effects.element_groups import element_groups
 from chladni.effects.family import Family
-from chladni.effects.movable_attachment import MovableAttachment
 from chladni.effects.registry import family
 from chladni.errors import FileError
 from chladni.fem.assemble import structure

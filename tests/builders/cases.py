@@ -3,9 +3,9 @@
 import shutil
 
 import chladni
-from chladni.effects.points import with_masses
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.model.point_masses import with_masses
 from chladni_specimens.plates import plate
 
 SENSORS = (2, 4, 7, 18, 30, 43)

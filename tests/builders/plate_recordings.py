@@ -7,9 +7,9 @@ import numpy as np
 from tests.builders.recordings import noisy
 
 import chladni
-from chladni.effects.points import with_masses
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.model.point_masses import with_masses
 from chladni_specimens.plates import plate
 
 SENSORS = [(0.0, 0.11), (0.05, 0.22), (0.15, 0.11), (0.2, 0.1833), (0.25, 0.0), (0.3, 0.22)]

@@ -1,18 +1,26 @@
 """Packages that add effects, installed for a test as pip would: a folder and its entry points."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from chladni.dynamics.eigen import normal_modes
 from chladni.effects import registry
-from chladni.effects.family import Family
-from chladni.reduced.reduced_problem import reduced_problem
+from chladni.effects.effect import Effect
+from chladni.effects.effect_context import EffectContext, Setup
+from chladni.fem.assemble import structure
+from chladni.fem.energy import mass_properties
+from chladni.model.assembly import Assembly
+from chladni.reduced.reduced_model import Reduced, evaluate
+from chladni.reduced.reduced_problem import ReducedProblem, reduced_problem
 from chladni_evidence.effect_ground import GROUNDS
-from chladni_specimens import jointed_plates, tied_plates
+from chladni_specimens import jointed_plates, plate, tied_plates
 
 
 def write_package(folder: Path, name: str, entries: dict[str, str]) -> None:
@@ -58,31 +66,61 @@ def source_of(module: str) -> str:
 
 
 @contextmanager
-def example(module: str, folder: Path) -> Iterator[Family]:
-    """An example package, installed: its one file and one entry point."""
-    name = EXAMPLES[module]
-    write_package(folder, f"example-{name}", {name: f"{module}:FAMILY"})
-    (folder / f"{module}.py").write_text(source_of(module), encoding="utf-8")
+def installed_examples(folder: Path, modules: Iterable[str] = EXAMPLES) -> Iterator[None]:
+    """Example packages, installed: one file and one entry point each."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
+        for module in modules:
+            name = EXAMPLES[module]
+            write_package(folder, f"example_{module}", {name: f"{module}:FAMILY"})
+            (folder / f"{module}.py").write_text(source_of(module), encoding="utf-8")
         registry._installed.cache_clear()
-        yield registry.family(name)
+        yield
     registry._installed.cache_clear()
-    sys.modules.pop(module, None)
-
-
-@pytest.fixture(scope="module")
-def example_edge_mass(tmp_path_factory):
-    """A mass along an edge."""
-    with example("edge_mass", tmp_path_factory.mktemp("site")) as family:
-        yield family
+    for module in modules:
+        sys.modules.pop(module, None)
 
 
 @pytest.fixture(scope="module", params=EXAMPLES)
 def example_family(request, tmp_path_factory):
     """Each of the example packages."""
-    with example(request.param, tmp_path_factory.mktemp("site")) as family:
-        yield family
+    with installed_examples(tmp_path_factory.mktemp("site"), (request.param,)):
+        yield registry.family(EXAMPLES[request.param])
+
+
+FLEXIBLE = slice(6, 12)  # of a free structure
+
+
+def full(made: Assembly, count: int = 14) -> np.ndarray:
+    """Natural frequencies of a structure as a whole [Hz]."""
+    return normal_modes(structure(made).system, count).frequency
+
+
+def hertz(ground: ReducedProblem | Reduced, effect: Effect, x: np.ndarray) -> np.ndarray:
+    """Natural frequencies of a reduced model with an effect [Hz]; a problem makes its own model."""
+    x = np.asarray(x, float)
+    model = ground if isinstance(ground, Reduced) else ground.model_for(effect, x)
+    lam = evaluate(model, [effect], x, False).lam
+    return np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
+
+
+def context_of(ground: ReducedProblem, f_max: float, **test: Any) -> EffectContext:
+    """The structure and a test, as effects see them."""
+    mass = mass_properties(ground.structure.assembly)[0]
+    setup = Setup(**{"sensors": (), "hangers": (), **test}, weight=mass, f_max=f_max)
+    return EffectContext(ground.groups, ground.grids, ground.candidates, setup)
+
+
+@pytest.fixture(scope="session")
+def of_plate():
+    """A free plate of 400 x 300 x 1.5 mm of 8 x 6 elements, made ready up to 300 Hz."""
+    return reduced_problem(plate(0.4, 0.3, 8, 6, 1.5e-3), 300.0)
+
+
+@pytest.fixture(scope="session")
+def plate_context(of_plate):
+    """That plate, without sensors and hangers."""
+    return context_of(of_plate, 300.0)
 
 
 JOINTED_TOP = 300.0  # Hz; six flexible modes of the two plates lie below

@@ -6,11 +6,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from chladni.effects import point_mass
+from chladni.effects import masses
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.point_mass import SHARE, TRIED
+from chladni.effects.masses import SHARE, TRIED
 from chladni.effects.search_context import SearchContext
+from chladni.effects.springs import ExtraSupport
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel, plate
 
@@ -37,7 +37,7 @@ def proposed(where, more):
         weighs_more=more,
         scan=SimpleNamespace(point_scores=point_scores),
     )
-    return point_mass.candidates(cast(SearchContext, context))
+    return masses.masses(cast(SearchContext, context))
 
 
 def test_the_mass_that_the_scales_ask_for_is_sought_by_itself(where):

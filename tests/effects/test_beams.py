@@ -11,11 +11,9 @@ from chladni.dynamics.reduction import Basis
 from chladni.effects.calibration_parameters import calibration_parameter, defaults, random_field
 from chladni.effects.effect import WIDER
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.point_mass import PointMass
+from chladni.effects.masses import LocalResonator, PointMass
 from chladni.effects.registry import families
-from chladni.effects.suspension import suspension
+from chladni.effects.springs import ExtraSupport, suspension
 from chladni.effects.user_parameters import user_parameter, with_factor
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties

@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects import compliant_support
 from chladni.effects.compliant_support import on_springs
-from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.sensor_mass import sensor_mass
+from chladni.effects.masses import sensor_mass
+from chladni.effects.model_errors import mesh_errors
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.base_motion import base_motion

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from chladni.effects.discretisation import LIMIT, mesh_errors
+from chladni.effects.model_errors import LIMIT, mesh_errors
 from chladni.fem.modelled import modelled
 from chladni.io.nastran import assembly, read_deck
 from chladni.reduced.reduced_model import evaluate

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import WIDER
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.springs import ExtraSupport
 from chladni.fem.assemble import structure
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem

@@ -5,11 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
+from scipy.sparse.linalg import spsolve
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.joint_stiffness import joint_families
 from chladni.effects.joints import (
     MOST_RUN,
     Connection,
@@ -19,8 +22,7 @@ from chladni.effects.joints import (
     with_factor_on,
     without_joint,
 )
-from chladni.effects.model_families import joint_families
-from chladni.effects.weld_compliance import WeldCompliance, WeldMissing, of_one, proposed
+from chladni.effects.welds import WeldCompliance, WeldMissing, of_one, proposed
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
 from chladni.inference.scan import baseline
@@ -69,9 +71,9 @@ def welds(ground):
 
 def receptances(assembly, data):
     """Of the structure as a whole, on the lines of the data."""
-    system = structure(assembly).system
-    K, M, rows = system.K.toarray(), system.M.toarray(), data.outputs.toarray()
-    return np.array([rows @ np.linalg.solve(K + s**2 * M, rows[0]) for s in data.s])[:, :, None]
+    system, rows = structure(assembly).system, data.outputs.toarray()
+    solved = [rows @ spsolve(sp.csc_array(system.K + s**2 * system.M), rows[0]) for s in data.s]
+    return np.array(solved)[:, :, None]
 
 
 @pytest.fixture(scope="module")

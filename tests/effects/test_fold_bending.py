@@ -8,7 +8,7 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Parameter
 from chladni.effects.element_groups import element_groups
-from chladni.effects.fold_bending import FoldBending, fold_bending
+from chladni.effects.model_errors import FoldBending, fold_bending
 from chladni.fem.assemble import structure
 from chladni.geometry.folds import share_at_folds
 from chladni.reduced.reduced_model import evaluate, reduce

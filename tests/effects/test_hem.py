@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.contact_stiffness import close_places, contacts
-from chladni.effects.hem_contact import along_stretch, everywhere
-from chladni.effects.hem_line import hem_lines
+from chladni.effects.contacts import close_places, contacts
+from chladni.effects.hems import along_stretch, everywhere, hem_lines
 from chladni.fem.assemble import structure
 from chladni.fem.energy import rigid_motions
 from chladni.reduced.reduced_model import evaluate
@@ -76,6 +75,16 @@ def test_the_reduced_hem_is_that_of_the_deck(deck, reduced, line, x):
     written = normal_modes(structure(effect.apply(deck, x)).system, 14).frequency[FLEXIBLE]
     assert_allclose(got, written, rtol=3e-3)
     assert written[0] > normal_modes(reduced.structure.system, 14).frequency[6]
+
+
+def test_a_line_costs_its_stiffness_per_length(deck, reduced, line):
+    """Sliding u of all of it stores ½ k L u², by the terms and by the bushes that are written."""
+    effect, x = everywhere(line, line.relative_rows(reduced.structure), 1), np.array([0.7])
+    n = len(line)  # each solid has its own pitch, the length is from first middle to last
+    due = effect.reported(x, np.zeros(1))[0].value * line.length * n / (n - 1)
+    assert effect.terms(x)[0].coefficient.sum() == pytest.approx(due, rel=0.05)
+    bushes = effect.apply(deck, x).bushes.stiffness[len(deck.bushes) :]
+    assert bushes.sum() == pytest.approx(due, rel=0.05)
 
 
 def test_a_stretch_as_long_as_the_line_is_all_of_it(reduced, line):

@@ -4,15 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
+from scipy.sparse.linalg import spsolve
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.adhesive import SEALANT, beads_of
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.contact_stiffness import close_places
+from chladni.effects.contacts import close_places
+from chladni.effects.joint_stiffness import joint_families
 from chladni.effects.joints import alone, beads, fasteners, with_factor_on, without_joint
-from chladni.effects.model_families import joint_families
-from chladni.effects.viscoelastic_joint import SEALANT, beads_of
-from chladni.effects.weld_compliance import (
+from chladni.effects.welds import (
     GONE,
     MOST_LN_LEFT,
     NONE_LEFT,
@@ -187,8 +189,9 @@ def test_the_scan_becomes_the_full_solve(deck, found, scanned):
         over[reach] = ground, lines.rebased(ground.model), singles(loosened_rows(ground))
 
     def solved(system):
-        K, M = system.K.toarray(), system.M.toarray()
-        return np.array([rows @ np.linalg.solve(K + v**2 * M, rows[0]) for v in s])
+        return np.array(
+            [rows @ spsolve(sp.csc_array(system.K + v**2 * system.M), rows[0]) for v in s]
+        )
 
     sound = solved(over[5.0][0].structure.system)
     for j, one in enumerate(found):

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.linear_parameter import linear_scale
-from chladni.effects.points import with_springs
+from chladni.effects.calibration_parameters import linear_scale
 from chladni.fem.assemble import structure
 from chladni.fem.derivative import by_part, by_radius, by_spring, with_radius
 from chladni.model.assembly import Average, Masses
+from chladni.model.ground_springs import with_springs
 from chladni.reduced.accuracy import accuracy, products
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem

@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.point_mass import PointMass
+from chladni.effects.masses import LocalResonator, PointMass
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
 from chladni.reduced.accuracy import LIMIT, accuracy

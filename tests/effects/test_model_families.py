@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import Effect, FieldChange, Parameter
 from chladni.effects.element_groups import element_groups
-from chladni.effects.model_families import (
+from chladni.effects.joint_stiffness import (
     ADHESIVE,
     FAR,
     calibrated_family,

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.joints import fasteners
-from chladni.effects.over_constraint import RIGID, over_constraint
 from chladni.effects.rigid_ties import on_firm_springs, rigid_ties
+from chladni.effects.welds import RIGID, over_constraint
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
 from chladni.model.added_points import next_id, with_points

@@ -7,16 +7,18 @@ import pytest
 from typer.testing import CliRunner
 
 from chladni.cli.app import application
-from chladni.effects import point_mass, registry
+from chladni.effects import masses, registry
 from chladni.errors import ExtensionError, LabelError, ModelError
 
+from .conftest import installed_examples
 
-class Bolt(point_mass.PointMass):
+
+class Bolt(masses.PointMass):
     name = "loose-bolt"
     claim = "a bolt is loose"
 
 
-BOLT = replace(point_mass.FAMILY, effect=Bolt)
+BOLT = replace(masses.POINT, effect=Bolt)
 
 
 @pytest.fixture
@@ -35,7 +37,7 @@ def test_a_program_adds_a_family_and_takes_it_back(bolt):
 
 
 def test_a_name_belongs_to_one_family(bolt):
-    for known in (BOLT, point_mass.FAMILY):
+    for known in (BOLT, masses.POINT):
         with pytest.raises(ExtensionError, match=f"'{known.name}' is registered already"):
             registry.register(known)
 
@@ -47,9 +49,10 @@ def test_unknown_names_are_told_the_known_ones():
         registry.unregister("point-mass")
 
 
-def test_an_installed_package_adds_its_family(example_edge_mass):
-    assert registry.names() == (*(f.name for f in registry.BUILT_IN), "edge-mass")
-    assert example_edge_mass.effect.__module__ == "edge_mass"
+def test_an_installed_package_adds_its_family(tmp_path):
+    with installed_examples(tmp_path, ["edge_mass"]):
+        assert registry.names() == (*(f.name for f in registry.BUILT_IN), "edge-mass")
+        assert registry.family("edge-mass").effect.__module__ == "edge_mass"
 
 
 FAULTS = {
@@ -58,7 +61,7 @@ FAULTS = {
     "is not there": ("nowhere:FAMILY", "", "ModuleNotFoundError"),
     "is something else": ("broken:FAMILY", "FAMILY = 3", "is a int, not a chladni"),
     "takes a name": (
-        "broken:FAMILY", "from chladni.effects.point_mass import FAMILY", "another effect has this",
+        "broken:POINT", "from chladni.effects.masses import POINT", "another effect has this",
     ),
 }  # fmt: skip
 

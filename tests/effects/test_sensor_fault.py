@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from chladni.effects.sensor_fault import candidates, sensor_fault
+from chladni.effects.channels import candidates, sensor_fault
 from chladni.inference.likelihood import Responses
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem

@@ -11,9 +11,8 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.search_context import best_starts
-from chladni.effects.shaker_restraint import MOST_DRIVES, shaker_restraint
+from chladni.effects.springs import MOST_DRIVES, ExtraSupport, shaker_restraint
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.inference.hypothesis_fit import UpdatingProblem

@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.mass_patch import MassPatch, spread_mass
-from chladni.effects.property_bands import BANDS, levels
-from chladni.effects.stiffness_patch import StiffnessPatch
+from chladni.effects.sheet_patch import BANDS, levels
+from chladni.effects.sheets import MassPatch, StiffnessPatch, spread_mass
 from chladni.fem.energy import mass_properties
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem

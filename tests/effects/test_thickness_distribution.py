@@ -7,7 +7,7 @@ import pytest
 
 from chladni.effects.element_groups import element_groups
 from chladni.effects.sheet_patch import surface
-from chladni.effects.thickness_distribution import ThicknessDistribution
+from chladni.effects.sheets import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly, Shells
 from chladni_specimens.plates import folded_panel, plate

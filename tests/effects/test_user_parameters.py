@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.points import with_masses, with_springs
 from chladni.effects.user_parameters import defaults_of_solids, user_parameter
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Beams, Bushes, Solids
 from chladni.model.free_parameter import FreeParameter
+from chladni.model.ground_springs import with_springs
+from chladni.model.point_masses import with_masses
 from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
 from chladni.reduced.accuracy import products
 from chladni.reduced.reduced_model import evaluate

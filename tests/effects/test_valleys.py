@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from chladni.effects.attachments import around
 from chladni.effects.effect_context import ElementGrids
-from chladni.effects.movable_attachment import around
 from chladni.effects.search_context import valleys
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate

@@ -7,12 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.effect import Parameter
-from chladni.effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
-from chladni.effects.joints import fasteners, stiffness, with_factor_on
-from chladni.effects.model_families import joint_families
-from chladni.effects.viscoelastic_joint import (
+from chladni.effects.adhesive import (
     LEVEL_SD,
     LOSS,
     LOSS_SD,
@@ -23,6 +18,11 @@ from chladni.effects.viscoelastic_joint import (
     speaks_for,
     suspects,
 )
+from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.effect import Parameter
+from chladni.effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
+from chladni.effects.joint_stiffness import joint_families
+from chladni.effects.joints import fasteners, stiffness, with_factor_on
 from chladni.fem.assemble import structure
 from chladni.geometry.sampling import farthest_point_sample, nearest_points
 from chladni.inference.damping_scatter import ModalDamping
@@ -67,7 +67,7 @@ def at_its_own_frequency(deck, effect, x, mode):
     """A mode of the full structure, its bead as stiff as it is at that mode's own frequency."""
     _, a, _ = effect.exponent(x)
     f = effect.reference
-    for _ in range(12):
+    for _ in range(6):
         made = with_factor_on(deck, effect.joint, float(np.exp(x[0])) * (f / effect.reference) ** a)
         f = normal_modes(structure(made).system, 14).frequency[mode]
     return f

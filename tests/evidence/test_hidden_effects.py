@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.effects.hem_line import hem_lines
+from chladni.effects.hems import hem_lines
 from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
 from chladni.model.ground_springs import with_ground_bushes

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tests.builders.refusals import damaged, refusals, says
 
-from chladni.case.toml_sections import read_keys
+from chladni.case.case_file import request_of
 from chladni.io.formed_files import read_formed
 from chladni.io.scanned_surface import read_scan
 from chladni.io.tables.read_tables import read_recordings
@@ -18,7 +18,7 @@ READERS = {
     "sensors": read_sensors,
     "formed": read_formed,
     "scan": read_scan,
-    "case": lambda path: read_keys(path, ("model", "test", "a", "b")),
+    "case": request_of,
 }
 TIME = "time_s,7:+Z [N],7:+Z [g],9:-X [m/s^2]\n"
 TEXTS = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.discretisation import JointFootprint, mesh_errors
+from chladni.effects.model_errors import JointFootprint, mesh_errors
 from chladni.fem.modelled import modelled
 from chladni.geometry.footprints import on_smaller_shells, regions_of_joints
 from chladni.geometry.refine import refined

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.sensor_fault import sensor_fault
+from chladni.effects.channels import sensor_fault
 from chladni.inference.held_out_evidence import held_out_evidence, predictive
 from chladni.inference.hypothesis_fit import HypothesisFit, fitted
 from chladni.inference.map_fit import MassMeasurement

@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter, defaults
 from chladni.effects.effect import Effect, Parameter
-from chladni.effects.points import with_springs
 from chladni.effects.user_parameters import user_parameter
 from chladni.inference.hypothesis_fit import UpdatingProblem
 from chladni.inference.identifiability import collinearity, identifiability
 from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.pole_data import Poles
 from chladni.model.free_parameter import FreeParameter
+from chladni.model.ground_springs import with_springs
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni.search.preparation import carrying

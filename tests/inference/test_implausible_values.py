@@ -7,7 +7,7 @@ import pytest
 
 from chladni.effects.calibration_parameters import PartScale
 from chladni.effects.effect import Parameter
-from chladni.effects.model_families import ADHESIVE, ModelFamily
+from chladni.effects.joint_stiffness import ADHESIVE, ModelFamily
 from chladni.inference.implausible_values import FAR, in_doubt, strained
 
 

@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter
+from chladni.effects.channels import channel_gain
 from chladni.effects.effect import Effect
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.point_mass import PointMass
-from chladni.effects.sensor_fault import channel_gain
+from chladni.effects.masses import PointMass
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.inference.joint_fit import informed, joint_fit, of_the_object, with_priors
 from chladni.inference.map_fit import MassMeasurement, fit

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter, random_field
-from chladni.effects.discretisation import mesh_errors
+from chladni.effects.channels import channel_gain, sensor_fault
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.point_mass import PointMass
-from chladni.effects.sensor_fault import channel_gain, sensor_fault
+from chladni.effects.masses import PointMass
+from chladni.effects.model_errors import mesh_errors
+from chladni.effects.springs import ExtraSupport
 from chladni.fem.modelled import solved
 from chladni.inference.hypothesis_fit import SCALES, fitted, over_scales
 from chladni.inference.pole_data import Poles

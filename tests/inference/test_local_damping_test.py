@@ -9,7 +9,7 @@ from scipy.stats import kstest
 
 from chladni.effects.crack import LineFinder, crack
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.springs import ExtraSupport
 from chladni.inference.adequacy import LEAST_P, FitTest
 from chladni.inference.damping_scatter import LOG_SD, SCATTER, ModalDamping
 from chladni.inference.hypothesis_fit import HypothesisFit

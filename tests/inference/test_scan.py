@@ -7,9 +7,9 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
+from chladni.effects.attachments import AtPoints
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Parameter, PointTerm, Traits, Weight
-from chladni.effects.points import AtPoints
 from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.scan import (
     baseline,

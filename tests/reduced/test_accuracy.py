@@ -7,10 +7,9 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.point_mass import PointMass
-from chladni.effects.sensor_mass import sensor_mass
-from chladni.effects.thickness_distribution import ThicknessDistribution
+from chladni.effects.masses import PointMass, sensor_mass
+from chladni.effects.sheets import ThicknessDistribution
+from chladni.effects.springs import ExtraSupport
 from chladni.fem.assemble import structure
 from chladni.reduced.accuracy import accuracy, products
 from chladni.reduced.reduced_model import evaluate

@@ -12,12 +12,12 @@ from chladni.effects.calibration_parameters import defaults
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.family import Family
+from chladni.effects.joint_stiffness import joint_families, joint_nuisances
 from chladni.effects.joints import fasteners
-from chladni.effects.model_families import joint_families, joint_nuisances
 from chladni.effects.registry import BUILT_IN
 from chladni.effects.rigid_ties import on_firm_springs
 from chladni.effects.search_context import Candidate
-from chladni.effects.weld_compliance import WeldCompliance, of_one
+from chladni.effects.welds import WeldCompliance, of_one
 from chladni.fem.modelled import modelled
 from chladni.model.assembly import Assembly
 from chladni.reduced.real_modes import flexible

@@ -5,7 +5,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from chladni.effects.points import with_masses, with_springs
+from chladni.model.ground_springs import with_springs
+from chladni.model.point_masses import with_masses
 from chladni.reduced.reduced_model import evaluate, reduce
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel

@@ -8,8 +8,8 @@ import pytest
 from chladni.decision.decision_rules import TIED
 from chladni.effects.effect import Parameter
 from chladni.effects.estimate import Remarks
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.model_families import ModelFamily
+from chladni.effects.joint_stiffness import ModelFamily
+from chladni.effects.masses import LocalResonator
 from chladni.effects.registry import families
 from chladni.inference.adequacy import FitTest
 from chladni.search.diagnosis import Diagnosis
@@ -43,7 +43,7 @@ def test_a_lump_whose_spring_may_be_stiff_may_be_a_point_mass(sd, name):
     """Half of the highest line, known to a tenth or to no better than a factor of two."""
     f = Parameter("f", "Hz", 0.0, 0.6, 100.0)
     other = tuple(Parameter(q, "-", 0.0, 1.0) for q in "mab")
-    resonator = LocalResonator((*other, f))
+    resonator = LocalResonator((*other, f), patch=None, nowhere=None)
     x = np.array([0.0, 0.0, 0.0, np.log(1.5)])
     known = resonator.remarks(x, np.array([0.1, 0.1, 0.1, sd]))
     assert (known.becomes, known.nearly) == ("", name)

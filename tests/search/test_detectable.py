@@ -7,10 +7,10 @@ import pytest
 from tests.builders.recordings import across, noisy
 
 import chladni
-from chladni.effects.points import with_masses
 from chladni.inference.map_fit import MassMeasurement
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.model.point_masses import with_masses
 from chladni.search.detectable import detectable
 from chladni.search.question import Question
 from chladni_specimens.plates import plate

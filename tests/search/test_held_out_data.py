@@ -8,10 +8,10 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.builders.recordings import accelerances, across, noisy
 
-from chladni.effects.points import with_masses
 from chladni.fem.modelled import modelled
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import MassMeasurement
+from chladni.model.point_masses import with_masses
 from chladni.search.basis_refinement import refined
 from chladni.search.deciding import decided
 from chladni.search.decision_in_words import concluded

@@ -9,13 +9,12 @@ import scipy.sparse.linalg as spl
 from numpy.testing import assert_allclose
 from tests.builders.structures import held_along_x0
 
+from chladni.effects.attachments import AtPoints
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect, MatrixTerm, Parameter, count
 from chladni.effects.effect_context import EffectContext, Setup
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.point_mass import PointMass
-from chladni.effects.points import AtPoints, MassEffect
+from chladni.effects.masses import LocalResonator, MassEffect, PointMass
+from chladni.effects.springs import ExtraSupport
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import MassMeasurement

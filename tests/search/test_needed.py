@@ -7,7 +7,7 @@ import pytest
 
 from chladni.decision.decision_rules import TIED
 from chladni.effects.element_groups import element_groups
-from chladni.effects.orthotropic_material import orthotropic
+from chladni.effects.orthotropy import orthotropic
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import MassMeasurement

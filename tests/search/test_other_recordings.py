@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.builders.recordings import accelerances, across, noisy
 
-from chladni.effects.points import with_masses
 from chladni.ema.identification import equalised, identify
 from chladni.ema.level_modes import AtLevel
 from chladni.ema.level_study import level_study
 from chladni.ema.level_words import level_notes
 from chladni.fem.modelled import modelled
 from chladni.inference.map_fit import MassMeasurement
+from chladni.model.point_masses import with_masses
 from chladni.search.other_recordings import (
     levels,
     measured_spread,

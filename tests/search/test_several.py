@@ -8,17 +8,16 @@ import numpy as np
 import pytest
 
 from chladni import parallel
-from chladni.effects import point_mass, sensor_mass
+from chladni.effects import masses
 from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.effect import Effect
 from chladni.effects.effect_context import Setup
-from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.mass_patch import MassPatch
-from chladni.effects.point_mass import PointMass
+from chladni.effects.masses import LocalResonator, PointMass
+from chladni.effects.masses import sensor_mass as masses_of_sensors
 from chladni.effects.registry import catalogue
 from chladni.effects.search_context import Candidate
-from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
+from chladni.effects.sheets import MassPatch
+from chladni.effects.springs import ExtraSupport
 from chladni.fem.energy import mass_properties
 from chladni.inference.held_out_evidence import held_out_evidence
 from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
@@ -36,7 +35,7 @@ from chladni.search.several import _begun_with, _More, _paying, _revised, _same,
 SENSORS = [1, 7, 57, 63, 25, 39]
 TOP, LINES = 200.0, 30
 HELD = slice(-4, None)  # lines
-FEW = (point_mass.FAMILY, sensor_mass.FAMILY)  # two are enough to go wrong with
+FEW = (masses.POINT, masses.SENSORS)  # two are enough to go wrong with
 
 
 def at(reduced, *xy):

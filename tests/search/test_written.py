@@ -9,12 +9,11 @@ import scipy.sparse as sp
 
 from chladni.decision.hypothesis_table import NULL, HypothesisTable
 from chladni.effects.calibration_parameters import calibration_parameter, random_field
-from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect import Effect, Parameter
-from chladni.effects.model_families import ADHESIVE, ModelFamily
-from chladni.effects.orthotropic_material import orthotropic
-from chladni.effects.stiffness_patch import StiffnessPatch
-from chladni.effects.thickness_distribution import ThicknessDistribution
+from chladni.effects.joint_stiffness import ADHESIVE, ModelFamily
+from chladni.effects.model_errors import mesh_errors
+from chladni.effects.orthotropy import orthotropic
+from chladni.effects.sheets import StiffnessPatch, ThicknessDistribution
 from chladni.errors import ModelError
 from chladni.fem.modelled import modelled
 from chladni.inference.hypothesis_fit import HypothesisFit

@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 import chladni
 from chladni.arrays import fingerprint
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.points import with_masses
 from chladni.errors import FileError
 from chladni.fem.assemble import structure
 from chladni.model.ground_springs import with_ground_bushes
+from chladni.model.point_masses import with_masses
 from chladni.units import UNITS
 from chladni.workflows.loaded_model import Model
 from chladni_specimens.forms import FORMS

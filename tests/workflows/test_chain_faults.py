@@ -11,11 +11,11 @@ from tests.builders.structures import stiffer
 
 import chladni
 from chladni.dynamics.frf import FRF
-from chladni.effects.points import with_masses
 from chladni.ema.finding import Finding, Screening
 from chladni.fem.modelled import modelled
 from chladni.inference.chain_hypotheses import chain_faults, without_modes
 from chladni.io.nastran import write_assembly
+from chladni.model.point_masses import with_masses
 from chladni.workflows.screening_of_case import instead_of_effects
 
 

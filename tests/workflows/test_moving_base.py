@@ -13,10 +13,10 @@ from tests.builders.recordings import noisy
 from tests.builders.structures import held_along_x0
 
 import chladni
-from chladni.effects.points import with_masses
 from chladni.errors import FileError
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.model.point_masses import with_masses
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.search.preparation import prepare
 from chladni.search.written_scores import seen, written_Q

@@ -71,7 +71,7 @@ def test_the_rig_has_the_transmissibility_of_the_model(case, article):
 
 def test_heavy_sensors_ride_on_the_table_as_well(case, article):
     """A sensor's mass is carried by the base, too: as a point mass of the deck would be."""
-    from chladni.effects.points import with_masses
+    from chladni.model.point_masses import with_masses
 
     grids = [int(g.partition(":")[0]) for g in case.outputs.labels]
     heavy = with_masses(case.assembly, tuple(grids), 0.02)

@@ -6,7 +6,7 @@ its foundation; for a bolted root the rotation matters most (Gorman 1975, Free V
 Beams and Shafts, ch. 1). With base excitation the springs are between the base and the clamp.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -39,21 +39,13 @@ TAKEN = 0.05, 0.25  # share of stiffness lost by that mode, for each spring of a
 
 @dataclass(frozen=True, eq=False)
 class SupportDirection:
-    """One compliance of a clamp: along the first axis of a frame, and about the second.
+    """One compliance of a clamp: along the first axis of a frame, and about the second."""
 
-    Attributes
-    ----------
-    clamp : position among the clamps of the structure
-    frame : (3, 3)     rows are unit vectors in the basic frame
-    components : 1, or 1 and 5: along and about these axes
-    rigid : (k,)       springs that are as good as rigid [N/m, N m/rad]
-    pull : (k, r)      f²/λ of each mode: a spring k reduces its stiffness by the share pull/k
-    """
-
-    clamp: int
-    frame: np.ndarray
-    components: tuple[int, ...]
-    rigid: np.ndarray
+    clamp: int  # position among the clamps of the structure
+    frame: np.ndarray  # (3, 3) rows are unit vectors in the basic frame
+    components: tuple[int, ...]  # 1, or 1 and 5: along and about these axes
+    rigid: np.ndarray  # (k,) springs that are as good as rigid [N/m, N m/rad]
+    # (k, r) f²/λ of each mode: a spring k reduces its stiffness by the share pull/k
     pull: np.ndarray
 
     @property
@@ -76,13 +68,11 @@ class CompliantSupport(Effect):
     claim = "a clamp is compliant where the deck is rigid"
     traits = Traits(rounds=1)
 
-    direction: SupportDirection | None = None
-    rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure
+    direction: SupportDirection = field(kw_only=True)
+    rows: sp.csr_array = field(kw_only=True)  # motions of the clamp over the dofs with it released
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """(k - k_rigid) gᵀg for each compliant motion g of the clamp."""
-        assert self.rows is not None
-        assert self.direction is not None
         k = self.springs(x)
         return (PointTerm("K", self.rows, k - self.direction.rigid, np.diag(k)),)
 
@@ -92,7 +82,6 @@ class CompliantSupport(Effect):
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Replace the supports by GRID, RBE2 and CELAS2 to ground."""
-        assert self.direction is not None
         assert self.release is not None
         clamp = self.release.clamps[self.direction.clamp]
         return on_springs(assembly, clamp, self.direction, self.springs(x))

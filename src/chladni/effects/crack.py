@@ -15,14 +15,13 @@ from ..fem.sparse_assembly import blocks, congruence
 from ..geometry.facets import cell_areas, cell_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.assembly import Assembly
-from ..model.properties import Part, ShellSection
+from ..model.properties import ShellSection
 from .effect import Effect, MatrixTerm, Parameter, Traits, Within
-from .element_groups import ElementGroups
+from .element_groups import ElementGroups, shear_matrices
 from .estimate import Estimate, in_mm
 from .family import Article, Family
-from .model_families import within_shear
+from .joint_stiffness import within_shear
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
-from .shell_components import shear_matrices
 
 LEAST_LEFT = 0.1  # of the bending stiffness always remains, so that K stays positive
 SHELLS = 3  # in a line at least
@@ -46,42 +45,25 @@ AROUND = (-0.7, 0.0, 0.7)  # strengths about that of the fit
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Adjacent shells along a line on a part, as drawn by :meth:`LineFinder.through`.
+    """Adjacent shells along a line on a part, as drawn by :meth:`LineFinder.through`."""
 
-    Attributes
-    ----------
-    shells : (k,) int
-    centre : (3,)        of these shells [m]
-    part, through : int  its part, and the shell whose middle it goes through
-    direction : (3,)     unit vector along it there
-    times : float        its length, in units of the usual one
-    """
-
-    shells: np.ndarray
-    centre: np.ndarray
-    part: int
-    through: int
-    direction: np.ndarray
-    times: float
+    shells: np.ndarray  # (k,) int
+    centre: np.ndarray  # (3,) of these shells [m]
+    part: int  # its part, and the shell whose middle it goes through
+    through: int  # its part, and the shell whose middle it goes through
+    direction: np.ndarray  # (3,) unit vector along it there
+    times: float  # its length, in units of the usual one
 
 
 @dataclass(frozen=True, eq=False)
 class LineFinder:
-    """Geometry of the shells of an assembly, from which lines of shells are drawn.
+    """Geometry of the shells of an assembly, from which lines of shells are drawn."""
 
-    Attributes
-    ----------
-    middle, normal : (m, 3)   [m], -
-    part : (m,) int
-    width : (m,)              square root of the area [m]
-    size : {part: square root of its area [m]}
-    """
-
-    middle: np.ndarray
-    normal: np.ndarray
-    part: np.ndarray
-    width: np.ndarray
-    size: dict[int, float]
+    middle: np.ndarray  # (m, 3) [m], -
+    normal: np.ndarray  # (m, 3) [m], -
+    part: np.ndarray  # (m,) int
+    width: np.ndarray  # (m,) square root of the area [m]
+    size: dict[int, float]  # {part: square root of its area [m]}
 
     @classmethod
     def of(cls, assembly: Assembly) -> "LineFinder":
@@ -176,11 +158,15 @@ class Crack(Effect):
         "annealed bend"
     )
 
-    shells: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    bending: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    shear: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    within: tuple[Within, Within] = (Within(), Within())  # of bending, and of shear
-    line: Line | None = None
+    line: Line = field(kw_only=True)
+    bending: sp.csr_array = field(kw_only=True)
+    shear: sp.csr_array = field(kw_only=True)
+    within: tuple[Within, Within] = field(kw_only=True)  # of bending, and of shear
+
+    @property
+    def shells(self) -> np.ndarray:
+        """Rows of the shells of the line."""
+        return self.line.shells
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """(f - 1) B, bending and the shear that comes with it."""
@@ -201,8 +187,7 @@ class Crack(Effect):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Remaining 12I/t³ with its 95 % interval."""
-        value, high, low = (left(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
-        return (Estimate("12I/T3", value, "-", low, high),)
+        return (self.estimate(x, sd, lambda y: left(y[0])),)
 
 
 def left(x: float) -> float:
@@ -230,7 +215,7 @@ def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     return Crack(
         (unknown,), f"on {name} through ({in_mm(line.centre)} mm)", (name,), point=(x, y, z),
         radius=float(reach), grids=tuple(assembly.ids[np.unique(groups.nodes[on])].tolist()),
-        trials_factor=tried, shells=on, bending=bending, shear=shear, within=within, line=line,
+        trials_factor=tried, bending=bending, shear=shear, within=within, line=line,
     )  # fmt: skip
 
 
@@ -240,15 +225,11 @@ def cracked(assembly: Assembly, shells: np.ndarray, f: float) -> Assembly:
     for k in np.unique(part[shells]):
         mine = shells[assembly.shells.part[shells] == k]
         part[mine] = len(parts)
-        new, name = weakened(parts[k], f), f"crack in {parts[k].name}"
+        section, name = parts[k].section, f"crack in {parts[k].name}"
+        assert isinstance(section, ShellSection)
+        new = parts[k].with_section(bending_ratio=section.bending_ratio * f)
         parts.append(replace(new, id=1 + max(p.id for p in parts), name=name))
     return replace(assembly, parts=tuple(parts), shells=replace(assembly.shells, part=part))
-
-
-def weakened(part: Part, f: float) -> Part:
-    """Multiply the bending stiffness of a part by f."""
-    assert isinstance(part.section, ShellSection)
-    return part.with_section(bending_ratio=part.section.bending_ratio * f)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
@@ -302,7 +283,7 @@ def _at_rest(
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
     """Move a fitted crack to neighbouring lines, in a few steps, each evaluated exactly."""
-    if not isinstance(effect, Crack) or effect.line is None or context.scan is None:
+    if not isinstance(effect, Crack) or context.scan is None:
         return None
     groups, line, tried = context.where.groups, effect.line, effect.trials_factor
     lines, best = LineFinder.of(groups.structure.assembly), effect

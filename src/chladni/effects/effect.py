@@ -18,7 +18,7 @@ Parameters are unbounded numbers x with a Gaussian prior; :meth:`Parameter.value
 physical value.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, NamedTuple, TypeVar
 
@@ -38,39 +38,31 @@ WIDER = 2.0  # times the deviation of an effect: 32 of 34 then lie within 90 % o
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown x with prior N(mean, sd²).
-
-    The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``. With
-    a finite ``reach`` L, x is replaced by ``L tanh(x/L)``, which equals x for small x. In a fit,
-    ``step`` limits the step; a search begins at ``starts``. With all parameters at ``nominal`` an
-    effect does nothing.
-    """
+    """One unknown x of prior N(mean, sd²); its value is scale eˣ ("log") or scale x ("linear")."""
 
     name: str
-    unit: str
+    unit: str  #: of the value
     mean: float
     sd: float
     scale: float = 1.0
     kind: Literal["log", "linear"] = "log"
-    step: float = 0.7
-    starts: tuple[float, ...] = ()
-    nominal: float = 0.0
-    reach: float = np.inf
+    step: float = 0.7  #: limit of a step of a fit
+    starts: tuple[float, ...] = ()  #: of a search
+    nominal: float = 0.0  #: with all parameters there an effect does nothing
+    reach: float = np.inf  #: L: x is replaced by L tanh(x/L), which equals x for small x
 
     def value(self, x: float) -> float:
         """Physical value."""
-        return float(self.scale * (np.exp(self._drawn_in(x)[0]) if self.kind == "log" else x))
+        if self.kind == "linear":
+            return float(self.scale * x)
+        y = x if np.isinf(self.reach) else self.reach * float(np.tanh(x / self.reach))
+        return float(self.scale * np.exp(y))
 
     def slope(self, x: float) -> float:
         """Derivative of the physical value with respect to x."""
-        return self.value(x) * self._drawn_in(x)[1] if self.kind == "log" else self.scale
-
-    def _drawn_in(self, x: float) -> tuple[float, float]:
-        """L tanh(x/L) and its derivative."""
-        if np.isinf(self.reach):
-            return x, 1.0
-        t = float(np.tanh(x / self.reach))
-        return self.reach * t, 1 - t**2
+        if self.kind == "linear":
+            return self.scale
+        return self.value(x) * (1 - float(np.tanh(x / self.reach)) ** 2)
 
     def interval(self, x: float, sd: float, width: float = 1.96) -> tuple[float, float]:
         """Values at x -+ width sd, in increasing order."""
@@ -80,32 +72,24 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class FieldChange:
-    """Logarithm of the factor on one sheet field, over the groups of shells.
-
-    ``value`` (n_groups,), ``gradient`` (n_groups, n_parameters).
-    """
+    """Logarithm of the factor on one sheet field, over the groups of shells."""
 
     field: str
-    value: np.ndarray
-    gradient: np.ndarray
+    value: np.ndarray  #: (n_groups,)
+    gradient: np.ndarray  #: (n_groups, n_parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class PointTerm:
-    """Σ_k c_k b_kᵀ b_k added to K or M: rows b (k, n), c (k,), dc/dx (k, n_parameters).
-
-    If the place is unknown, ``moving`` holds ∂b/∂x for the parameters that move it. If the effect
-    has its own dofs, ``own`` (k, own_dofs) is b on these. A moving base carries them as it carries
-    the rows ``carrier`` of the structure.
-    """
+    """Σ_k c_k b_kᵀ b_k added to K or M."""
 
     matrix: Literal["K", "M"]
-    rows: sp.csr_array
-    coefficient: np.ndarray
-    gradient: np.ndarray
-    moving: dict[int, sp.csr_array] = field(default_factory=dict)
-    own: np.ndarray | None = None
-    carrier: sp.csr_array | None = None
+    rows: sp.csr_array  #: b (k, n)
+    coefficient: np.ndarray  #: c (k,)
+    gradient: np.ndarray  #: dc/dx (k, n_parameters)
+    moving: dict[int, sp.csr_array] = field(default_factory=dict)  #: ∂b/∂x that move the place
+    own: np.ndarray | None = None  #: b (k, own_dofs) on the effect's own dofs
+    carrier: sp.csr_array | None = None  #: rows that carry these dofs where the base moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,21 +99,14 @@ class Rise:
     G = Φ diag(g) ΦᵀM on the modes Φ of the model without the rise, g = (f/f_0)^p. A mode has the
     stiffness at its own frequency, a coupling of two modes that at their geometric mean. The
     product stays positive.
-
-    Attributes
-    ----------
-    power, gradient : p, (n_parameters,)
-    reference : f_0 [Hz]
-    band : (low, high) Hz, the measured band, beyond which the stiffness is constant
-    loss, loss_gradient : η, (n_parameters,)
     """
 
-    power: float
-    gradient: np.ndarray
-    reference: float
-    band: tuple[float, float]
-    loss: float
-    loss_gradient: np.ndarray
+    power: float  #: p
+    gradient: np.ndarray  #: dp/dx (n_parameters,)
+    reference: float  #: f_0 [Hz]
+    band: tuple[float, float]  #: [Hz] measured; beyond it the stiffness is constant
+    loss: float  #: η
+    loss_gradient: np.ndarray  #: dη/dx (n_parameters,)
 
     def log_frequency(self, lam: np.ndarray) -> np.ndarray:
         """ln f/f_0, limited to the band, of modes with these λ (m,)."""
@@ -143,35 +120,26 @@ class Within:
 
     A term c A adds c m A. The factor m is left of A by all changes of the whole. Hence c > -1
     leaves the stiffness positive.
-
-    Attributes
-    ----------
-    pieces : contents of A, each a kind and an id: ("joint", 17). Operators with more are the whole
-    complete : whether A is all that the pieces have, so that 1 + c multiplies their shares
-    shells : rows of the shells of whose stiffness A is a share; their softest group sets m
-    bending : A is a share of their bending alone
     """
 
+    #: contents of A, each a kind and an id: ("joint", 17); operators with more are the whole
     pieces: frozenset[tuple[str, int]] = frozenset()
-    complete: bool = True
-    shells: np.ndarray | None = None
-    bending: bool = False
+    complete: bool = True  #: A is all that the pieces have: 1 + c multiplies their shares
+    shells: np.ndarray | None = None  #: rows of shells A is a share of; their softest group sets m
+    bending: bool = False  #: A is a share of their bending alone
 
 
 @dataclass(frozen=True, eq=False)
 class MatrixTerm:
-    """c A added to K or M: A (n, n) symmetric, c, dc/dx (n_parameters,).
-
-    ``within`` is the whole of which A is a share. A ``geometric`` A has no sign (a membrane force).
-    All of these together take at most 0.99 of the stiffness of any motion.
-    """
+    """c A added to K or M, A symmetric."""
 
     matrix: Literal["K", "M"]
-    operator: sp.csr_array
-    coefficient: float
-    gradient: np.ndarray
+    operator: sp.csr_array  #: A (n, n)
+    coefficient: float  #: c
+    gradient: np.ndarray  #: dc/dx (n_parameters,)
     rise: Rise | None = None
-    within: Within | None = None
+    within: Within | None = None  #: the whole of which A is a share
+    #: A has no sign (a membrane force); all of these take at most 0.99 of any motion's stiffness
     geometric: bool = False
 
 
@@ -181,41 +149,34 @@ class ModalFactor:
 
     K becomes GᵀKG with G = I + Φ (Λ^-½ e^{L/2} Λ^½ - I) ΦᵀM. The logarithms L of all effects on the
     same ``rows`` are added. K stays positive. Motion that follows a released clamp is not strained.
-
-    Attributes
-    ----------
-    rows : (k, n)      ΦᵀM
-    omega : (k,) [rad/s]
-    log, gradient : L (k, k), ∂L/∂x (n_parameters, k, k)
     """
 
-    rows: sp.csr_array
-    omega: np.ndarray
-    log: np.ndarray
-    gradient: np.ndarray
+    rows: sp.csr_array  #: ΦᵀM (k, n)
+    omega: np.ndarray  #: (k,) [rad/s]
+    log: np.ndarray  #: L (k, k)
+    gradient: np.ndarray  #: ∂L/∂x (n_parameters, k, k)
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelChange:
-    """log10 of the factor on every output, complex: level and phase (n_out,), (n_out, n_p)."""
+    """log10 of the factor on every output, complex: level and phase."""
 
-    value: np.ndarray
-    gradient: np.ndarray
+    value: np.ndarray  #: (n_out,)
+    gradient: np.ndarray  #: (n_out, n_parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeChange:
     """c S b added to the motion of the measured places: outputs first, then inputs.
 
-    b are coordinates ``rows`` (k, n) of the structure, S ``shapes`` (places, k), c and dc/dx
-    (n_parameters,). It represents local changes at a sensor, which no change of K and M over a
-    basis can. Motion that follows a released clamp is not included.
+    It represents local changes at a sensor, which no change of K and M over a basis can. Motion
+    that follows a released clamp is not included.
     """
 
-    rows: sp.csr_array
-    shapes: np.ndarray
-    coefficient: float
-    gradient: np.ndarray
+    rows: sp.csr_array  #: b (k, n)
+    shapes: np.ndarray  #: S (places, k)
+    coefficient: float  #: c
+    gradient: np.ndarray  #: dc/dx (n_parameters,)
 
 
 Term = FieldChange | PointTerm | MatrixTerm | ModalFactor | ChannelChange | ShapeChange
@@ -223,46 +184,26 @@ Kind = TypeVar("Kind", FieldChange, PointTerm, MatrixTerm, ModalFactor, ChannelC
 
 
 class Weight(NamedTuple):
-    """Mass of an effect on the scales [kg].
+    """Mass of an effect on the scales [kg]."""
 
-    Attributes
-    ----------
-    mass, gradient : float, (n_p,)   added to the weighed mass, that of the sheets excluded
-    removed : mass that is on the structure during the test and is removed before it is weighed
-    """
-
-    mass: float
-    gradient: np.ndarray
-    removed: float = 0.0
+    mass: float  #: added to the weighed mass, that of the sheets excluded
+    gradient: np.ndarray  #: (n_parameters,)
+    removed: float = 0.0  #: on the structure during the test, and removed before it is weighed
 
 
 @dataclass(frozen=True)
 class Traits:
-    """Fixed properties of a kind of effect.
+    """Fixed properties of a kind of effect."""
 
-    Attributes
-    ----------
-    writable : a deck can represent it
-    remakes_structure : it is strong, so that mesh error and basis are computed again
-    elastic : it adds or removes stiffness only, without friction
-    lone : a second one of its kind is not a finding
-    lump : it is a mass at its ``location``; the first parameter is that mass [kg]
-    own_dofs : degrees of freedom that it adds; its terms must give them mass
-    rounds : times that the responses of :meth:`Effect.basis_rows` load the basis again, because
-        the effect changes modes beyond first order
-    own_loads : the loads of these rounds are A u with its first operator A; else they are M u
-    level : position of the parameter that is ln of the damping common to all modes (``damping``)
-    """
-
-    writable: bool = True
-    remakes_structure: bool = False
-    elastic: bool = False
-    lone: bool = False
-    lump: bool = False
-    own_dofs: int = 0
-    rounds: int = 0
-    own_loads: bool = False
-    level: int = 0
+    writable: bool = True  #: a deck can represent it
+    remakes_structure: bool = False  #: it is strong: mesh error and basis are computed again
+    elastic: bool = False  #: it adds or removes stiffness only, without friction
+    lone: bool = False  #: a second one of its kind is not a finding
+    lump: bool = False  #: it is a mass at its ``location``; the first parameter is that mass [kg]
+    own_dofs: int = 0  #: degrees of freedom that it adds; its terms must give them mass
+    rounds: int = 0  #: times that the responses of basis_rows load the basis again
+    own_loads: bool = False  #: their loads are A u with its first operator A; else they are M u
+    level: int = 0  #: position of the parameter ln of the damping common to all modes (``damping``)
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,19 +213,6 @@ class Effect:
     A subclass defines :meth:`terms` and :meth:`apply`. The other methods have defaults:
     :meth:`weight` for masses, :meth:`basis_rows` where the modes of the deck are too few, and
     :meth:`reported`, :meth:`location` and :meth:`remarks` after a fit.
-
-    Attributes
-    ----------
-    parameters : the unknowns, in the order of x
-    text : where it acts, in words
-    parts, grids : names of parts and ids of grids it concerns
-    point : (3,) or None  its place in the basic frame [m]
-    trials_factor : number of places tried, this one included (look-elsewhere effect)
-    replaces : names of calibration parameters that it makes superfluous
-    expected : whether the materials of the deck usually have it
-    release : clamps that it releases, so that its rows reach beyond the dofs of the deck
-    in_structure : x that the structure already contains (``remakes_structure``), or None
-    damping : identified damping with which it is compared as well, because it dissipates
     """
 
     name: ClassVar[str] = "nothing"
@@ -292,18 +220,19 @@ class Effect:
     kind: ClassVar[str] = "physics"  # physics, test, calibration, nuisance
     traits: ClassVar[Traits] = Traits()
 
-    parameters: tuple[Parameter, ...] = ()
-    text: str = ""
-    parts: tuple[str, ...] = ()
-    grids: tuple[int, ...] = ()
-    point: tuple[float, float, float] | None = None
-    radius: float | None = None
-    trials_factor: int = 1
-    replaces: tuple[str, ...] = ()
+    parameters: tuple[Parameter, ...] = ()  #: the unknowns, in the order of x
+    text: str = ""  #: where it acts, in words
+    parts: tuple[str, ...] = ()  #: names of parts that it concerns
+    grids: tuple[int, ...] = ()  #: ids of grids
+    point: tuple[float, float, float] | None = None  #: its place in the basic frame [m]
+    radius: float | None = None  #: [m]
+    trials_factor: int = 1  #: places tried, this one included (look-elsewhere effect)
+    replaces: tuple[str, ...] = ()  #: names of calibration parameters that it makes superfluous
     channels: tuple[str, ...] = field(default=())
-    expected: bool = False
-    release: Release | None = None
-    in_structure: np.ndarray | None = None
+    expected: bool = False  #: the materials of the deck usually have it
+    release: Release | None = None  #: clamps released: rows reach beyond the dofs of the deck
+    in_structure: np.ndarray | None = None  #: x that the structure contains (``remakes_structure``)
+    #: identified damping with which it is compared as well, because it dissipates
     damping: IdentifiedDamping | None = None
 
     def terms(self, x: np.ndarray) -> tuple[Term, ...]:
@@ -344,6 +273,16 @@ class Effect:
             Estimate(p.name, p.value(x[k]), p.unit, *p.interval(x[k], wide[k]))
             for k, p in enumerate(self.parameters)
         )
+
+    def estimate(
+        self, x: np.ndarray, sd: np.ndarray, value: Callable[[np.ndarray], float], name: str = "",
+        unit: str = "", k: int = 0,
+    ) -> Estimate:  # fmt: skip
+        """A value of x, and its interval as the k-th parameter moves; that names it by default."""
+        step = 1.96 * self.widened(sd)[k] * np.eye(len(x))[k]
+        here, *ends = (float(value(x + s * step)) for s in (0, -1, 1))
+        p = self.parameters[k]
+        return Estimate(name or p.name, here, unit or p.unit, min(ends), max(ends))
 
     def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The place after a fit, with its uncertainty where ``sd`` (n_p,) is given."""

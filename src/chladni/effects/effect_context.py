@@ -15,27 +15,20 @@ from ..geometry.sampling import farthest_point_sample
 from .element_groups import ElementGroups
 from .identified_damping import IdentifiedDamping
 
+SAME = 0.95  # cosine from which directions across two beams of one grid count as one
+
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """The test, as effects see it.
+    """The test, as effects see it."""
 
-    Attributes
-    ----------
-    sensors : (grid id, weight) pairs of each output
-    hangers : grid ids
-    weight : mass of the structure [kg]
-    f_max : highest frequency of interest [Hz]
-    drives : (grid id, weight) pairs of each force, and its direction
-    damping : of the identified modes, where responses are compared
-    """
-
-    sensors: tuple[Share, ...]
-    hangers: tuple[int, ...]
-    weight: float
-    f_max: float
+    sensors: tuple[Share, ...]  # (grid id, weight) pairs of each output
+    hangers: tuple[int, ...]  # grid ids
+    weight: float  # of the structure [kg]
+    f_max: float  # highest frequency of interest [Hz]
+    # (grid id, weight) pairs of each force, and its direction
     drives: tuple[tuple[Share, tuple[float, float, float]], ...] = ()
-    damping: IdentifiedDamping | None = None
+    damping: IdentifiedDamping | None = None  # where responses are compared
 
     @property
     def stiffness(self) -> float:
@@ -49,23 +42,14 @@ class ElementGrids:
 
     A grid of shells is listed once, with the normal of the surface. A grid of beams is listed once
     for every direction across a beam that ends there.
-
-    Attributes
-    ----------
-    grids : (k,) int      ids
-    normal : (k, 3)       of the surface, or across the beam, unit length
-    point : (k, 3) [m]
-    rows : (k, n)         translation along the normal
-    line : (k,) int       number of the line of beams it lies on, -1 on shells
-    along : (k, 3)        of that line, unit length; zero on shells
     """
 
-    grids: np.ndarray
-    normal: np.ndarray
-    point: np.ndarray
-    rows: sp.csr_array
-    line: np.ndarray
-    along: np.ndarray
+    grids: np.ndarray  # (k,) ids
+    normal: np.ndarray  # (k, 3) of the surface, or across the beam, unit length
+    point: np.ndarray  # (k, 3) [m]
+    rows: sp.csr_array  # (k, n) translation along the normal
+    line: np.ndarray  # (k,) number of the line of beams it lies on, -1 on shells
+    along: np.ndarray  # (k, 3) of that line, unit length; zero on shells
 
     def __len__(self) -> int:
         return len(self.grids)
@@ -110,9 +94,6 @@ def element_grids(groups: ElementGroups) -> ElementGrids:
     return found.only(moving)
 
 
-SAME = 0.95  # cosine from which directions across two beams of one grid count as one
-
-
 def _across_beams(
     groups: ElementGroups,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -139,21 +120,13 @@ def _across_beams(
 
 @dataclass(frozen=True, eq=False)
 class EffectContext:
-    """The structure and its test, as every effect sees them.
+    """The structure and its test, as every effect sees them."""
 
-    Attributes
-    ----------
-    groups : shells and beams in groups
-    grids : ElementGrids        all of them
-    places : ElementGrids       a sample of them, tried if a place is unknown
-    setup : Setup               of the test
-    frequency : (r,) Hz, shapes : (n, r)    modes of the deck up to the highest spectral line
-    """
-
-    groups: ElementGroups
-    grids: ElementGrids
-    places: ElementGrids
-    setup: Setup
+    groups: ElementGroups  # shells and beams
+    grids: ElementGrids  # all of them
+    places: ElementGrids  # a sample of them, tried if a place is unknown
+    setup: Setup  # of the test
+    # modes of the deck up to the highest spectral line: (r,) [Hz], (n, r)
     frequency: np.ndarray = field(default_factory=lambda: np.zeros(0))
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
@@ -164,8 +137,5 @@ class EffectContext:
 
     def at_shares(self, shares: Sequence[Share]) -> sp.csr_array:
         """Rows (3k, n) of all three translations of places given as weighted grids."""
-        weighted = [
-            sp.csr_array(sum(w * self.translations([grid]) for grid, w in share))
-            for share in shares
-        ]
-        return sp.csr_array(sp.vstack(weighted))
+        each = (sum(w * self.translations([grid]) for grid, w in share) for share in shares)
+        return sp.csr_array(sp.vstack(list(each)))

@@ -6,6 +6,10 @@ for each group, and the reduced model does not return to elements.
 
 For a beam, t is the wall of a thin tube. Its area and shear areas, I1, I2, I12 and J are
 proportional to t. Hence its stiffness is E t A and its mass ρ t m exactly.
+
+Transverse shear in series with residual bending, S = (Z_s + Z_r)⁻¹, is neither linear nor cubic in
+t. It is split into S Z_s S and S Z_r S: with the powers t and t³ for these two, the value *and* the
+first derivative are exact.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,11 +25,71 @@ from ..arrays import alike
 from ..dynamics.reduction import Basis
 from ..fem import beam, shell
 from ..fem.assemble import Structure
-from ..fem.shell_section import section_arrays
+from ..fem.shell import ShellGeometry
+from ..fem.shell_section import SectionArrays, section_arrays
 from ..geometry.beam_lines import member_beams
 from ..model.assembly import Assembly, picked
 from ..model.properties import BeamSection
-from .shell_components import component_matrices, thickness_split
+
+COMPONENTS = {"Q11": ((0, 0),), "Q22": ((1, 1),), "Q12": ((0, 1), (1, 0)), "Q66": ((2, 2),)}
+
+Pair = tuple[np.ndarray, np.ndarray]
+
+
+def thickness_split(
+    assembly: Assembly, geo: ShellGeometry, arrays: SectionArrays | None = None
+) -> Pair:
+    """(A, B) with K = A + B and ∂K/∂ln t = A + 3 B (m, 24, 24) each [N/m]."""
+    arrays = section_arrays(assembly, geo) if arrays is None else arrays
+    t, reference = assembly.shells.thickness, arrays.Qm
+    thin, residual = _shear_split(arrays)
+    linear = shell.stiffness(geo, t, Qm=arrays.Qm, S=thin, drill=arrays.drill, reference=reference)
+    return linear, shell.stiffness(geo, t, Qb=arrays.Qb, S=residual, reference=reference)
+
+
+def component_matrices(assembly: Assembly) -> Iterator[tuple[str, Pair]]:
+    """(A, B) as above for each component k: ∂K/∂ln Q_k = A_k + B_k, Σ_k A_k + B_k = K.
+
+    Shear flexibility of the material and the drilling stiffness are assigned to Q66.
+    """
+    geo = shell.geometry(assembly.points, assembly.shells)
+    arrays = section_arrays(assembly, geo)
+    t, reference = assembly.shells.thickness, arrays.Qm
+    thin, _ = _shear_split(arrays)
+    for name, entries in COMPONENTS.items():
+        Qm, Qb = _entries(arrays.Qm, entries), _entries(arrays.Qb, entries)
+        own = name == "Q66"
+        linear = shell.stiffness(
+            geo, t, Qm=Qm, S=thin if own else None, drill=arrays.drill if own else None,
+            reference=reference,
+        )  # fmt: skip
+        residual = arrays.shear_by_bending(geo, Qb)
+        yield name, (linear, shell.stiffness(geo, t, Qb=Qb, S=residual, reference=reference))
+
+
+def shear_matrices(assembly: Assembly, rows: np.ndarray) -> np.ndarray:
+    """γᵀ S Z_s S γ and γᵀ S Z_r S γ of some shells (2, m, 24, 24), which grow with t and t³."""
+    shells = picked(assembly.shells, rows)
+    geo = shell.geometry(assembly.points, shells)
+    arrays = section_arrays(replace(assembly, shells=shells), geo)
+    return np.stack([
+        shell.stiffness(geo, shells.thickness, S=S, reference=arrays.Qm)
+        for S in _shear_split(arrays)
+    ])  # fmt: skip
+
+
+def _shear_split(arrays: SectionArrays) -> Pair:
+    """S Z_s S and S Z_r S (m, 2, 2)."""
+    S, Z = arrays.S, arrays.shear_flexibility
+    thin = S @ Z @ S
+    return thin, S - thin
+
+
+def _entries(Q: np.ndarray, entries: tuple[tuple[int, int], ...]) -> np.ndarray:
+    out = np.zeros_like(Q)
+    for i, j in entries:
+        out[:, i, j] = Q[:, i, j]
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,28 +98,18 @@ class ElementGroups:
 
     Fasteners are not included; errors of fasteners belong to the effects of joints. A beam uses the
     rows of its two ends; the other twelve are zero.
-
-    Attributes
-    ----------
-    linear, cubic : (m, 24, 24)   stiffness that grows with t and with t³ [N/m]
-    mass : (m, 24, 24)            [kg]
-    nodes : (m, 4)                rows of points; of a beam the second end thrice
-    group : (m,)                  group of each element
-    centre : (g, 3)               area-weighted centre of each group [m]
-    area, weight : (g,)           [m²] (of a beam: length times the root of A), [kg]
-    part : (g,)                   position of the group's part
     """
 
     structure: Structure
-    linear: np.ndarray
-    cubic: np.ndarray
-    mass: np.ndarray
-    nodes: np.ndarray
-    group: np.ndarray
-    centre: np.ndarray
-    area: np.ndarray
-    weight: np.ndarray
-    part: np.ndarray
+    linear: np.ndarray  # (m, 24, 24) stiffness that grows with t and with t³ [N/m]
+    cubic: np.ndarray  # (m, 24, 24) stiffness that grows with t and with t³ [N/m]
+    mass: np.ndarray  # (m, 24, 24) [kg]
+    nodes: np.ndarray  # (m, 4) rows of points; of a beam the second end thrice
+    group: np.ndarray  # (m,) group of each element
+    centre: np.ndarray  # (g, 3) area-weighted centre of each group [m]
+    area: np.ndarray  # (g,) [m²] (of a beam: length times the root of A), [kg]
+    weight: np.ndarray  # (g,) [m²] (of a beam: length times the root of A), [kg]
+    part: np.ndarray  # (g,) position of the group's part
 
     def __len__(self) -> int:
         return len(self.area)
@@ -124,22 +178,13 @@ class ElementGroups:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Elements of one group and the motion of their points, without the rest of the structure.
+    """Elements of one group and the motion of their points, without the rest of the structure."""
 
-    Attributes
-    ----------
-    elements : (m,) int
-    dofs : (p,) int       motions of their points, 6 a point
-    at : (m, 24) int      of each element among these
-    sum : (p, 24 m)       of the forces of all elements
-    T : (p, k), free : (k,)   the motions by these free dofs of the structure
-    """
-
-    elements: np.ndarray
-    dofs: np.ndarray
-    at: np.ndarray
-    sum: sp.csr_array
-    T: sp.csr_array
+    elements: np.ndarray  # (m,) int
+    dofs: np.ndarray  # (p,) int motions of their points, 6 a point
+    at: np.ndarray  # (m, 24) int of each element among these
+    sum: sp.csr_array  # (p, 24 m) of the forces of all elements
+    T: sp.csr_array  # (p, k), free : (k,) the motions by these free dofs of the structure
     free: np.ndarray
 
     @classmethod

@@ -18,27 +18,18 @@ from .search_context import Candidate, SearchContext, best_starts
 
 @dataclass(frozen=True, eq=False)
 class Article:
-    """A test article on the virtual bench, its test and the concealed truth.
+    """A test article on the virtual bench, its test and the concealed truth."""
 
-    Attributes
-    ----------
-    assembly : the article, meshed finer than the deck
-    deck : the deck given to the user
-    outputs, hangers : (k,) int    grid ids of the deck
-    gains : (n_out,)               factor on every channel
-    off_scale : mass that is removed before the article is weighed [kg]
-    drive : grid id of the deck and direction of the force, or None if unknown
-    truth : the concealed effect; ``parameters`` by the names that the effect reports, ``value`` the
-        first of them, ``point_m`` and ``channel`` where it has a place
-    """
-
-    assembly: Assembly
-    deck: Assembly
-    outputs: np.ndarray
-    hangers: np.ndarray
-    gains: np.ndarray
-    off_scale: float = 0.0
+    assembly: Assembly  #: the article, meshed finer than the deck
+    deck: Assembly  #: given to the user
+    outputs: np.ndarray  #: (k,) int, grid ids of the deck
+    hangers: np.ndarray  #: (k,) int, grid ids of the deck
+    gains: np.ndarray  #: (n_out,) factor on every channel
+    off_scale: float = 0.0  #: mass that is removed before the article is weighed [kg]
+    #: grid id of the deck and direction of the force, or None if unknown
     drive: tuple[int, tuple[float, float, float]] | None = None
+    #: of the concealed effect: ``parameters`` by the names that it reports, ``value`` the first of
+    #: them, ``point_m`` and ``channel`` where it has a place
     truth: dict[str, Any] = field(default_factory=dict)
 
     def with_hidden(
@@ -84,37 +75,26 @@ FromLump = tuple[Effect, np.ndarray] | None
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """One kind of physics, as used by search, bench, deck and page.
+    """One kind of physics, as used by search, bench, deck and page."""
 
-    Attributes
-    ----------
-    effect : its class, with name, claim and physics
-    conceal : function that puts it into an article at random, in size and place, with the truth
-    placed : function that gives its effects where deck and test define the place
-    candidates : function that proposes fits where the place is unknown; without it, the best
-        starts of ``placed``
-    closer : function that moves an effect fitted at x if it explains more next to its place; the
-        last of the context's ``bases`` is that of the fit
-    of_lump : function that gives its effect, and its start, from a mass [kg] at a place (3,) [m],
-        or None if impossible; without it, the effect is no mass at a place
-    cards : of the deck that represent it
-    no_cards : why no card can
-    settled_by : the measurement that separates it from similar causes, in words
-    needs : what the structure must have in addition to sheets, in words; "": nothing
-    on_sheets : whether it acts on shells only, so that a structure of beams does not try it
-    """
-
-    effect: type[Effect]
+    effect: type[Effect]  #: its class, with name, claim and physics
+    #: puts it into an article at random, in size and place, with the truth
     conceal: Callable[[Article, np.random.Generator], Article]
+    #: gives its effects where deck and test define the place
     placed: Callable[[EffectContext], Sequence[Effect]] | None = None
+    #: proposes fits where the place is unknown; without it, the best starts of ``placed``
     candidates: Callable[[SearchContext], Iterable[Candidate]] | None = None
+    #: moves an effect fitted at x if it explains more next to its place; the last of the context's
+    #: ``bases`` is that of the fit
     closer: Callable[[SearchContext, Effect, np.ndarray], Candidate | None] | None = None
+    #: gives its effect, and its start, from a mass [kg] at a place (3,) [m], or None if impossible;
+    #: without it, the effect is no mass at a place
     of_lump: Callable[[EffectContext, np.ndarray, float], FromLump] | None = None
-    cards: tuple[str, ...] = ()
-    no_cards: str = ""
-    settled_by: str = ""
-    needs: str = ""
-    on_sheets: bool = False
+    cards: tuple[str, ...] = ()  #: of the deck that represent it
+    no_cards: str = ""  #: why no card can
+    settled_by: str = ""  #: the measurement that separates it from similar causes, in words
+    needs: str = ""  #: what the structure must have in addition to sheets; "": nothing
+    on_sheets: bool = False  #: it acts on shells only: a structure of beams does not try it
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(-[a-z]+)*", self.name) or self.name == Effect.name:

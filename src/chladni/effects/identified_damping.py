@@ -28,18 +28,11 @@ class AuxiliaryResidual:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedDamping:
-    """Identified damping of the modes that are compared.
+    """Identified damping of the modes that are compared."""
 
-    Attributes
-    ----------
-    frequency : (n,) Hz
-    ratio : (n,)           ζ
-    sd : (n,)              of ln ζ, from the identification
-    """
-
-    frequency: np.ndarray
-    ratio: np.ndarray
-    sd: np.ndarray
+    frequency: np.ndarray  # (n,) Hz
+    ratio: np.ndarray  # (n,) ζ
+    sd: np.ndarray  # (n,) of ln ζ, from the identification
 
     def of(self, keep: np.ndarray) -> Self:
         """A selection of the modes by a mask (n,)."""

@@ -36,19 +36,12 @@ Family = TypeVar("Family", Beams, Bushes)
 
 @dataclass(frozen=True, eq=False)
 class JointVariant:
-    """A structure with one kind of joint modelled in another way.
+    """A structure with one kind of joint modelled in another way."""
 
-    Attributes
-    ----------
-    joints, model : "welds" and "bars", for example; "deck" and "" for the deck itself
-    assembly : Assembly, None where it cannot be made
-    refused : why not, in one sentence
-    """
-
-    joints: str
-    model: str
-    assembly: Assembly | None
-    refused: str = ""
+    joints: str  # "welds" and "bars", for example; "deck" and "" for the deck itself
+    model: str  # "welds" and "bars", for example; "deck" and "" for the deck itself
+    assembly: Assembly | None  # Assembly, None where it cannot be made
+    refused: str = ""  # why not, in one sentence
 
     @property
     def name(self) -> str:
@@ -58,20 +51,12 @@ class JointVariant:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A hexahedron between two sheets.
+    """A hexahedron between two sheets."""
 
-    Attributes
-    ----------
-    place : (2, 3)    middles of its faces [m]
-    area : mean of both faces [m²]
-    carriers : of each face, the grids it depends on
-    material : Isotropic
-    """
-
-    place: np.ndarray
-    area: float
-    carriers: tuple[Carriers, Carriers]
-    material: Isotropic
+    place: np.ndarray  # (2, 3) middles of its faces [m]
+    area: float  # mean of both faces [m²]
+    carriers: tuple[Carriers, Carriers]  # of each face, the grids it depends on
+    material: Isotropic  # Isotropic
 
     @property
     def height(self) -> float:
@@ -122,13 +107,7 @@ def _remade(
 
 
 def _blocks(assembly: Assembly, group: int, rows: np.ndarray) -> Iterator[Block]:
-    """Blocks of some solids.
-
-    Raises
-    ------
-    ModelError
-        If a solid is no hexahedron between two sheets.
-    """
+    """Blocks of some solids, all of them hexahedra between two sheets."""
     solids, carriers = assembly.solids[group], _carriers(assembly)
     part = dict(zip(assembly.shells.nodes.ravel().tolist(),
                     np.repeat(assembly.shells.part, 4).tolist(), strict=True))  # fmt: skip

@@ -30,26 +30,15 @@ FLAT = 1e-9  # of the stiffest direction of a joint: softer ones are rounding
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """Elements that hold sheets together in one place.
+    """Elements that hold sheets together in one place."""
 
-    Attributes
-    ----------
-    kind : "solids", "beams" or "bushes" of the assembly
-    group : position among ``Assembly.solids``, 0 of others
-    elements : (k,) int     rows of that group
-    ids : ids of these elements
-    point : (3,) [m]        its middle
-    parts : names of the sheets and beams it holds, largest first
-    grids : ids of the grids of these it hangs on
-    """
-
-    kind: str
-    group: int
-    elements: np.ndarray
-    ids: tuple[int, ...]
-    point: np.ndarray
-    parts: tuple[str, ...] = ()
-    grids: tuple[int, ...] = ()
+    kind: str  # "solids", "beams" or "bushes" of the assembly
+    group: int  # position among ``Assembly.solids``, 0 of others
+    elements: np.ndarray  # (k,) int rows of that group
+    ids: tuple[int, ...]  # ids of these elements
+    point: np.ndarray  # (3,) [m] its middle
+    parts: tuple[str, ...] = ()  # names of the sheets and beams it holds, largest first
+    grids: tuple[int, ...] = ()  # ids of the grids of these it hangs on
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
     @property

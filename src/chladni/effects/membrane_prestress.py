@@ -29,9 +29,8 @@ from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
 
-MOST_OF_BUCKLING = (
-    0.7  # of buckling; with both forces 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
-)
+# of buckling; with both forces 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
+MOST_OF_BUCKLING = 0.7
 SD = 0.4  # of N / (0.7 N_cr) where that is small: mostly within a third of buckling
 STARTS = (-0.35, 0.35)
 LARGE = 0.05  # share of the shells' area below which a part is not tried
@@ -45,17 +44,14 @@ MODES = 40  # from which the buckling force of an article is computed
 
 @dataclass(frozen=True, eq=False)
 class MembranePrestress(Effect):
-    """K + Σ N_k K_k, N_k = 0.7 N_cr,k x_k / √(1 + |x|²); see :mod:`..fem.membrane_force`.
-
-    ``critical`` are N_cr,k [N/m], ``tensors`` (2, 3, 3) the unit forces along and across.
-    """
+    """K + Σ N_k K_k, N_k = 0.7 N_cr,k x_k / √(1 + |x|²); see :mod:`..fem.membrane_force`."""
 
     name = "membrane-prestress"
     claim = "a sheet has a membrane force, because it was strained, heated or cooled in place"
 
     part: int = 0
-    tensors: np.ndarray = field(default_factory=lambda: np.zeros((2, 3, 3)))
-    critical: np.ndarray = field(default_factory=lambda: np.ones(2))
+    tensors: np.ndarray = field(kw_only=True)  # (2, 3, 3) unit forces along and across
+    critical: np.ndarray = field(kw_only=True)  # N_cr,k [N/m]
     operators: tuple[sp.csr_array, ...] = ()
 
     def force(self, x: np.ndarray) -> np.ndarray:
@@ -64,13 +60,8 @@ class MembranePrestress(Effect):
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """N_k K_k."""
-        s = 1 + x @ x
-        slope = (
-            MOST_OF_BUCKLING
-            * self.critical[:, None]
-            * (np.eye(2) - np.outer(x, x) / s)
-            / np.sqrt(s)
-        )
+        s, most = 1 + x @ x, MOST_OF_BUCKLING * self.critical[:, None]
+        slope = most * (np.eye(2) - np.outer(x, x) / s) / np.sqrt(s)
         every = zip(self.operators, self.force(x), slope, strict=True)
         return tuple(MatrixTerm("K", K, float(N), g, geometric=True) for K, N, g in every)
 
@@ -83,12 +74,8 @@ class MembranePrestress(Effect):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """N along and across, each interval with the other force fixed."""
-        out = []
-        for k, p in enumerate(self.parameters):
-            step = 1.96 * self.widened(sd)[k] * np.eye(2)[k]
-            low, here, high = (float(self.force(x + s * step)[k]) for s in (-1, 0, 1))
-            out.append(Estimate(p.name, here, "N/m", low, high))
-        return tuple(out)
+        along = self.estimate(x, sd, lambda y: self.force(y)[0])
+        return along, self.estimate(x, sd, lambda y: self.force(y)[1], k=1)
 
 
 def axes_of(assembly: Assembly, part: int) -> np.ndarray:
@@ -147,13 +134,7 @@ def buckling(lam: np.ndarray, K_g: np.ndarray) -> float:
 
 
 def prestressed(assembly: Assembly, part: int, tensor: np.ndarray, N: float) -> Assembly:
-    """Write a force N in a part as scalar springs, whose stiffness may be negative.
-
-    Raises
-    ------
-    ModelError
-        If grids of the part have different displacement frames.
-    """
+    """Write a force N in a part as scalar springs, whose stiffness may be negative."""
     force = field_of(assembly, part, tensor)
     pairs, k = force.springs
     if assembly.axes is not None and np.ptp(assembly.axes[np.unique(pairs)], axis=0).max() > 1e-9:
@@ -209,20 +190,12 @@ def _turns(
     m = sp.coo_array(moments)
     a, b = np.triu_indices(3, 1)
     ground = np.full(m.nnz, -1)
-    nodes = np.concatenate(
-        [
-            np.array([(row, -1)] * 3 + [(row, row)] * 3),
-            np.column_stack([m.row // 6, np.full(m.nnz, row)]),
-            np.column_stack([m.row // 6, ground]),
-        ]
-    )
-    component = 1 + np.concatenate(
-        [
-            np.column_stack([np.r_[0, 1, 2, a], np.r_[0, 1, 2, b]]) + 3,
-            np.column_stack([m.row % 6, m.col + 3]),
-            np.column_stack([m.row % 6, m.row % 6]),
-        ]
-    )
+    own, turned = np.array([(row, -1)] * 3 + [(row, row)] * 3), np.full(m.nnz, row)
+    others = (np.column_stack([m.row // 6, end]) for end in (turned, ground))
+    nodes = np.concatenate([own, *others])
+    own = np.column_stack([np.r_[0, 1, 2, a], np.r_[0, 1, 2, b]]) + 3
+    others = (np.column_stack([m.row % 6, end]) for end in (m.col + 3, m.row % 6))
+    component = 1 + np.concatenate([own, *others])
     held = cost.sum(axis=1) - np.asarray(moments.sum(axis=0)).ravel()
     value = np.concatenate([held, -cost[a, b], m.data, -m.data])
     some = value != 0

@@ -12,63 +12,50 @@ from functools import cache
 from ..errors import ExtensionError, LabelError, did_you_mean
 from ..extensions import installed
 from . import (
+    adhesive,
+    channels,
     compliant_support,
-    contact_stiffness,
+    contacts,
     crack,
-    extra_support,
-    hem_contact,
-    local_resonator,
-    mass_patch,
+    hems,
+    masses,
     membrane_prestress,
-    orthotropic_material,
-    over_constraint,
-    point_mass,
-    sensor_fault,
-    sensor_mass,
-    shaker_restraint,
-    stiffness_patch,
-    suspension,
-    thickness_distribution,
-    viscoelastic_joint,
-    weld_compliance,
+    orthotropy,
+    sheets,
+    springs,
+    welds,
 )
 from .family import Family
 
 GROUP = "chladni.effects"
 BUILT_IN = (
-    orthotropic_material.FAMILY,
-    sensor_mass.FAMILY,
-    point_mass.FAMILY,
-    extra_support.FAMILY,
-    suspension.FAMILY,
-    thickness_distribution.FAMILY,
-    sensor_fault.FAMILY,
-    local_resonator.FAMILY,
-    stiffness_patch.FAMILY,
-    mass_patch.FAMILY,
+    orthotropy.FAMILY,
+    masses.SENSORS,
+    masses.POINT,
+    springs.SUPPORT,
+    springs.SUSPENSION,
+    sheets.THICKNESS,
+    channels.FAMILY,
+    masses.RESONATOR,
+    sheets.STIFFNESS,
+    sheets.MASS,
     crack.FAMILY,
     membrane_prestress.FAMILY,
-    weld_compliance.MISSING,
-    weld_compliance.FAMILY,
-    viscoelastic_joint.ADHESIVE,
-    hem_contact.FAMILY,
-    contact_stiffness.FAMILY,
-    over_constraint.FAMILY,
+    welds.MISSING,
+    welds.COMPLIANCE,
+    adhesive.ADHESIVE,
+    hems.FAMILY,
+    contacts.FAMILY,
+    welds.TIE,
     compliant_support.FAMILY,
-    shaker_restraint.FAMILY,
-    viscoelastic_joint.FAMILY,
+    springs.SHAKER,
+    adhesive.FAMILY,
 )
 _added: dict[str, Family] = {}
 
 
 def families() -> tuple[Family, ...]:
-    """All known families, the built-in ones first.
-
-    Raises
-    ------
-    ExtensionError
-        If an installed package offers a family that cannot be used.
-    """
+    """All known families, the built-in ones first; ExtensionError where a package is at fault."""
     return (*BUILT_IN, *_installed(), *_added.values())
 
 
@@ -93,13 +80,7 @@ def family(name: str) -> Family:
 
 
 def register(family: Family) -> None:
-    """Add a family for this process.
-
-    Raises
-    ------
-    ExtensionError
-        If its name is taken.
-    """
+    """Add a family for this process; ExtensionError where its name is taken."""
     if family.name in names():
         raise ExtensionError(f"an effect {family.name!r} is registered already")
     _added[family.name] = family

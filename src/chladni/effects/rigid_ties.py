@@ -22,18 +22,11 @@ LEAST_REACH = 0.005  # [m] lever arm of rotations where a tie holds one grid onl
 
 @dataclass(frozen=True, eq=False)
 class RigidTie:
-    """Some dependent points of a rigid element.
+    """Some dependent points of a rigid element."""
 
-    Attributes
-    ----------
-    rows : rows of their points
-    lead : row of the element's independent point
-    reach : root mean square distance of the followers from their middle [m]
-    """
-
-    rows: tuple[int, ...]
-    lead: int
-    reach: float
+    rows: tuple[int, ...]  # rows of their points
+    lead: int  # row of the element's independent point
+    reach: float  # root mean square distance of the followers from their middle [m]
 
     def within(self, assembly: Assembly) -> tuple[int, RigidBody]:
         """Position of the rigid element that contains the tie, and the element."""
@@ -52,17 +45,22 @@ def rigid_ties(assembly: Assembly) -> list[RigidTie]:
     Ties between a fastener or a bush and its sheet are left out, because the compliance of the
     fastener is in series. If two sheets follow a point with no other attachment, one tie is enough.
     """
-    sheet, used = _sheet_of(assembly), _used(assembly)
-    led = _fastened(assembly)
+    sheet, used = np.full(len(assembly.points), -1), _used(assembly)
+    groups: tuple[Any, ...] = (*assembly.solids, assembly.beams, assembly.shells)
+    for group in groups:  # part of the elements at each point, that of shells before others
+        sheet[group.nodes.ravel()] = np.repeat(group.part, group.nodes.shape[1])
+    bars = [assembly.beams.nodes[piece].ravel() for piece in fastener_bars(assembly)]
+    bushes = assembly.bushes.nodes[(assembly.bushes.nodes >= 0).all(axis=1)].ravel()
+    led = set(np.concatenate([bushes, *bars]).astype(int).tolist())  # ends of fasteners
     out: list[RigidTie] = []
     for body in assembly.rigid:
         if not isinstance(body, RigidBody) or body.independent in led:
             continue
         on = sheet[list(body.dependent)]
-        groups = [np.flatnonzero(on == s).tolist() for s in np.unique(on)]
+        legs = [np.flatnonzero(on == s).tolist() for s in np.unique(on)]
         if body.independent not in used:
-            groups = sorted(groups, key=len)[: len(groups) if len(groups) > 2 else len(groups) - 1]
-        out += [_tie(assembly, body, legs) for legs in groups]
+            legs = sorted(legs, key=len)[: len(legs) if len(legs) > 2 else len(legs) - 1]
+        out += [_tie(assembly, body, some) for some in legs]
     return out
 
 
@@ -71,15 +69,6 @@ def _tie(assembly: Assembly, body: RigidBody, legs: list[int]) -> RigidTie:
     X = assembly.points[list(rows)]
     reach = float(np.sqrt(((X - X.mean(axis=0)) ** 2).sum(axis=1).mean()))
     return RigidTie(rows, body.independent, max(reach, LEAST_REACH))
-
-
-def _sheet_of(assembly: Assembly) -> np.ndarray:
-    """Part of the elements at each point (n,), shells before beams before solids, else -1."""
-    out = np.full(len(assembly.points), -1)
-    groups: tuple[Any, ...] = (*assembly.solids, assembly.beams, assembly.shells)
-    for group in groups:
-        out[group.nodes.ravel()] = np.repeat(group.part, group.nodes.shape[1])
-    return out
 
 
 def _used(assembly: Assembly) -> set[int]:
@@ -101,13 +90,6 @@ def _others(body: object) -> Iterator[int]:
         yield from (int(r) for r in getattr(body, "nodes", ()))
         yield from (int(t[0]) for t in getattr(body, "terms", ()))
         yield from [int(body.reference)] if hasattr(body, "reference") else []
-
-
-def _fastened(assembly: Assembly) -> set[int]:
-    """Rows of the ends of fasteners and of bushes between points."""
-    bars = [assembly.beams.nodes[piece].ravel() for piece in fastener_bars(assembly)]
-    bushes = assembly.bushes.nodes[(assembly.bushes.nodes >= 0).all(axis=1)].ravel()
-    return set(np.concatenate([bushes, *bars]).astype(int).tolist())
 
 
 def loosened(assembly: Assembly, tie: RigidTie) -> tuple[Assembly, int]:

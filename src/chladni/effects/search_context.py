@@ -14,6 +14,8 @@ from .effect import Effect
 from .effect_context import EffectContext, ElementGrids
 from .joints import Connection
 
+NEIGHBOURS = 6  # places round a place of a sheet
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -149,9 +151,6 @@ class SearchContext(Protocol):
 
     def optima(self, effect: Effect) -> list[np.ndarray]:
         """The lowest local minima over the effect's whole prior, if only poles are known."""
-
-
-NEIGHBOURS = 6  # places round a place of a sheet
 
 
 def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candidate]:

@@ -24,16 +24,17 @@ from .calibration_parameters import (
     SHEET,
     SPREAD,
     TUBE,
+    LinearScale,
     calibration_parameter,
+    linear_scale,
     value,
     with_scaled,
 )
 from .effect import Effect, Parameter, Term, Weight, Within
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location
+from .joint_stiffness import within_joints
 from .joints import solid_parts
-from .linear_parameter import LinearScale, linear_scale
-from .model_families import within_joints
 
 UNITS = {
     **OF_FIELDS,

@@ -21,12 +21,11 @@ from ..geometry.sampling import nearest_points
 from ..model.assembly import Assembly, Average, RigidBody, Shells
 from ..model.free_parameter import FreeParameter
 from .effect import Effect, MatrixTerm, Parameter, Traits, Within
-from .element_groups import ElementGroups
+from .element_groups import ElementGroups, shear_matrices
+from .joint_stiffness import within_shear
 from .joints import fasteners
-from .model_families import within_shear
-from .property_bands import in_bands
-from .shell_components import shear_matrices
-from .stiffness_patch import softened
+from .sheet_patch import in_bands
+from .sheets import softened
 
 FIELD, SPIDERS = "weld-patch", "rigid-patch"
 PATCHES = FIELD, SPIDERS
@@ -100,13 +99,7 @@ def bell(R: float, distance: np.ndarray, variance: np.ndarray) -> tuple[np.ndarr
 
 
 def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
-    """Return the patch about all welds or spiders of the structure, or of the named parts.
-
-    Raises
-    ------
-    ModelError
-        If no shell of these parts touches such a joint.
-    """
+    """Return the patch about all welds or spiders of the structure, or of the named parts."""
     built = groups.structure
     assembly, shells = built.assembly, built.assembly.shells
     kind, what, each = (
@@ -120,7 +113,8 @@ def weld_patch(groups: ElementGroups, free: FreeParameter) -> WeldPatch:
     if not touching.any():
         raise ModelError(f"the deck has no shells that touch {what}; leave {kind.name} out")
     part &= np.isin(shells.part, shells.part[touching])
-    area = groups_area(groups)
+    X = assembly.points[shells.nodes]  # of a quadrilateral half the product of its diagonals
+    area = np.linalg.norm(np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]), axis=1) / 2
     R = float(np.sqrt(area[touching].mean()) / 2)
     middle = assembly.points[shells.nodes].mean(axis=1)
     points = np.array([point for point, _ in each])
@@ -171,13 +165,6 @@ def spiders(assembly: Assembly) -> list[tuple[np.ndarray, np.ndarray]]:
     return out
 
 
-def groups_area(groups: ElementGroups) -> np.ndarray:
-    """Area of every shell [m²], from the diagonals of its quadrilateral."""
-    assembly = groups.structure.assembly
-    X = assembly.points[assembly.shells.nodes]
-    return np.asarray(np.linalg.norm(np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]), axis=1) / 2)
-
-
 def _rings(inside: np.ndarray, touching: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """Ring of each shell: those that touch a weld first, the rest by distance; -1 outside."""
     ring = np.where(touching, 0, -1)
@@ -196,10 +183,8 @@ def _stiffness(
     shear = shear_matrices(built.assembly, rows).sum(axis=0)
     rest = groups.linear[rows] + groups.cubic[rows] - shear
     n, nodes = len(built.assembly.points), groups.nodes[rows]
-    return (
-        congruence(built.T, blocks(shear, nodes, n)),
-        congruence(built.T, blocks(rest, nodes, n)),
-    )
+    first, second = (congruence(built.T, blocks(A, nodes, n)) for A in (shear, rest))
+    return first, second
 
 
 def _within(shells: Shells, rows: np.ndarray) -> tuple[Within, Within]:

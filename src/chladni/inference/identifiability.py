@@ -16,7 +16,7 @@ import numpy as np
 
 from ..effects.calibration_parameters import REASONS
 from ..effects.effect import Effect
-from ..effects.model_families import FAR
+from ..effects.joint_stiffness import FAR
 from ..effects.user_parameters import UserParameter
 from ..reduced.effect_dofs import slices
 from ..reduced.reduced_model import State, evaluate

@@ -6,7 +6,7 @@ from typing import TypeGuard
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.model_families import FAR, JOINTS, ModelFamily
+from ..effects.joint_stiffness import FAR, JOINTS, ModelFamily
 from ..effects.user_parameters import UserParameter
 from .map_fit import Fit
 

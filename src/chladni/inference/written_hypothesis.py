@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.discretisation import MeshError
 from ..effects.effect import Effect
-from ..effects.model_families import calibrated_family
+from ..effects.joint_stiffness import calibrated_family
+from ..effects.model_errors import MeshError
 from ..reduced.reduced_model import evaluate
 from .hypothesis_fit import HypothesisFit
 from .implausible_values import is_strained

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.effect import FieldChange, MatrixTerm, Within, of
-from ..effects.element_groups import ElementGroups
-from ..effects.shell_components import COMPONENTS
+from ..effects.element_groups import COMPONENTS, ElementGroups
 from ..errors import ModelError
 from .effect_dofs import Acting
 

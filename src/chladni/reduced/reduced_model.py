@@ -24,8 +24,7 @@ from ..effects.effect import (
     count,
     of,
 )
-from ..effects.element_groups import ElementGroups
-from ..effects.shell_components import COMPONENTS
+from ..effects.element_groups import COMPONENTS, ElementGroups
 from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties

@@ -3,10 +3,9 @@
 import scipy.sparse as sp
 
 from ..effects.calibration_parameters import random_field
-from ..effects.discretisation import MeshError, Places, mesh_errors, modal_discrepancy
 from ..effects.effect import Effect
-from ..effects.fold_bending import fold_bending
-from ..effects.model_families import model_families
+from ..effects.joint_stiffness import model_families
+from ..effects.model_errors import MeshError, Places, fold_bending, mesh_errors, modal_discrepancy
 from ..fem.assemble import Structure
 from ..fem.modelled import Modelled
 from ..reduced.reduced_problem import ReducedProblem

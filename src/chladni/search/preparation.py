@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.calibration_parameters import defaults
+from ..effects.channels import channel_gain
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
-from ..effects.model_families import joint_nuisances
+from ..effects.joint_stiffness import joint_nuisances
 from ..effects.registry import catalogue, family
-from ..effects.sensor_fault import channel_gain
 from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
 from ..effects.weld_patch import PATCHES, weld_patch
 from ..ema.identification import Identified, equalised, identify

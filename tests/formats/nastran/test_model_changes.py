@@ -9,11 +9,12 @@ from tests.builders.refusals import says
 
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.element_groups import element_groups
-from chladni.effects.orthotropic_material import orthotropic
-from chladni.effects.points import with_masses, with_springs
+from chladni.effects.orthotropy import orthotropic
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.ground_springs import with_springs
+from chladni.model.point_masses import with_masses
 from chladni.model.properties import Anisotropic, BeamSection, Isotropic, Part
 from chladni.units import UNITS
 from chladni_specimens.plates import folded_panel, plate

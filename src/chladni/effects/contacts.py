@@ -1,22 +1,28 @@
-"""Two sheets that almost touch in the model and do touch in reality."""
+"""Two sheets that almost touch in the model and do touch in reality.
+
+The motion of a spring between two sheets is that between two averages at one point. Each average is
+the best rigid motion of the nearby grids of one sheet. Between two different points a rigid
+rotation would load the spring.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
+from ..fem.average import average_rows
 from ..geometry.clearance import all_gaps
 from ..geometry.folds import smooth_points
 from ..geometry.sampling import farthest_point_sample
-from ..model.assembly import Assembly
+from ..model.added_points import next_id, with_points
+from ..model.assembly import Assembly, Average, appended
+from .attachments import AtPoints, strength
 from .effect_context import ElementGrids
 from .family import Article, Family
-from .points import AtPoints, strength
 from .search_context import Candidate, SearchContext, best_places, valleys
-from .sheet_pairs import SheetPairs
 
 MEDIAN, SD = 2e4, 2.0  # [N/m], sd of ln
 STARTS = (-2.0, 0.0, 2.0)
@@ -27,17 +33,75 @@ FOLLOWED = 2
 
 
 @dataclass(frozen=True, eq=False)
+class SheetPairs:
+    """Places at which two sheets face each other."""
+
+    middle: np.ndarray  # (k, 3) places [m], unit vectors of the relative motion
+    along: np.ndarray  # (k, 3) places [m], unit vectors of the relative motion
+    # rows of the attached grids in either sheet for each place, three at least
+    sides: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def __len__(self) -> int:
+        return len(self.sides)
+
+    def relative_rows(self, built: Structure) -> sp.csr_array:
+        """Rows (k, n): motion of the second sheet relative to the first along the direction."""
+        bare, ends = self.tied(replace(built.assembly, axes=None, rigid=()))
+        means = average_rows(bare, np.arange(len(bare.rigid)))
+        where = (means.dof[means.row], means.on)
+        n = 6 * len(bare.points)
+        G = sp.csr_array((means.factor, where), shape=(n, n))[:, : built.T.shape[0]]
+        k = len(ends)
+        first, second = (
+            sp.csr_array(
+                (
+                    self.along.ravel(),
+                    (np.repeat(np.arange(k), 3), (6 * end[:, None] + np.arange(3)).ravel()),
+                ),
+                shape=(k, n),
+            )
+            for end in ends.T
+        )
+        return sp.csr_array((second - first) @ G @ built.T)
+
+    def tied(self, assembly: Assembly, on: np.ndarray | None = None) -> tuple[Assembly, np.ndarray]:
+        """Add both ends of springs at some places (default all); return also their rows (k, 2)."""
+        at = np.arange(len(self)) if on is None else on
+        grown, rows = with_points(assembly, np.repeat(self.middle[at], 2, axis=0))
+        first, T = next_id(assembly), (1, 2, 3)
+        carriers = [grids for k in at for grids in self.sides[k]]
+        means = tuple(
+            Average(first + j, int(row), T, tuple((int(g), T, 1.0) for g in grids))
+            for j, (row, grids) in enumerate(zip(rows, carriers, strict=True))
+        )
+        turns = np.array([(r, c) for r in rows for c in (4, 5, 6)], dtype=np.int64).reshape(-1, 2)
+        supports = np.concatenate([grown.supports, turns])
+        grown = replace(grown, rigid=(*grown.rigid, *means), supports=supports)
+        return grown, rows.reshape(-1, 2)
+
+    def gripped(self, assembly: Assembly, k: np.ndarray) -> Assembly:
+        """Add springs k (k,) [N/m] along the directions, where k is positive."""
+        on = np.flatnonzero(k > 0)
+        grown, ends = self.tied(assembly, on)
+        e = self.along[on]
+        z = np.cross(e, np.eye(3)[np.abs(e).argmin(axis=1)])
+        z /= np.linalg.norm(z, axis=1, keepdims=True)
+        stiffness = np.zeros((len(on), 6))
+        stiffness[:, 0] = k[on]
+        new = appended(
+            grown.bushes, ids=next_id(grown) + np.arange(len(on)), nodes=ends,
+            frame=np.stack([e, np.cross(z, e), z], axis=1), place=self.middle[on],
+            stiffness=stiffness,
+        )  # fmt: skip
+        return replace(grown, bushes=new)
+
+
+@dataclass(frozen=True, eq=False)
 class ClosePlaces(SheetPairs):
-    """Places where two sheets nearly touch, away from joints; ``along`` is across the gap.
+    """Places where two sheets nearly touch, away from joints; ``along`` is across the gap."""
 
-    Attributes
-    ----------
-    grids : (k,) int               ids of their grids on the first sheet
-    sheets : names of both sheets at each place
-    """
-
-    grids: np.ndarray
-    sheets: tuple[tuple[str, str], ...]
+    grids: np.ndarray  # (k,) int ids of their grids on the first sheet
+    sheets: tuple[tuple[str, str], ...]  # names of both sheets at each place
 
     def only(self, which: Sequence[int]) -> "ClosePlaces":
         """A selection of the places."""
@@ -55,11 +119,10 @@ class ContactStiffness(AtPoints):
     name = "contact-stiffness"
     claim = "two sheets touch where the model has a gap"
 
-    place: ClosePlaces | None = None
+    place: ClosePlaces = field(kw_only=True)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CBUSH between two RBE3 at the place."""
-        assert self.place is not None
         return self.place.gripped(assembly, np.array([self.parameters[0].value(x[0])]))
 
 
@@ -120,7 +183,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
         return best_places(context, chosen, FOLLOWED, extended=True)
     places = ElementGrids(
         np.array([e.grids[0] for e in effects]),
-        np.array([e.place.along[0] for e in effects if e.place is not None]),
+        np.array([e.place.along[0] for e in effects]),
         points,
         sp.csr_array(sp.vstack([e.rows for e in effects])),
         np.full(len(effects), -1),

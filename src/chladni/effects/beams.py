@@ -1,7 +1,7 @@
 """Beams along a line of grids that the model lacks, with a section of unknown size."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, Self
 
 import numpy as np
@@ -23,23 +23,16 @@ class BeamLine(Effect):
     """K + r² K_A + r⁴ K_I and M likewise, r the size of the section over that of ``section``.
 
     Areas grow with r² and second moments of area with r⁴. The first parameter is the size.
-
-    Attributes
-    ----------
-    section : of r = 1
-    up : (3,) or None   direction of plane 1
-    offset : (3,)       place of the beams from their grids [m]
-    length : of the line [m]
-    operators : K_A, K_I, M_A and M_I with their powers of r
     """
 
     traits = Traits(elastic=True)
 
-    section: BeamSection | None = None
-    up: tuple[float, float, float] | None = None
+    section: BeamSection = field(kw_only=True)  # of r = 1
+    up: tuple[float, float, float] | None = None  # (3,) or None direction of plane 1
+    # (3,) place of the beams from their grids [m]
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    length: float = 0.0
-    operators: tuple[Operator, ...] = ()
+    length: float = 0.0  # of the line [m]
+    operators: tuple[Operator, ...] = ()  # K_A, K_I, M_A and M_I with their powers of r
 
     @classmethod
     def along(
@@ -47,7 +40,7 @@ class BeamLine(Effect):
         text: str, tried: int = 1, up: tuple[float, float, float] | None = None,
         offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> Self:  # fmt: skip
-        """Beams along a line of grids of the deck.
+        """Beams along a line of grids of the deck; the section has areas and second moments only.
 
         Parameters
         ----------
@@ -57,11 +50,6 @@ class BeamLine(Effect):
         text : where it is, in words
         tried : number of places tried, this one included
         up, offset : see :func:`..model.added_beams.with_beam_line`
-
-        Raises
-        ------
-        ModelError
-            If the section has more than areas and second moments, or the line is none.
         """
         s, plain = section, _of_area(section)
         if s != replace(plain, I1=s.I1, I2=s.I2, I12=s.I12, J=s.J):
@@ -105,13 +93,11 @@ class BeamLine(Effect):
 
     def weight(self, x: np.ndarray) -> Weight:
         """ρ A L."""
-        assert self.section is not None
         (r, slope), m = self.size(x), self.section.material.rho * self.section.area * self.length
         return Weight(m * r**2, 2 * m * r * slope * np.eye(len(x))[0])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write the beams, with a property of their own."""
-        assert self.section is not None
         made = sized(self.section, self.size(x)[0])
         return with_beam_line(assembly, self.grids, made, self.up, self.name, self.offset)
 

@@ -1,4 +1,10 @@
-"""Discretisation errors: the mesh of the deck and the formulation of its elements."""
+"""Errors of the model: the mesh of the deck, the formulation of its elements, its folds.
+
+Bending stiffness at folds differs between meshes, codes and tools. A radius of 5 mm is a sharp edge
+between shells of 20 mm. One solver makes solids of shells and ties their ends at an edge rigidly;
+another lets them rotate. A bead smaller than a shell is missing from the deck. Membrane and mass
+are the same in all of them.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,10 +16,14 @@ import scipy.sparse as sp
 from ..dynamics.modes import ModalModel
 from ..fem.assemble import Structure
 from ..fem.modelled import Modelled, modelled
+from ..geometry.facets import cell_areas
+from ..geometry.folds import share_at_folds
 from ..geometry.footprints import on_smaller_shells, regions_of_joints
 from ..geometry.refine import refined
 from ..model.assembly import Assembly
+from .calibration_parameters import LogField
 from .effect import Effect, ModalFactor, Parameter, ShapeChange, Term, Traits
+from .element_groups import ElementGroups
 
 MOST_DOFS = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
 LARGE = 20_000  # dofs from which refined modes are solved only up to the comparison limit
@@ -22,6 +32,8 @@ LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyon
 MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
 FOOTPRINT = 0.5, 0.7  # prior of the footprint error: as in the deck, half or a quarter as wide
 REGIONS = 4  # regions of joints with their own footprints; each needs one refined solution
+FOLDS = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
+LEAST_SHARE = 0.02  # share at folds, in groups that have folds, below which a part has no factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,22 +41,17 @@ class MeshError(Effect):
     """Modal stiffness Λ^½ e^{x L} Λ^½: that of a mesh twice as fine at x = 1.
 
     Relative errors are extrapolated, not differences, so no mode loses all of its stiffness.
-
-    Attributes
-    ----------
-    rows : (k, n)              coordinates of the modes of the deck
-    omega : (k,) [rad/s]
-    log : (k, k)               L
-    shapes : (p, k)            change of motion at the measured places by each coordinate
     """
 
     name = "mesh-error"
     claim = "the mesh is not infinitely fine"
     kind = "nuisance"
 
+    # (k, n) coordinates of the modes of the deck
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    omega: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    log: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    omega: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (k,) [rad/s]
+    log: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (k, k) L
+    # (p, k) change of motion at the measured places by each coordinate
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def terms(self, x: np.ndarray) -> tuple[Term, ...]:
@@ -232,3 +239,32 @@ def modal_discrepancy(
 def _flexible(modes: ModalModel, f_max: float) -> ModalModel:
     keep = modes.frequency > 1e-3 * f_max
     return ModalModel(modes.frequency[keep], modes.damping[keep], modes.shapes[:, keep], modes.dofs)
+
+
+class FoldBending(LogField):
+    """A factor e^(x s) on the bending stiffness of one part, s the share of a group at folds."""
+
+    name = "fold-bending"
+    claim = "a fold is stiffer or softer in bending than shells joined at an angle"
+    kind = "nuisance"
+    traits = Traits(writable=False)
+
+
+def fold_bending(groups: ElementGroups) -> list[FoldBending]:
+    """One factor for every part of shells that has a fold."""
+    assembly = groups.structure.assembly
+    cells, points = assembly.shells.nodes, assembly.points
+    if not len(cells):
+        return []
+    area, of = cell_areas(points, cells), groups.group[: len(cells)]
+    folded = np.bincount(of, area * share_at_folds(points, cells), len(groups))
+    share = folded / np.maximum(np.bincount(of, area, len(groups)), np.finfo(float).tiny)
+    out = []
+    for k in np.unique(groups.part[groups.sheet]):
+        own = np.where((groups.part == k) & groups.sheet, share, 0.0)
+        if own @ groups.area > LEAST_SHARE * groups.area[own > 0].sum():
+            name = assembly.parts[k].name
+            unknown = Parameter("k", "-", 0.0, FOLDS, step=0.3)
+            text = f"bending at folds of {name}"
+            out.append(FoldBending((unknown,), text, quantity="bending", functions=own[:, None]))
+    return out

@@ -1,4 +1,4 @@
-"""A mass or a spring at an unknown place, which a fit may move.
+"""Masses and springs at points: at known grids, or at an unknown place that a fit may move.
 
 Between grids the motion of the sheet is interpolated by moving least squares with quadratic
 polynomials (Lancaster and Salkauskas 1981, Math. Comp. 37, 141-158), so that a fit can use its
@@ -6,10 +6,10 @@ slope. On a line of beams the place moves along the line; the second parameter o
 inactive and stays at its prior. The place stays within the grids: it is clipped to their range.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,33 +20,71 @@ from .effect_context import EffectContext, ElementGrids
 from .estimate import Estimate, Location, in_mm
 from .search_context import Candidate, SearchContext, best_places, valleys
 
+NOTHING = -30.0  # ln of a strength over its median that is as good as zero
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
 FAR = 0.75  # of a patch's size, beyond which the patch is centred again on the fitted place
 _FLAT = 1e-6  # of a patch's size: grids with a smaller extent lie on a line
 STEP = 1e-4  # of the local mesh size, for the slope of the interpolation weights
+CLOSER = 60  # grids tried round each of the best places
+TRIED = 40  # places that are evaluated one by one if only natural frequencies are known
+
+
+def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
+    """A log-normal strength with median ``scale``."""
+    return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts, nominal=NOTHING)
+
+
+@dataclass(frozen=True, eq=False)
+class AtPoints(Effect):
+    """Σ_k c s_k b_kᵀ b_k at fixed rows b: one strength c = scale · e^x, in shares s."""
+
+    matrix: ClassVar[Literal["K", "M"]] = "K"
+
+    rows: sp.csr_array = field(kw_only=True)  # (k, n)
+    # (m,) k/m rows one after another have one share
+    shares: np.ndarray = field(default_factory=lambda: np.ones(1))
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """The strength on every row."""
+        each = np.repeat(self.shares, self.rows.shape[0] // len(self.shares))
+        c = self.parameters[0].value(x[0]) * each
+        return (PointTerm(self.matrix, self.rows, c, c[:, None]),)
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Grids round a start, in the tangent plane, or on its line of beams.
+    """Grids round a start, in the tangent plane, or on its line of beams."""
 
-    Attributes
-    ----------
-    grids : (k,) int          ids
-    flat : (k, 2)             places in the tangent plane, the start is the origin [m]
-    plane : (2, 3)            its axes; along a line of beams the second is zero
-    origin : (3,) [m]
-    rows : d lists            rows of the structure at these grids, one (k, n) per direction
-    size : float              typical distance of neighbours [m]
-    """
+    grids: np.ndarray  # (k,) ids
+    flat: np.ndarray  # (k, 2) places in the tangent plane, the start is the origin [m]
+    plane: np.ndarray  # (2, 3) its axes; along a line of beams the second is zero
+    origin: np.ndarray  # (3,) [m]
+    rows: tuple[sp.csr_array, ...]  # of the structure at these grids, (k, n) for each direction
+    size: float  # typical distance of neighbours [m]
 
-    grids: np.ndarray
-    flat: np.ndarray
-    plane: np.ndarray
-    origin: np.ndarray
-    rows: tuple[sp.csr_array, ...]
-    size: float
+    @classmethod
+    def about(cls, where: EffectContext, k: int, directions: np.ndarray) -> Self:
+        """The neighbours of the k-th grid in the same face of a sheet, or on its line of beams."""
+        spots = where.grids
+        d = spots.point - spots.point[k]
+        if spots.line[k] < 0:
+            mine = _in_face(where, spots.normal[k])
+            plane, neighbours = np.stack(tangents(spots.normal[k])), NEIGHBOURS
+        else:
+            mine = np.zeros(len(spots), bool)
+            mine[np.unique(spots.grids, return_index=True)[1]] = True
+            mine &= np.isin(spots.grids, spots.grids[spots.line == spots.line[k]])
+            plane, neighbours = np.stack([spots.along[k], np.zeros(3)]), NEIGHBOURS // 2
+        distance = np.where(mine, np.linalg.norm(d, axis=1), np.inf)
+        near = np.argsort(distance, kind="stable")[:neighbours]
+        near = near[np.isfinite(distance[near])]
+        size = float(distance[near][1 : 5 if spots.line[k] < 0 else 3].mean())
+        rows = tuple(
+            where.groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
+            for axis in directions
+        )
+        return cls(spots.grids[near], d[near] @ plane.T, plane, spots.point[k], rows, size)
 
     def inside(self, at: np.ndarray) -> np.ndarray:
         """A place of the plane, clipped to the range of the grids (2,)."""
@@ -58,9 +96,8 @@ class Patch:
         if not self.plane[1].any():
             d[:, 1] = 0.0
         w = np.exp(-(d**2).sum(axis=1) / 1.8)
-        P = np.stack(
-            [np.ones(len(d)), d[:, 0], d[:, 1], d[:, 0] ** 2, d[:, 0] * d[:, 1], d[:, 1] ** 2], 1
-        )
+        u, v = d.T
+        P = np.stack([np.ones(len(d)), u, v, u**2, u * v, v**2], 1)
         A = (P.T * w) @ P + 1e-9 * np.eye(6)
         return np.asarray(np.linalg.solve(A, (P.T * w))[0])
 
@@ -90,28 +127,56 @@ class Patch:
         return self._weighted(change / apart if apart else 0.0 * change)
 
 
+def _in_face(where: EffectContext, normal: np.ndarray) -> np.ndarray:
+    """Grids of shells that face a direction, or that border on a shell which does (k,) bool.
+
+    The normal of a grid on a fold is that of neither face, yet both faces reach as far as the fold.
+    """
+    spots, assembly = where.grids, where.groups.structure.assembly
+    cells = assembly.shells.nodes
+    facing = np.abs(cell_normals(assembly.points, cells) @ normal) > FACING
+    bordering = np.isin(spots.grids, assembly.ids[np.unique(cells[facing])])
+    return ((np.abs(spots.normal @ normal) > FACING) | bordering) & (spots.line < 0)
+
+
 @dataclass(frozen=True, eq=False)
 class MovableAttachment(Effect):
     """x = (ln strength, place along both axes of the patch in units of its size, others)."""
 
-    patch: Patch | None = None
+    matrix: ClassVar[Literal["K", "M"]] = "K"
+
+    patch: Patch = field(kw_only=True)
     direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    matrix = "K"
+
+    @classmethod
+    def at_grid(
+        cls, where: EffectContext, k: int, unknown: Parameter, directions: np.ndarray,
+        others: Sequence[Parameter] = (), **more: Any,
+    ) -> Self:  # fmt: skip
+        """The effect near the k-th of ``where.grids``: its strength, its place, other unknowns.
+
+        One step of a fit moves the place by about a mesh size.
+        """
+        place = [Parameter(n, "m", 0.0, 1.5, kind="linear", step=0.7) for n in ("along", "across")]
+        grid, (x, y, z) = int(where.grids.grids[k]), where.grids.point[k].tolist()
+        return cls(
+            (unknown, *place, *others), f"at grid {grid}", grids=(grid,), point=(x, y, z),
+            trials_factor=len(where.places), patch=Patch.about(where, k, directions), **more,
+        )  # fmt: skip
+
+    def placed(self, x: np.ndarray) -> tuple[sp.csr_array, dict[int, sp.csr_array]]:
+        """Rows at the place, one per direction (d, n), and their slopes by its two parameters."""
+        at, size = self.patch.size * x[1:3], self.patch.size
+        return self.patch.at(at), {1 + k: self.patch.slope(at, k) * size for k in range(2)}
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """One strength in every direction, at the place."""
-        assert self.patch is not None
-        at = self.patch.size * x[1:3]
-        rows = self.patch.at(at)
+        rows, moving = self.placed(x)
         c = np.full(rows.shape[0], self.parameters[0].value(x[0]))
-        gradient = np.zeros((len(c), 3))
-        gradient[:, 0] = c
-        moving = {1 + k: self.patch.slope(at, k) * self.patch.size for k in range(2)}
-        return (PointTerm("M" if self.matrix == "M" else "K", rows, c, gradient, moving),)
+        return (PointTerm(self.matrix, rows, c, np.outer(c, np.eye(3)[0]), moving),)
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """Rows of the grids next to the start, so that the place may move."""
-        assert self.patch is not None
         nearest = np.argsort((self.patch.flat**2).sum(axis=1))[:7]
         return sp.csr_array(sp.vstack([rows[nearest] for rows in self.patch.rows]))
 
@@ -129,7 +194,6 @@ class MovableAttachment(Effect):
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """The place in the basic frame (3,) [m]."""
-        assert self.patch is not None
         return self.patch.origin + self.patch.inside(self.patch.size * x[1:3]) @ self.patch.plane
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
@@ -138,7 +202,6 @@ class MovableAttachment(Effect):
 
     def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The fitted place, and its 95 % radius [m], at least the mesh size."""
-        assert self.patch is not None
         point, grid = tuple(float(v) for v in self.at(x)), self.nearest(x)
         text = f"near grid {grid} ({in_mm(point)} mm)"
         far = 1.0 if sd is None else max(self._reach(x, sd), 1.0)
@@ -152,7 +215,6 @@ class MovableAttachment(Effect):
         beams, or the edge of a fold) it is 1.96 times the standard deviation. An axis counts only
         if the fit ended within the grids, because beyond them the place is fixed.
         """
-        assert self.patch is not None
         at, size = self.patch.size * x[1:3], self.patch.size
         moves = np.ptp(self.patch.flat, axis=0) > _FLAT * size
         times = np.sqrt(5.99) if moves.all() else 1.96
@@ -161,7 +223,6 @@ class MovableAttachment(Effect):
 
     def nearest(self, x: np.ndarray) -> int:
         """Id of the grid nearest to the place."""
-        assert self.patch is not None
         d = self.patch.flat - self.patch.size * x[1:3]
         return int(self.patch.grids[np.argmin((d**2).sum(axis=1))])
 
@@ -186,87 +247,32 @@ def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate |
     return None if again is None else Candidate(*again, context.bases[-1])
 
 
-def moved(strength: Parameter) -> tuple[Parameter, ...]:
-    """Parameters of strength and place; one step of a fit moves the place by about a mesh size."""
-    place = [Parameter(n, "m", 0.0, 1.5, kind="linear", step=0.7) for n in ("along", "across")]
-    return (replace(strength), *place)
-
-
-def there(where: EffectContext, k: int) -> dict[str, Any]:
-    """Fields of an effect near the k-th of ``where.grids``."""
-    grid, (x, y, z) = int(where.grids.grids[k]), where.grids.point[k]
-    point = float(x), float(y), float(z)
-    tried = len(where.places)
-    return {"text": f"at grid {grid}", "grids": (grid,), "point": point, "trials_factor": tried}
-
-
-def _in_face(where: EffectContext, normal: np.ndarray) -> np.ndarray:
-    """Grids of shells that face a direction, or that border on a shell which does (k,) bool.
-
-    The normal of a grid on a fold is that of neither face, yet both faces reach as far as the fold.
-    """
-    spots, assembly = where.grids, where.groups.structure.assembly
-    cells = assembly.shells.nodes
-    facing = np.abs(cell_normals(assembly.points, cells) @ normal) > FACING
-    bordering = np.isin(spots.grids, assembly.ids[np.unique(cells[facing])])
-    return ((np.abs(spots.normal @ normal) > FACING) | bordering) & (spots.line < 0)
-
-
-def patch(where: EffectContext, k: int, directions: np.ndarray) -> Patch:
-    """The neighbours of the k-th grid in the same face of the sheet, or on its line of beams."""
-    spots = where.grids
-    d = spots.point - spots.point[k]
-    if spots.line[k] < 0:
-        mine = _in_face(where, spots.normal[k])
-        plane, neighbours = np.stack(tangents(spots.normal[k])), NEIGHBOURS
-    else:
-        mine = np.zeros(len(spots), bool)
-        mine[np.unique(spots.grids, return_index=True)[1]] = True
-        mine = np.isin(spots.grids, spots.grids[spots.line == spots.line[k]]) & mine
-        plane, neighbours = np.stack([spots.along[k], np.zeros(3)]), NEIGHBOURS // 2
-    distance = np.where(mine, np.linalg.norm(d, axis=1), np.inf)
-    near = np.argsort(distance, kind="stable")[:neighbours]
-    near = near[np.isfinite(distance[near])]
-    next_ones = distance[near][1 : 5 if spots.line[k] < 0 else 3]
-    size = float(next_ones.mean())
-    rows = tuple(
-        where.groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
-        for axis in directions
-    )
-    return Patch(spots.grids[near], d[near] @ plane.T, plane, spots.point[k], rows, size)
-
-
-CLOSER = 60  # grids tried round each of the best places
-TRIED = 40  # places that are evaluated one by one if only natural frequencies are known
-
-
 def attachments(
-    context: SearchContext, near: Callable[[EffectContext, int], MovableAttachment], matrix: str,
-    strengths: np.ndarray, known: Sequence[float] = (),
+    context: SearchContext, kind: type[MovableAttachment], strengths: np.ndarray,
+    known: Sequence[float] = (),
 ) -> list[Candidate]:  # fmt: skip
     """The two best places about each baseline, by exact re-analysis at every place.
 
     Parameters
     ----------
-    near : makes the effect at a grid
-    strengths : [kg] for "M" or [N/m] for "K"
+    strengths : [kg] of masses or [N/m] of springs
     known : strengths suggested by other evidence; the best place of each is followed too
     """
     where = context.where
     grids, places = where.grids, where.places
     if context.scan is None:
         some = places.spread(TRIED)
-        effects = [near(where, grids.position(places.grids[k], places.normal[k])) for k in some]
-        return best_places(context, effects)
+        at = [grids.position(places.grids[k], places.normal[k]) for k in some]
+        return best_places(context, [kind.near(where, k) for k in at])
     scan, out = context.scan, []
 
     def follow(about: int, levels: np.ndarray, k: int) -> None:
         """Add the best grid round a place, with the best strength there."""
         closer = around(grids, places, k)
-        finer = scan.point_scores(about, matrix, levels, closer)
+        finer = scan.point_scores(about, kind.matrix, levels, closer)
         best, level = np.unravel_index(np.argmin(finer), finer.shape)
         k_best = grids.position(closer.grids[best], closer.normal[best])
-        effect, c = near(where, k_best), levels[level]
+        effect, c = kind.near(where, k_best), levels[level]
         start = np.array([p.mean for p in effect.parameters])
         start[0] = np.log(c / effect.parameters[0].scale)
         out.append(Candidate(effect, start, context.bases[about]))
@@ -274,7 +280,7 @@ def attachments(
     chosen: list[int] = []
     unknown = len(strengths)
     for about in range(len(context.bases)):
-        score = scan.point_scores(about, matrix, np.append(strengths, known))
+        score = scan.point_scores(about, kind.matrix, np.append(strengths, known))
         for k in valleys(score[:, :unknown].min(axis=1), places.point, chosen, 2):
             chosen.append(k)
             follow(about, strengths, k)

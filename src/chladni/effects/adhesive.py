@@ -28,9 +28,8 @@ from .effect import MatrixTerm, Parameter, Rise, Traits
 from .estimate import Estimate, Location, Remarks
 from .family import Article, Family
 from .identified_damping import LEVEL_SD, IdentifiedDamping, paired_with
-from .joint_stiffness import JointStiffness
+from .joint_stiffness import JointFamilies, JointStiffness, joint_families
 from .joints import Connection, beads, joined, stiffness, with_factor_on
-from .model_families import JointFamilies, joint_families
 from .search_context import Candidate, SearchContext, best_places
 
 SD = 3.0  # of ln of the factor on E
@@ -74,18 +73,14 @@ class AdhesiveStiffness(JointStiffness):
 
 @dataclass(frozen=True, eq=False)
 class ViscoelasticJoint(JointStiffness):
-    """K + e^x G(a) K_joint G(a) - K_joint, a = (2/π) arctan η; ζ_j + η/2 times the joint's share.
-
-    Attributes
-    ----------
-    band : from the first flexible mode of the deck to the highest spectral line [Hz]
-    """
+    """K + e^x G(a) K_joint G(a) - K_joint, a = (2/π) arctan η; ζ_j + η/2 times its share."""
 
     name = "viscoelastic-joint"
     claim = "a joint is compliant and dissipates: its modulus is complex and rises with frequency"
     # the damping of the modes supports only one such effect
     traits = Traits(rounds=2, own_loads=True, lone=True, level=2)
 
+    # from the first flexible mode of the deck to the highest spectral line [Hz]
     band: tuple[float, float] = (1.0, 1.0)
 
     @property
@@ -187,13 +182,7 @@ def modulus_of(assembly: Assembly, bead: Connection) -> float | None:
 def softened_bead(
     assembly: Assembly, rng: np.random.Generator, ln_factor: tuple[float, float]
 ) -> tuple[Connection, float, float]:
-    """Draw a bead to conceal, the factor on its E from a range of its logarithm, and E [Pa].
-
-    Raises
-    ------
-    ModelError
-        If there is no bead.
-    """
+    """Draw a bead to conceal, the factor on its E from a range of its logarithm, and E [Pa]."""
     found = beads(structure(assembly))
     if not found:
         raise ModelError("the structure has no bead of adhesive")

@@ -1,4 +1,4 @@
-"""A weld or a fastener that is softer than in the deck, or missing.
+"""Welds, fasteners and rigid ties that are softer than in the deck, or missing.
 
 A weld of a deck is a thousand times stiffer than the sheets around it. Its stiffness w hardly
 affects the structure until it falls to that of the sheets, z. Hence prior and name depend on the
@@ -6,9 +6,14 @@ softness s = z/(w + z), which static responses give. With a share s of its stiff
 carries half of its load; with e^-3 s it carries nearly none and is missing. With e^3 s it carries
 nearly all. More than that is not a property of a weld, but another patch of sheet that it holds,
 which the mesh determines.
+
+An RBE2 is rigid; a clip, a screwed flange or a bearing is not. The search uses a model with a
+spring k_0 in every tie, far stiffer than the sheets round it
+(:func:`.rigid_ties.on_firm_springs`). A compliant tie has k in series with k_0 instead. The rest is
+as for a weld of reduced stiffness.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,12 +21,12 @@ from ..errors import ModelError
 from ..fem.assemble import structure
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from .effect import Parameter, Traits
+from .effect import MatrixTerm, Parameter, Traits
 from .estimate import Estimate, Remarks
 from .family import Article, Family
-from .joint_stiffness import Fastener
+from .joint_stiffness import Fastener, JointFamilies, joint_families
 from .joints import MOST_RUN, Connection, fasteners, with_factor_on, with_family, without_joint
-from .model_families import JointFamilies, joint_families
+from .rigid_ties import RigidTie, firmly_held, rigid_ties, sprung
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
 
 NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
@@ -38,6 +43,10 @@ REFINED = 3  # runs whose ends are moved
 RUNS_FOLLOWED = 2, 1  # about the deck's own model, where a gap is sharper, and the calibrated one
 FAMILY_OF = {"solids": "welds", "bushes": "bushes"}  # the nuisance that scales all of a kind
 NEEDS = "welds, screws or bushes between sheets or beams"
+TIE_SD = 2.0  # of ln k about the stiffness of the sheets at the tie
+TIE_STARTS = tuple(np.arange(-4.0, 4.0).tolist())  # a factor e² off, the right tie looks wrong
+RIGID = 60.0  # ln of k over its median that is as good as rigid
+TIES_BY_POLES, TIES_FOLLOWED = 12, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +76,7 @@ class WeldCompliance(Fastener):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Remaining share of the joint's stiffness."""
-        low, here, high = (self.left(x[0] + k * 1.96 * self.widened(sd)[0])[0] for k in (-1, 0, 1))
-        return (Estimate("K", here, "of the deck's", low, high),)
+        return (self.estimate(x, sd, lambda y: self.left(y[0])[0]),)
 
     def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
         """A missing weld, where the joint carries nearly no load."""
@@ -227,7 +235,7 @@ def _run(
     return FastenerRun(float(score[k]), last - first + 1, loose.joint, loose.share, k)
 
 
-def candidates(context: SearchContext) -> list[Candidate]:
+def softer(context: SearchContext) -> list[Candidate]:
     """Softer welds, screws and bushes."""
     return proposed(WeldCompliance, context)
 
@@ -238,20 +246,14 @@ def missing(context: SearchContext) -> list[Candidate]:
 
 
 def drawn(article: Article, rng: np.random.Generator) -> Connection:
-    """A random fastener of the article.
-
-    Raises
-    ------
-    ModelError
-        If there is none.
-    """
+    """A random fastener of the article."""
     found = fasteners(structure(article.assembly))
     if not found:
         raise ModelError("the structure has no weld, screw or bush")
     return found[int(rng.integers(len(found)))]
 
 
-def conceal(article: Article, rng: np.random.Generator) -> Article:
+def _loosen(article: Article, rng: np.random.Generator) -> Article:
     """Leave 1e-5 to 1e-4 of the stiffness of a fastener: it carries about half of its load."""
     joint = drawn(article, rng)
     f = float(10 ** rng.uniform(-5, -4))
@@ -259,25 +261,115 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     return article.with_hidden(made, {"K": f}, joint.point)
 
 
-def remove(article: Article, rng: np.random.Generator) -> Article:
+def _remove(article: Article, rng: np.random.Generator) -> Article:
     """Remove a fastener."""
     joint = drawn(article, rng)
     return article.with_hidden(without_joint(article.assembly, joint), {"K": 0.0}, joint.point)
 
 
-FAMILY = Family(
+COMPLIANCE = Family(
     WeldCompliance,
-    conceal,
-    candidates=candidates,
+    _loosen,
+    candidates=softer,
     cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBAR", "CBAR", "PBUSH", "CBUSH"),
     settled_by="tap on both sides of the joint with a small hammer, and test a coupon of it",
     needs=NEEDS,
 )
 MISSING = Family(
     WeldMissing,
-    remove,
+    _remove,
     candidates=missing,
     cards=("MAT1", "CHEXA", "CPENTA", "CTETRA", "CBAR", "CBUSH", "PBUSH"),
     settled_by="inspect that joint, and test it by ultrasound or a chisel",
     needs=NEEDS,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class OverConstraint(Fastener):
+    """K - K_j / (1 + k/k_0), K_j = k_0 bᵀb the firm spring in the tie: k and k_0 in series."""
+
+    name = "over-constraint"
+    claim = "a joint is compliant where the model has a rigid tie"
+    traits = Traits(rounds=1)
+
+    tie: RigidTie | None = None
+    firm: float = 1.0
+
+    def left(self, x: float) -> float:
+        """Remaining share of the firm spring, k / (k + k_0)."""
+        return 1.0 / (1.0 + self.firm / self.parameters[0].value(x))
+
+    def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """(f - 1) K_j, without a difference of nearly equal numbers."""
+        k = self.parameters[0].value(x[0])
+        lost = 1.0 / (1.0 + k / self.firm)
+        slope = np.array([lost * (1 - lost)])
+        return (MatrixTerm("K", self.operator, -lost, slope, within=self.within),)
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """Write a CBUSH between the tie's independent grid and a new one that leads the others."""
+        assert self.tie is not None
+        return sprung(assembly, self.tie, self.parameters[0].value(x[0]))
+
+
+def over_constraint(
+    assembly: Assembly, joint: Connection, share: np.ndarray, tried: int
+) -> OverConstraint:
+    """The effect of the tie with a given firm spring, one of ``tried`` ties.
+
+    Parameters
+    ----------
+    share : (r,)   z/(k_0 + z) of the spring's rows, z the stiffness of the sheets in series
+    """
+    tie, firm = firmly_held(assembly, int(joint.elements[0]))
+    z = firm * float(np.exp(np.log(share / (1 - np.minimum(share, 0.999))).mean()))
+    unknown = Parameter("K", "N/m", 0.0, TIE_SD, z, step=1.0, starts=TIE_STARTS, nominal=RIGID)
+    effect = OverConstraint.of(
+        joint, (unknown,), f"rigid tie {joint.where}", tried, "", {}, "", tie=tie, firm=firm
+    )
+    return replace(effect, point=tuple(assembly.points[tie.lead].tolist()))
+
+
+def ties(context: SearchContext) -> list[Candidate]:
+    """The rigid ties whose compliance explains most, by exact re-analysis from each base."""
+    every = context.fasteners
+    at = [k for k, (joint, _) in enumerate(every) if joint.rigid]
+    if not at:
+        return []
+    built = context.where.groups.structure
+    effects = [over_constraint(built.assembly, *every[k], len(at)) for k in at]
+    if context.scan is None:
+        some = farthest_point_sample(np.array([e.point for e in effects]), TIES_BY_POLES)
+        chosen = [effects[k] for k in some]
+        return best_places(context, chosen, TIES_FOLLOWED, anywhere=True, extended=True)
+    left = np.ones((len(every), len(TIE_STARTS)))
+    left[at] = [[e.left(x) for x in TIE_STARTS] for e in effects]
+    out: dict[int, Candidate] = {}
+    for about, base in reversed(tuple(enumerate(context.bases))):
+        score = context.scan.fastener_scores(about, left)[at]
+        best = np.argsort(score.min(axis=1)).tolist()
+        for k in [k for k in best if k not in out][:TIES_FOLLOWED]:
+            out[k] = Candidate(effects[k], np.array([TIE_STARTS[int(np.argmin(score[k]))]]), base)
+    return list(out.values())
+
+
+def _release(article: Article, rng: np.random.Generator) -> Article:
+    """Give a rigid tie of the article a stiffness of 30 to 1000 N/mm."""
+    ties = rigid_ties(article.assembly)
+    if not ties:
+        raise ModelError("the structure has no rigid elements except those of its fasteners")
+    tie = ties[int(rng.integers(len(ties)))]
+    k = float(10 ** rng.uniform(4.5, 6.0))
+    made = sprung(article.assembly, tie, k)
+    return article.with_hidden(made, {"K": k}, article.assembly.points[tie.lead])
+
+
+TIE = Family(
+    OverConstraint,
+    _release,
+    candidates=ties,
+    cards=("GRID", "RBE2", "CBUSH", "PBUSH"),
+    settled_by="tap on both sides of the tie with a small hammer, and compare their motion",
+    needs="rigid elements (RBE2, RBAR) except those at fasteners",
 )
