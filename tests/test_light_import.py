@@ -32,7 +32,7 @@ HEAVY = {
     "scipy.optimize",
     "scipy.spatial",
 }
-OURS = {"planning", "bench", "studies", "specimens", "evidence", "envs"}
+OURS = {"planning", "bench", "studies", "specimens", "contract", "evidence", "envs"}
 MOST = {  # modules of ours and of SciPy that a command loads for its --help, a tenth to spare
     "": (20, 0),
     "check": (430, 207),

@@ -11,7 +11,7 @@ import pytest
 from chladni.effects import registry
 from chladni.effects.family import Family
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni_evidence.effect_ground import GROUNDS
+from chladni_contract.effect_ground import GROUNDS
 from chladni_specimens import jointed_plates, tied_plates
 
 

@@ -38,7 +38,7 @@ from chladni.model.assembly import Assembly
 from chladni.model.free_parameter import FreeParameter
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni_evidence.effect_rules import (
+from chladni_contract.effect_rules import (
     ActingEffect,
     acts,
     exact_slopes,
@@ -47,7 +47,7 @@ from chladni_evidence.effect_rules import (
     survives_pickling,
     symmetric_operators,
 )
-from chladni_evidence.family_rules import weighed, written
+from chladni_contract.family_rules import weighed, written
 from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below

@@ -14,7 +14,7 @@ from chladni.errors import AccuracyError, LabelError
 from chladni.io.nastran import write_assembly
 from chladni.model.point_masses import with_masses
 from chladni.model.properties import BeamSection
-from chladni_evidence.effect_check import PROPOSES, RULES, checked_rules
+from chladni_contract.effect_check import PROPOSES, RULES, checked_rules
 from chladni_specimens import STEEL, folded_panel
 
 from .conftest import example
@@ -220,7 +220,7 @@ def test_an_invisible_effect_is_said_to_be_so(on_plate, stringer):
         made = with_masses(article.assembly, (article.assembly.ids[0],), 1e-6)
         return article.with_hidden(made, {"a": 3e-3})
 
-    from chladni_evidence.effect_visibility import visibility
+    from chladni_contract.effect_visibility import visibility
 
     loud, faint = (visibility(f, on_plate) for f in (stringer, replace(stringer, conceal=thin)))
     assert loud.scatter == faint.scatter > 0

@@ -10,9 +10,9 @@ from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.point_mass import PointMass
 from chladni.reduced.reduced_model import evaluate
-from chladni_evidence.effect_check import RULES
-from chladni_evidence.effect_ground import usual_grounds
-from chladni_evidence.family_rules import tried
+from chladni_contract.effect_check import RULES
+from chladni_contract.effect_ground import usual_grounds
+from chladni_contract.family_rules import tried
 
 FLEXIBLE = slice(6, 12)
 NAMES = (*(family.name for family in registry.BUILT_IN), "edge-mass")
