@@ -8,7 +8,7 @@ from pathlib import Path
 
 from chladni import errors
 
-SOURCE = Path(__file__).parents[1] / "src"
+SOURCES = tuple(Path(__file__).parents[1] / name for name in ("src", "evidence"))
 GAP = "…"  # stands for what the sentence fills in: a file, a line, a name, a number
 _ROOMS = {  # what a sentence without its own cure is about, by the room that says it
     "io.nastran": "correct the deck at the named line; [Nastran cards](cards.md) says how",
@@ -20,6 +20,7 @@ _ROOMS = {  # what a sentence without its own cure is about, by the room that sa
     "chladni_planning": "[Planning a test](../tutorials/planning.md) shows a valid call",
     "chladni_studies": "[Parameter studies](../studies.md) list the forms",
     "chladni_bench": "[The virtual bench](../bench.md) lists excitations and settings",
+    "chladni_contract": "[Extending](../extending.md) states the rules that every effect keeps",
     "chladni_evidence": "[The blind benchmark](../blind.md) states what each step needs",
     "chladni_specimens": "[Generated structures](../specimens.md) lists sizes and options",
     "effects": "[Effects](effects.md) lists what each needs",
@@ -59,10 +60,11 @@ class Sentence:
         return _ROOMS.get(self.room) or _ROOMS.get(self.room.split(".")[0], _REST)
 
 
-def sentences(source: Path = SOURCE) -> list[Sentence]:
-    """Every refusal of the source, by room and text, equal ones once."""
+def sentences(*sources: Path) -> list[Sentence]:
+    """Every refusal of the sources (default: ours), by room and text, equal ones once."""
     found = {
         Sentence(_room(path.relative_to(source)), kind, text)
+        for source in sources or SOURCES
         for path in source.rglob("*.py")
         for kind, text in _made(ast.parse(path.read_text(encoding="utf-8")))
     }

@@ -18,7 +18,7 @@ import effect_signatures
 import error_sentences
 import numpy as np
 
-from chladni_evidence.effect_ground import GROUNDS, EffectGround, usual_grounds
+from chladni_contract.effect_ground import GROUNDS, EffectGround, usual_grounds
 
 ROOT = Path(__file__).parents[1]
 SIGNATURES = "signatures"  # folder of the pictures of the effects

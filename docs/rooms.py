@@ -1,4 +1,7 @@
-"""Draws docs/rooms.png: every room on its floor, from the imports as they are now."""
+"""Draws docs/rooms.png: every room on its floor, from the imports as they are now.
+
+A line is left out where other lines lead from the one room to the other.
+"""
 
 import ast
 from collections import defaultdict
@@ -18,8 +21,10 @@ GROUND = {
     "parallel",
     "results",
     "extensions",
+    "arguments",
+    "own_folder",
 }
-COLOUR = {False: "#f4efe6", True: "#dfe9f2"}  # a room of chladni; a package that builds on it
+ROOM, PACKAGE, PROOF = "#f4efe6", "#dfe9f2", "#e2f0dc"  # in chladni; on it; not in the wheel
 
 
 def room(name: tuple[str, ...]) -> str | None:
@@ -32,7 +37,7 @@ def room(name: tuple[str, ...]) -> str | None:
 def needs() -> dict[str, set[str]]:
     """Which rooms every room imports from."""
     out: dict[str, set[str]] = defaultdict(set)
-    for base in (ROOT / "src", ROOT / "envs"):
+    for base in (ROOT / "src", ROOT / "envs", ROOT / "evidence"):
         for path in base.rglob("*.py"):
             own = path.relative_to(base).with_suffix("").parts
             here = room(own)
@@ -58,8 +63,21 @@ def floors(rooms: dict[str, set[str]]) -> dict[str, int]:
     return level
 
 
+def below(room: str, rooms: dict[str, set[str]]) -> set[str]:
+    """Every room that a room uses, itself or through another."""
+    used = rooms.get(room, set())
+    return used.union(*(below(r, rooms) for r in used))
+
+
+def colour(room: str) -> str:
+    """The colour of a box."""
+    if room == "chladni_evidence":
+        return PROOF
+    return PACKAGE if room.startswith("chladni_") else ROOM
+
+
 def main() -> None:
-    """One box a room, arrows down to what it uses on the next floors."""
+    """One box a room, lines down to what it uses."""
     rooms = needs()
     level = floors(rooms)
     by_floor: dict[int, list[str]] = defaultdict(list)
@@ -67,14 +85,16 @@ def main() -> None:
         by_floor[k].append(name)
     figure, axes = plt.subplots(figsize=(10, 9))
     at = {
-        n: ((j + 1) / (len(row) + 1), k) for k, row in by_floor.items() for j, n in enumerate(row)
+        n: ((j + 1) / (len(row) + 1) + 0.05 * (k % 3 - 1), k)
+        for k, row in by_floor.items()
+        for j, n in enumerate(row)
     }
-    for name, below in rooms.items():
-        for other in below:
+    for name, used in rooms.items():
+        for other in used - set().union(*(below(r, rooms) for r in used)):
             (x0, y0), (x1, y1) = at[name], at[other]
-            axes.plot([x0, x1], [y0 - 0.2, y1 + 0.2], color="0.8", lw=0.7, zorder=0)
+            axes.plot([x0, x1], [y0 - 0.2, y1 + 0.2], color="0.6", lw=0.9, zorder=0)
     for name, (x, y) in at.items():
-        box = {"boxstyle": "round", "fc": COLOUR[name.startswith("chladni_")]}
+        box = {"boxstyle": "round", "fc": colour(name)}
         axes.text(x, y, name, ha="center", va="center", bbox=box)
     axes.set_axis_off()
     axes.set_ylim(-0.6, max(level.values()) + 0.6)

@@ -150,7 +150,7 @@ BUGS = (
         "nxt = np.minimum(j + 1, n - 1)", "tests/specimens/test_holed.py",
     ),
     DeliberateBug(  # a wrong name counts as found
-        "src/chladni_evidence/blind_power.py", "if r[\"times\"] == times], NAMED))",
+        "evidence/chladni_evidence/blind_power.py", "if r[\"times\"] == times], NAMED))",
         "if r[\"times\"] == times], (*NAMED, \"wrong\")))", "tests/evidence/test_blind_power.py",
     ),
     DeliberateBug(  # a score that counts what the start brought

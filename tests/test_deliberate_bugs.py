@@ -14,7 +14,17 @@ import pytest
 from tests.deliberate_bugs import BUGS
 
 ROOT = Path(__file__).parents[1]
-TREE = ("src", "envs", "meshes", "tests", "docs", "conftest.py", "pyproject.toml", "README.md")
+TREE = (
+    "src",
+    "envs",
+    "evidence",
+    "meshes",
+    "tests",
+    "docs",
+    "conftest.py",
+    "pyproject.toml",
+    "README.md",
+)
 FAILED = 1  # of pytest: tests ran, and some failed
 
 
@@ -41,7 +51,7 @@ def test_the_text_of_a_bug_stands_once(bug):
 def test_the_suite_fails_on_it(bug, tree):
     sound = (tree / bug.file).read_text(encoding="utf-8")
     (tree / bug.file).write_text(sound.replace(bug.old, bug.new), encoding="utf-8")
-    path = os.pathsep.join(str(tree / name) for name in ("src", "envs"))
+    path = os.pathsep.join(str(tree / name) for name in ("src", "envs", "evidence"))
     env = {**os.environ, "PYTHONPATH": path}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", bug.tests]
     try:

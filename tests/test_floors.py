@@ -8,7 +8,7 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from chladni.cli.app import BUILT_IN
+from chladni.cli.app import BUILT_IN, OF_CHECKOUT
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = {  # every package of ours and where its source is
@@ -17,7 +17,8 @@ PACKAGES = {  # every package of ours and where its source is
     "chladni_bench": ROOT / "src",
     "chladni_studies": ROOT / "src",
     "chladni_specimens": ROOT / "src",
-    "chladni_evidence": ROOT / "src",
+    "chladni_contract": ROOT / "src",
+    "chladni_evidence": ROOT / "evidence",
     "chladni_envs": ROOT / "envs",
 }
 GROUND = {
@@ -49,6 +50,7 @@ CHLADNI = MAY_IMPORT["report"] | {"report"}  # all but its commands
 MAY_IMPORT["chladni_planning"] = MAY_IMPORT["chladni_studies"] = CHLADNI
 MAY_IMPORT["chladni_bench"] = CHLADNI | {"chladni_planning"}
 MAY_IMPORT["chladni_specimens"] = CHLADNI | {"chladni_planning"}
+MAY_IMPORT["chladni_contract"] = CHLADNI | {"chladni_bench", "chladni_specimens"}
 MAY_IMPORT["chladni_evidence"] = CHLADNI | {
     "chladni_planning", "chladni_bench", "chladni_specimens"
 }  # fmt: skip
@@ -114,7 +116,11 @@ def entry_points():
 
 MODULES = {module(p) for p in SOURCES}
 FRONTS = {name: front(name) for name in PACKAGES}
-COMMANDS = {("chladni", "cli", name) for name in BUILT_IN} | entry_points()["chladni.commands"]
+COMMANDS = (
+    {("chladni", "cli", name) for name in BUILT_IN}
+    | {tuple(name.split(".")) for name in OF_CHECKOUT.values()}
+    | entry_points()["chladni.commands"]
+)
 
 
 @cache

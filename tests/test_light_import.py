@@ -14,7 +14,7 @@ HEAVY = {
     "distributed", "SALib", "xarray", "pandas", "plotly", "dask", "control", "sdynpy", "emcee",
     "scipy.stats", "scipy.signal", "scipy.optimize", "scipy.spatial",
 }  # fmt: skip
-OURS = {"planning", "bench", "studies", "specimens", "evidence", "envs"}
+OURS = {"planning", "bench", "studies", "specimens", "contract", "evidence", "envs"}
 MOST = {  # modules of ours and of SciPy that a command loads for its --help, a tenth to spare
     "": (20, 0),
     "check": (430, 207),

@@ -87,7 +87,7 @@ def stopped(monkeypatch):
     monkeypatch.setattr("chladni.workflows.diagnose.diagnose_states", reached)
     monkeypatch.setattr("chladni.workflows.calibrate.diagnose_states", reached)
     monkeypatch.setattr("chladni_bench.bench_workflow._tested", reached)
-    monkeypatch.setattr("chladni_evidence.effect_check.ground_of", reached)
+    monkeypatch.setattr("chladni_contract.effect_check.ground_of", reached)
 
 
 def case_of(call):

@@ -52,7 +52,7 @@ _LATER = {  # public name: module that holds it, loaded at the first use
     "WorkingModel": ".workflows.working_model",
     "calibrate": ".workflows.calibrate",
     "check": ".workflows.case_check",
-    "check_effect": "chladni_evidence",
+    "check_effect": "chladni_contract",
     "correlate": ".workflows.correlate",
     "diagnose": ".workflows.diagnose",
     "evaluate_recordings": ".workflows.evaluation",
@@ -114,7 +114,7 @@ if _typing.TYPE_CHECKING:
     from .report import result_views as _result_views  # noqa: F401  loaded by _show_later
     from chladni_bench import BenchSettings as BenchSettings
     from chladni_bench import virtual_test as virtual_test
-    from chladni_evidence import check_effect as check_effect
+    from chladni_contract import check_effect as check_effect
     from chladni_planning import PlanSettings as PlanSettings
     from chladni_planning import plan as plan
     from chladni_studies import StudySettings as StudySettings

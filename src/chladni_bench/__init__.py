@@ -23,6 +23,7 @@ from .bench_workflow import BenchResult as BenchResult
 from .bench_workflow import BenchSettings as BenchSettings
 from .bench_workflow import virtual_test as virtual_test
 from .benched_article import benched as benched
+from .benched_article import dissipated as dissipated
 from .benched_article import true_places as true_places
 from .cords import RUBBER as RUBBER
 from .cords import THESIS as THESIS
@@ -30,6 +31,12 @@ from .cords import Cord as Cord
 from .cords import cord as cord
 from .noisy_frf import MeasurementChain as MeasurementChain
 from .noisy_frf import recorded as recorded
+from .part_scatter import Draw as Draw
+from .part_scatter import Scales as Scales
+from .part_scatter import decades_apart as decades_apart
+from .part_scatter import recognisable as recognisable
+from .part_scatter import scaled_parts as scaled_parts
+from .part_scatter import scattered_parts as scattered_parts
 from .pole_model import PoleModel as PoleModel
 from .sine_schedule import TABLE_3 as TABLE_3
 from .sine_schedule import Stage as Stage
@@ -57,20 +64,27 @@ __all__ = [
     "BenchTest",
     "Channels",
     "Cord",
+    "Draw",
     "MeasurementChain",
     "PoleModel",
+    "Scales",
     "Stage",
     "bench_rig",
     "benched",
     "channels_of",
     "cord",
+    "decades_apart",
+    "dissipated",
     "drawn_article",
     "drawn_gains",
     "dwells_of",
     "fitted",
     "level_for",
+    "recognisable",
     "record",
     "recorded",
+    "scaled_parts",
+    "scattered_parts",
     "stage_lines",
     "stages_for",
     "stepped_sine_time",

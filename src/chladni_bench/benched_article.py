@@ -100,7 +100,7 @@ def benched(
     f, zeta = whole.frequency.copy(), np.full(r, REST)
     f[: len(modes)][rigid_modes(modes)] = 0.0
     zeta[: len(modes)] = drawn_damping(scatter, len(modes), rng)
-    zeta = zeta + _dissipated(built, phi, f)
+    zeta = zeta + dissipated(built, phi, f)
     return BenchArticle(
         name="A", weight=mass_properties(assembly)[0], frequency=f, damping=zeta,
         outputs=felt @ phi, mounts=(moved @ phi).reshape(n, 3, r), drive=drive @ phi,
@@ -163,7 +163,7 @@ def cord_directions(assembly: Assembly, hangers: Sequence[int]) -> np.ndarray:
     return np.asarray(np.linalg.eigh(spread.T @ spread)[1][:, 1])
 
 
-def _dissipated(built: Structure, phi: np.ndarray, f: np.ndarray) -> np.ndarray:
+def dissipated(built: Structure, phi: np.ndarray, f: np.ndarray) -> np.ndarray:
     """ζ_r of dashpots, φᵀVφ/2ω, and of losses, (φᵀK_loss φ/ω² + g)/2, of every mode (r,)."""
     omega = np.maximum(2 * np.pi * f, 2 * np.pi * 0.1)
     out = np.full(len(f), built.assembly.structural_damping / 2)

@@ -55,3 +55,17 @@ def test_a_command_that_cannot_be_used_is_one_sentence(bells, capsys, fault):
     assert "the package bells offers the command" in text
     assert said in text
     assert text.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [["blind", "run", "x"], ["blind"]])
+def test_a_wheel_says_where_the_evidence_lives(monkeypatch, capsys, words):
+    """`blind` is of a checkout: a wheel does not list it, and refuses it in one sentence."""
+    monkeypatch.setattr(app, "_is_there", lambda module: False)
+    monkeypatch.setattr(sys, "argv", ["chladni", *words])
+    with pytest.raises(SystemExit) as ended:
+        app.main()
+    assert ended.value.code == 2
+    text = capsys.readouterr().err
+    assert "blind lives in evidence/ of the source" in text
+    assert text.count("\n") == 1
+    assert "blind" not in app.commands()

@@ -19,7 +19,7 @@ from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Assembly
 from chladni.reduced.reduced_model import Reduced, evaluate
 from chladni.reduced.reduced_problem import ReducedProblem, reduced_problem
-from chladni_evidence.effect_ground import GROUNDS
+from chladni_contract.effect_ground import GROUNDS
 from chladni_specimens import jointed_plates, plate, tied_plates
 
 

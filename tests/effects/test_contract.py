@@ -29,10 +29,10 @@ from chladni.model.free_parameter import FreeParameter
 from chladni.model.point_masses import with_masses
 from chladni.model.properties import BeamSection
 from chladni.reduced.reduced_model import evaluate
-from chladni_evidence import effect_check
-from chladni_evidence.effect_check import PROPOSES, RULES, checked_rules
-from chladni_evidence.effect_ground import TOP, usual_grounds
-from chladni_evidence.effect_rules import (
+from chladni_contract import effect_check
+from chladni_contract.effect_check import PROPOSES, RULES, checked_rules
+from chladni_contract.effect_ground import TOP, usual_grounds
+from chladni_contract.effect_rules import (
     ActingEffect,
     acts,
     exact_slopes,
@@ -41,8 +41,8 @@ from chladni_evidence.effect_rules import (
     survives_pickling,
     symmetric_operators,
 )
-from chladni_evidence.effect_visibility import visibility
-from chladni_evidence.family_rules import tried, weighed, written
+from chladni_contract.effect_visibility import visibility
+from chladni_contract.family_rules import tried, weighed, written
 from chladni_specimens import STEEL, folded_panel
 
 from .conftest import EXAMPLES, FLEXIBLE, full, installed_examples

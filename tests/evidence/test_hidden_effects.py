@@ -9,6 +9,7 @@ from chladni.effects.hems import hem_lines
 from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
 from chladni.model.ground_springs import with_ground_bushes
+from chladni_bench.part_scatter import WELDS, decades_apart, scattered_parts
 from chladni_evidence.article_modes import article_modes
 from chladni_evidence.bench_of_structure import panel_bench
 from chladni_evidence.held_kinds import HELD
@@ -27,8 +28,7 @@ from chladni_evidence.joint_kinds import SOFTEST, hem, hem_stretch, viscoelastic
 from chladni_evidence.mesh_transfer import Spots, mesh_transfer, still_there
 from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
 from chladni_evidence.pair_kinds import APART, HEMS, HIDDEN, PAIRS, catalogued, together
-from chladni_evidence.part_scatter import WELDS, scattered
-from chladni_evidence.response_of_article import Coupling, accelerance, decades_apart, seen
+from chladni_evidence.response_of_article import Coupling, accelerance, seen
 from chladni_specimens.forms import FORMS
 from chladni_specimens.plates import folded_panel
 from chladni_specimens.tailgate.design import TailgateDesign
@@ -279,7 +279,7 @@ def test_scatter_is_as_wide_as_it_says():
     a = FORMS["lidded box"].made(0)
     E, welds = [], []
     for seed in range(200):
-        drawn, scales = scattered(a, np.random.default_rng(seed))
+        drawn, scales = scattered_parts(a, np.random.default_rng(seed))
         E.append([np.log(scales[n][q]) for n in ("box", "lid") for q in ("E", "t")])
         one = [p for p in drawn.parts if p.name == WELDS][1]
         welds.append(np.log(one.section.material.E / 210e9))

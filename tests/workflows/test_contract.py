@@ -30,7 +30,7 @@ WORKFLOW = {  # command: the function it calls
     "check": "chladni.workflows.case_check.check",
     "study": "chladni_studies.study",
     "blind": "chladni_evidence.blind_run.run",
-    "check-effect": "chladni_evidence.check_effect",
+    "check-effect": "chladni_contract.check_effect",
     "specimen": "chladni_specimens.tailgate_specimen",
     "report": "chladni.report.page.write_page",
 }

@@ -57,7 +57,7 @@ def test_every_type_of_result_has_a_view():
     own = {name for name, package in packages.items() if package == "chladni"}
     assert own == {*_PAGES, full_name(DiagnosisResult)}
     others = sorted(package for package in packages.values() if package != "chladni")
-    assert others == ["chladni_bench", "chladni_evidence", "chladni_planning", "chladni_studies"]
+    assert others == ["chladni_bench", "chladni_contract", "chladni_planning", "chladni_studies"]
 
 
 @pytest.mark.parametrize("command", MADE)

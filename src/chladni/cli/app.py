@@ -42,6 +42,7 @@ BUILT_IN = (  # each a module here with a function ``run``, or ``STEPS`` of a co
     "render",
     "report",
 )
+OF_CHECKOUT = {"blind": "chladni_evidence.blind_command"}  # evidence/: no wheel holds it
 DONE, FAILED, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 1, 2, 3, 130
 _EVERY = {  # options that every command takes
     "verbose": (
@@ -136,6 +137,7 @@ def commands() -> dict[str, str | ModuleType]:
     here = [e for e in entry_points(group=GROUP) if e.dist and e.dist.name == "chladni"]
     own: dict[str, str | ModuleType] = {name: f"{__package__}.{name}" for name in BUILT_IN}
     own |= {entry.name: entry.value for entry in sorted(here, key=lambda e: e.name)}
+    own |= {name: module for name, module in OF_CHECKOUT.items() if _is_there(module)}
     return own | installed(
         GROUP,
         "command",
@@ -144,6 +146,11 @@ def commands() -> dict[str, str | ModuleType]:
         own,
         but=here,
     )
+
+
+def _is_there(module: str) -> bool:
+    """True if the package of a module can be imported."""
+    return find_spec(module.partition(".")[0]) is not None
 
 
 def _said_by_source(name: str) -> str:
@@ -164,9 +171,14 @@ def _said_by_source(name: str) -> str:
 
 def main() -> None:
     """Run the command line; a package whose command cannot be used is one sentence."""
-    words = [word for word in sys.argv[1:] if not word.startswith("-")]
+    first = next((word for word in sys.argv[1:] if not word.startswith("-")), "")
     try:
-        run = application(words[0] if words else "")
+        if first in OF_CHECKOUT and not _is_there(OF_CHECKOUT[first]):
+            raise FileError(
+                f"the command {first} lives in evidence/ of the source, which the installed "
+                "package leaves out; run it in a checkout (pip install --editable .)"
+            )
+        run = application(first)
     except ChladniError as error:
         raise SystemExit(_said(error, AT_FAULT)) from None
     run()

@@ -297,7 +297,7 @@ class Effect:
 
         With prior sd_0 the data have the precision 1/sd² - 1/sd_0². Model error reduces this
         precision and leaves the prior unchanged. Hence no result is wider than its prior. Values
-        of a calibration are known as well as Laplace says (``chladni_evidence.interval_evidence``).
+        of a calibration are known as well as Laplace says (``chladni_evidence intervals``).
         """
         prior = np.array([p.sd for p in self.parameters])
         if self.kind == "calibration":

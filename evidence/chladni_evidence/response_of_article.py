@@ -68,9 +68,3 @@ def accelerance(
             phi_out @ np.linalg.solve(Z, np.broadcast_to(phi_in.T, (len(Z), *phi_in.T.shape)))
         )
     return np.concatenate(out) * s[:, None, None] ** 2
-
-
-def decades_apart(one: np.ndarray, other: np.ndarray) -> float:
-    """Root mean square of |log10 (H_1 / H_2)| over all lines and channels, phase included."""
-    ratio = np.log(one / other)
-    return float(np.sqrt(np.mean(np.abs(ratio) ** 2)) / np.log(10))

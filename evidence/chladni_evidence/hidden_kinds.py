@@ -14,10 +14,10 @@ from chladni.geometry.facets import cell_areas, cell_normals, unit
 from chladni.model.assembly import Assembly
 from chladni.model.ground_springs import with_ground_bushes
 from chladni.model.properties import Isotropic, Orthotropic, Part, ShellSection
+from chladni_bench import scaled_parts
 
 from .hidden import Hidden, Site, near_outputs, with_lumps
 from .mesh_transfer import nearest_rows
-from .part_scatter import scaled
 from .response_of_article import Coupling
 
 STEEP = 0.95  # cosine between normal and material axis above which a shell keeps its own axis
@@ -34,7 +34,9 @@ def calibration(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A change of E of one part by 6 to 12 % at size 1."""
     part = site.part(rng)
     factor = float(np.exp(rng.choice([-1, 1]) * rng.uniform(0.06, 0.12) * size))
-    return Hidden(scaled(site.article, {part: {"E": factor}}), {"part": part, "value": factor})
+    return Hidden(
+        scaled_parts(site.article, {part: {"E": factor}}), {"part": part, "value": factor}
+    )
 
 
 def point_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:

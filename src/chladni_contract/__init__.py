@@ -1,4 +1,4 @@
-"""Evidence: concealed cases made, diagnosed blindly and scored; effects against their contract."""
+"""The contract of effects: the rules that every effect keeps, checked in seconds."""
 
 from . import effect_check_views as effect_check_views
 from .effect_check import EffectCheck as EffectCheck

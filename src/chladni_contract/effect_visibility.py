@@ -4,17 +4,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.frf import transfer
+from chladni.dynamics.residual import with_residual_vectors
 from chladni.effects.family import Article, Family
+from chladni.fem.assemble import structure
+from chladni_bench import decades_apart, dissipated, fitted, recognisable, scattered_parts
 
-from .article_modes import article_modes
-from .bench_of_structure import ZETA
 from .effect_ground import EffectGround
-from .made_case import COARSE, FULL, TWICE
-from .part_scatter import scattered
-from .response_of_article import accelerance, decades_apart
 
 DRAWS = 3  # of the effect
 LOWEST = 0.1  # of the highest frequency of interest: lowest line
+LINES = 250
+ABOVE = 1.6  # modes reach up to this many times the highest line
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class Visibility:
     ----------
     moved : by each draw [rms decades]
     scatter : by another article of the same drawing [rms decades]
-    due : change from which a case of the blind evidence counts the effect as recognisable
+    due : change from which the effect can be recognised
     """
 
     moved: tuple[float, ...]
@@ -42,29 +44,31 @@ def visibility(family: Family, ground: EffectGround) -> Visibility:
     """Compare articles with the effect, as ``conceal`` draws it, with one without.
 
     The change is the root mean square of |Δ log10 H| over lines and sensors, at the damping of an
-    article. The scatter is that of E and t by 1 % in every part. A change is seen from twice the
-    scatter on, or from twice ``FULL`` where that is less (:func:`chladni_evidence.made_case`).
+    article. The scatter is that of E and t by 1 % in every part. A change is seen where it is
+    :func:`chladni_bench.recognisable`.
     """
     plain = ground.article
     base = _responses(ground, plain)
-    other, _ = scattered(plain.assembly, np.random.default_rng(1))
+    other, _ = scattered_parts(plain.assembly, np.random.default_rng(1))
     scatter = decades_apart(_responses(ground, replace(plain, assembly=other)), base)
     concealed = [family.conceal(plain, np.random.default_rng(seed)) for seed in range(DRAWS)]
     moved = [decades_apart(_responses(ground, article), base) for article in concealed]
-    return Visibility(tuple(moved), scatter, TWICE * min(scatter, FULL))
+    return Visibility(tuple(moved), scatter, recognisable(scatter))
 
 
 def _responses(ground: EffectGround, article: Article) -> np.ndarray:
     """Accelerance of an article at the sensors, with its gains (n_f, n_out, 1)."""
-    plain, made, known = ground.article, article.assembly, ground.reduced.grids
+    plain, known, built = ground.article, ground.reduced.grids, structure(article.assembly)
     assert plain.drive is not None
-    at = [known.position(int(grid)) for grid in plain.outputs]
-    out = made.rows(plain.grids_at(plain.outputs))
-    drive = made.rows(plain.grids_at(np.array([plain.drive[0]])))
+    grid, direction = plain.drive
+    at = [known.position(int(g)) for g in plain.outputs]
+    felt = built.along(np.array(plain.grids_at(plain.outputs)), known.normal[at])
+    driven = built.along(np.array(plain.grids_at(np.array([grid]))), np.array([direction]))
     top = ground.reduced.f_max
-    modes = article_modes(made, out, drive, top)
-    phi_out = np.einsum("kir,ki->kr", modes.at(out), known.normal[at])
-    phi_in = np.einsum("kir,i->kr", modes.at(drive), np.array(plain.drive[1]))
-    zeta = np.full(len(modes.frequency), ZETA)
-    lines = np.linspace(LOWEST * top, top, COARSE)
-    return accelerance(modes, phi_out, phi_in, zeta, lines) * article.gains[:, None]
+    modes = normal_modes(built.system, band=ABOVE * top)
+    modes = with_residual_vectors(built.system, modes, driven.T.toarray())
+    lost = dissipated(built, modes.shapes, modes.frequency)
+    modes = replace(modes, damping=fitted().damping + lost)
+    s = 2j * np.pi * np.linspace(LOWEST * top, top, LINES)
+    H = transfer(modes, felt @ modes.shapes, driven @ modes.shapes, s) * s[:, None, None] ** 2
+    return np.asarray(H * article.gains[:, None])

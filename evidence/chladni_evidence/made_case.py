@@ -21,7 +21,16 @@ from chladni.model.assembly import Assembly
 from chladni.model.properties import BeamSection, ShellSection
 from chladni.output import write_json, write_text
 from chladni.units import units
-from chladni_bench import AccelerometerType, MeasurementChain, drawn_gains, recorded
+from chladni_bench import (
+    AccelerometerType,
+    Draw,
+    MeasurementChain,
+    decades_apart,
+    drawn_gains,
+    recognisable,
+    recorded,
+    scattered_parts,
+)
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import ZETA, Bench
@@ -41,13 +50,10 @@ from .mesh_transfer import Spots, still_there
 from .outside_kinds import OUTSIDE
 from .package_kinds import package_kinds
 from .pair_kinds import members, together
-from .part_scatter import Draw, scattered
-from .response_of_article import accelerance, decades_apart, seen
+from .response_of_article import accelerance, seen
 
 KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE, **JOINTS, **HELD}
 UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # kinds without a size
-TWICE = 2.0  # least change of responses by an effect, over that by scatter
-FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
 NOTHING = 0.02  # an effect that changes less is a bad draw [rms decades]
 NEAR_SIZE, FAR_SIZE, STEP = 0.1, 0.25, 5.0  # ln of a change: near enough, too far; growth a try
 GROWTH, TRIES, COARSE = 1.5, 5, 250  # the size is found on about COARSE lines of the band
@@ -107,14 +113,14 @@ class _Rig:
 
 def made_case(
     bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None = None,
-    recorder: Recorder = PLAIN, times: float | None = None, draw: Draw = scattered,
+    recorder: Recorder = PLAIN, times: float | None = None, draw: Draw = scattered_parts,
 ) -> MadeCase:  # fmt: skip
     """Measure an article of one of the bench's meshes, with part scatter and an effect.
 
-    The effect grows (up to fivefold) until it changes the responses over the fitted band enough.
-    The limit is twice the change by scatter, or twice ``FULL`` where that is less.  Both figures
-    (rms decades) are in the truth. With several effects each does so alone, and the figure is the
-    least of them. On CalculiX' mesh our elements give the size, and CalculiX the recording.
+    The effect grows (up to fivefold) until its change of the responses over the fitted band is
+    :func:`chladni_bench.recognisable`. That change and the one by scatter (rms decades) are in the
+    truth. With several effects each does so alone, and the figure is the least of them. On
+    CalculiX' mesh our elements give the size, and CalculiX the recording.
 
     Parameters
     ----------
@@ -231,7 +237,7 @@ def _sized(
         if kind == "nothing":
             return hidden, 0.0, size
         moved = decades_apart(hidden.spoil(rig.responses(hidden, band)[0]), own)
-        if kind in UNSIZED or kind not in KINDS or moved >= TWICE * min(scatter, FULL):
+        if kind in UNSIZED or kind not in KINDS or moved >= recognisable(scatter):
             break
         size *= GROWTH
     if kind not in UNSIZED and moved < NOTHING:

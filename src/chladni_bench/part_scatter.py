@@ -1,4 +1,4 @@
-"""Scatter between articles: E and t of every part, adhesive, every single weld."""
+"""Scatter between articles: E and t of every part, adhesive, every single weld; its size."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,7 +9,6 @@ from chladni.effects.calibration_parameters import scaled_material
 from chladni.model.assembly import Assembly
 from chladni.model.properties import (
     BeamSection,
-    Material,
     Part,
     ShellSection,
     SolidSection,
@@ -17,12 +16,14 @@ from chladni.model.properties import (
 
 PART, ADHESIVE, WELD = 0.01, 0.1, 0.3  # standard deviations of ln E (and of ln t of sheets)
 WELDS = "spot welds"  # part in which every solid is a weld of its own
+TWICE = 2.0  # least change of responses by an effect, over that by scatter
+FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
 
 Scales = dict[str, dict[str, float]]  # {part: {"E": factor, "t": factor}}
 Draw = Callable[[Assembly, np.random.Generator], tuple[Assembly, Scales]]
 
 
-def scattered(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
+def scattered_parts(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
     """Another article of the same drawing, and log-normal factors on E and t of every part.
 
     E and t of a sheet or tube vary by 1 %, E of adhesive by 10 %, of each weld by 30 %.
@@ -35,10 +36,24 @@ def scattered(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, S
             scales[part.name] = {"E": float(E), "t": float(t)}
         elif part.name != WELDS:
             scales[part.name] = {"E": float(np.exp(ADHESIVE * drawn[0]))}
-    return _each_weld(scaled(assembly, scales), rng), scales
+    return _each_weld(scaled_parts(assembly, scales), rng), scales
 
 
-def scaled(assembly: Assembly, scales: Scales) -> Assembly:
+def decades_apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Root mean square of |log10 (H_1 / H_2)| over all lines and channels, phase included."""
+    ratio = np.log(one / other)
+    return float(np.sqrt(np.mean(np.abs(ratio) ** 2)) / np.log(10))
+
+
+def recognisable(scatter: float) -> float:
+    """Change of responses from which an effect can be recognised, over that by scatter [decades].
+
+    It is twice the scatter, or twice ``FULL`` where that is less.
+    """
+    return TWICE * min(scatter, FULL)
+
+
+def scaled_parts(assembly: Assembly, scales: Scales) -> Assembly:
     """The assembly with E and t (of tubes: the wall) of its parts times these factors."""
     parts = tuple(_scaled(p, scales.get(p.name, {})) for p in assembly.parts)
     t = np.array([scales.get(p.name, {}).get("t", 1.0) for p in assembly.parts])
@@ -53,25 +68,17 @@ def _scaled(part: Part, scale: dict[str, float]) -> Part:
         sheet = section.membrane
         assert sheet is not None
         return part.with_section(
-            membrane=stiffer(sheet, E), bending=stiffer(sheet, E), thickness=section.thickness * t
+            membrane=scaled_material(sheet, "E", E),
+            bending=scaled_material(sheet, "E", E),
+            thickness=section.thickness * t,
         )
     if isinstance(section, BeamSection):
         sizes = {name: getattr(section, name) * t for name in ("area", "I1", "I2", "I12", "J")}
-        return part.with_section(material=stiffer(section.material, E), **sizes)
-    return part.with_section(material=stiffer(section.material, E))
+        return part.with_section(material=scaled_material(section.material, "E", E), **sizes)
+    return part.with_section(material=scaled_material(section.material, "E", E))
 
 
-def stiffer(material: Material, factor: float) -> Material:
-    """The material with all its moduli times a factor.
-
-    >>> from chladni.model.properties import Isotropic
-    >>> stiffer(Isotropic(210e9, 0.3, 7850.0), 2.0).E
-    420000000000.0
-    """
-    return scaled_material(material, "E", factor)
-
-
-def with_parts_of_solids(
+def _with_parts_of_solids(
     assembly: Assembly, chosen: np.ndarray, parts: list[Part], kind: int
 ) -> Assembly:
     """Solids ``chosen`` of one family each on a new part of its own; ids follow the last."""
@@ -95,5 +102,5 @@ def _each_weld(assembly: Assembly, rng: np.random.Generator) -> Assembly:
         mine = np.flatnonzero(group.part == p)
         factors = np.exp(WELD * rng.normal(size=len(mine)))
         parts = [_scaled(assembly.parts[p], {"E": float(f)}) for f in factors]
-        assembly = with_parts_of_solids(assembly, mine, parts, kind)
+        assembly = _with_parts_of_solids(assembly, mine, parts, kind)
     return assembly

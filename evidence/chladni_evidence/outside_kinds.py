@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.effects.calibration_parameters import scaled_material
 from chladni.errors import ModelError
 from chladni.geometry.facets import point_normals, tangents
 from chladni.model.assembly import Assembly
@@ -11,7 +12,6 @@ from chladni.model.properties import BeamSection, Part, SolidSection
 
 from .hidden import Hidden, Site, around
 from .hidden_kinds import Kind
-from .part_scatter import stiffer
 from .response_of_article import Coupling
 
 PATCH = 0.06  # radius of rotors' feet and foam, of the structure's size
@@ -103,7 +103,9 @@ def _slipping_solids(a: Assembly, rng: np.random.Generator, soft: float, eta: fl
 
 def _lossy(part: Part, soft: float, eta: float) -> Part:
     assert isinstance(part.section, SolidSection | BeamSection)
-    return part.with_section(material=replace(stiffer(part.section.material, soft), damping=eta))
+    return part.with_section(
+        material=replace(scaled_material(part.section.material, "E", soft), damping=eta)
+    )
 
 
 def duplicated(site: Site, rng: np.random.Generator, size: float) -> Hidden:

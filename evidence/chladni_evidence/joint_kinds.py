@@ -8,11 +8,11 @@ from chladni.effects.hems import HemLine, hem_lines
 from chladni.errors import ModelError
 from chladni.model.assembly import Assembly, Solids
 from chladni.model.properties import Isotropic, SolidSection
+from chladni_bench import scaled_parts
 from chladni_specimens import grip
 
 from .hidden import Hidden, Site
 from .hidden_kinds import Kind
-from .part_scatter import scaled
 
 SOFTEST = 20e9  # [Pa] least E of a weld: softer solids are adhesive
 REDRAWN = np.log(1.5)  # ln of the growth of a size: another weld is drawn for every size
@@ -84,7 +84,7 @@ def adhesive(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     section = a.parts[a.part(name)].section
     sign = -1.0 if _modulus(section) > 1e9 else sign  # a stiffer epoxy layer would change little
     factor = float(np.exp(sign * rng.uniform(3.0, 4.0) * size))
-    made = scaled(a, {name: {"E": factor}})
+    made = scaled_parts(a, {name: {"E": factor}})
     return Hidden(made, {"value": _modulus(section) * factor, "part": name})
 
 
@@ -113,7 +113,7 @@ def viscoelastic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     def law(s: np.ndarray) -> np.ndarray:
         return modulus(s) / there.real - 1
 
-    made = scaled(a, {name: {"E": factor}})
+    made = scaled_parts(a, {name: {"E": factor}})
     k = made.part(name)
     section = made.parts[k].section
     assert isinstance(section, SolidSection)

@@ -1,7 +1,7 @@
 """The contract of effects, second part: a family on a structure, its deck and its bench.
 
 A rule returns the number that it measured, in words, or raises
-:class:`chladni_evidence.effect_rules.BrokenRule`.
+:class:`chladni_contract.effect_rules.BrokenRule`.
 """
 
 import tempfile

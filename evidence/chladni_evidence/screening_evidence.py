@@ -19,13 +19,12 @@ from chladni.ema.setup import Recording
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import Modelled, modelled
 from chladni.inference.channel_screening import against_model
-from chladni_bench import MeasurementChain, recorded
+from chladni_bench import MeasurementChain, recorded, scattered_parts
 from chladni_planning import even_lines
 
 from .article_modes import ArticleModes, article_modes
 from .bench_of_structure import Bench, form_bench, glue_candidates, panel_bench
 from .mesh_transfer import MeshTransfer, Spots, mesh_transfer
-from .part_scatter import scattered
 from .response_of_article import accelerance, seen
 
 STRUCTURES = ("plate", "panel", "ribbed plate", "curved shell", "lidded box", "bonded plates")
@@ -110,7 +109,7 @@ def _article(structure: str, seed: int):  # type: ignore[no-untyped-def]
         else form_bench(structure, seed)
     )
     mesh = "calculix" if structure in ("plate", "panel") else "fine"
-    article, _ = scattered(bench.meshes[mesh](), np.random.default_rng([seed, 5]))
+    article, _ = scattered_parts(bench.meshes[mesh](), np.random.default_rng([seed, 5]))
     return bench, modelled(bench.deck, 1.4 * bench.held[1]), article
 
 

@@ -1,0 +1,1 @@
+"""Evidence: concealed cases made, diagnosed blindly and scored; the thesis retold."""
