@@ -16,6 +16,7 @@ from chladni.cli.run import (
     Driven,
     Kind,
     Out,
+    Pictures,
     Units,
     limits,
     place_of,
@@ -72,6 +73,7 @@ def run(
     ] = None,
     units: Units = None,
     allow: Allow = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Sample parameters: frequencies, mass, responses, Q of every sample, and sensitivities.
@@ -92,21 +94,21 @@ def run(
             source, vary or (), settings, out=place, workers=workers, scheduler=scheduler,
             units=units, allow=allow or (), progress=progress,
         )  # fmt: skip
-    _written(source, place, found)
+    _written(source, place, found, pictures)
 
 
-def _written(source: Path, place: Path, found: ParameterStudy) -> None:
+def _written(source: Path, place: Path, found: ParameterStudy, pictures: bool) -> None:
     """Write the page, the tables and study.json next to the samples."""
     from .study_page import study_page
     from .study_tables import write_netcdf
 
-    with started("study", source, place) as job:
+    with started("study", source, place, pictures=pictures) as job:
         job.json("study.json", to_json(found))
         write_samples(job.keep("samples.csv", "one line per sample"), found.table())
         job.notes += write_netcdf(job.keep("study.nc", "all results, for xarray"), found)
         job.files.append(("samples.jsonl", "the samples in the order they finished"))
         job.progress("pictures", 0.5)
-        job.show(study_page(job.folder, found))
+        job.show(study_page(found))
     if 2 * len(found.failed) > len(found.rows):
         number, why = found.failed[0]
         raise AccuracyError(

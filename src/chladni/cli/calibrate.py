@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..workflows.calibrate import calibrate
-from .run import CaseFolder, Out, diagnosed, opened, started
+from .run import CaseFolder, Out, Pictures, diagnosed, opened, started
 
 
 def run(
@@ -26,6 +26,7 @@ def run(
             help="Draw from the posterior (needs emcee: pip install 'chladni[posterior]').",
         ),
     ] = False,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Fit E, rho and t of the parts, or the case's parameters; write the updated deck and a page.
@@ -37,7 +38,7 @@ def run(
     if variants:
         _variants(source, out)
     else:
-        diagnosed("calibrate", source, out, partial(calibrate, sample=sample))
+        diagnosed("calibrate", source, out, partial(calibrate, sample=sample), pictures)
 
 
 def _variants(source: Path, out: Path | None) -> None:
