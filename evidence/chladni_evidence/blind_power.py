@@ -1,11 +1,14 @@
 """Power of a diagnosis: how often effects of each size are named, and how often none is made up."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from chladni.output import write_json, write_text
-from chladni.view.evaluation_plots import shares_over_size
+from chladni.view.chart import Chart, ChartAxis, Panel, Series
+from chladni.view.chart_png import png
 
 from .blind_score import score
 from .outcome_row import NULLS, Row
@@ -92,7 +95,21 @@ def power(outs: Sequence[Path], say: Callable[[str], object]) -> dict[str, list[
         for name, every in found.items()
         for kind, what in (("named", "named"), ("listed", "named or listed"))
     }
-    shares_over_size(outs[0] / "power.png", curves)
+    png(shares_over_size(curves), outs[0] / "power.png")
     for line in lines:
         say(line)
     return found
+
+
+def shares_over_size(
+    curves: Mapping[str, tuple[Sequence[float], Sequence[float], Sequence[tuple[float, float]]]],
+) -> Chart:
+    """Shares of named effects over their size: {label: (size, share, interval)}."""
+    series = []
+    for name, (size, share, ends) in curves.items():
+        low, high = np.array(ends, dtype=float).T
+        place = np.array(size, dtype=float), np.array(share, dtype=float)
+        series.append(Series(name, *place, "both", dash="dot", ends=(low, high)))
+    x = ChartAxis("size of the effect, times scatter and mesh (0: no effect, false alarms)")
+    y = ChartAxis("share named", limits=(-0.03, 1.03))
+    return Chart.of(Panel(series, x, y, "Power of the diagnosis"), size=(6.4, 4.4))

@@ -9,7 +9,17 @@ from typing import Any
 from chladni.errors import FileError
 from chladni.output import own_version, write_json
 from chladni.progress import Progress, within
-from chladni.report.blocks import Block, Facts, Items, Live, Picture, Section, Table, Text
+from chladni.report.blocks import (
+    Block,
+    Drawing,
+    Facts,
+    Items,
+    Picture,
+    Section,
+    Table,
+    Text,
+    write_pictures,
+)
 
 SETTINGS = "settings.json"
 _BLOCKS = {kind.__name__.lower(): kind for kind in (Text, Items, Facts, Table, Picture)}
@@ -92,7 +102,7 @@ class ChapterStore:
     def keep(self, name: str, chapter: Chapter) -> Chapter:
         """Write a finished chapter; return it as it will be read again."""
         sections = [
-            {"title": s.title, "blocks": [_plain(b) for b in _still(s.blocks)]}
+            {"title": s.title, "blocks": [_plain(b) for b in _still(s.blocks, self.folder)]}
             for s in chapter.sections
         ]
         data = {"lead": chapter.lead, "sections": sections, "numbers": chapter.numbers,
@@ -120,10 +130,14 @@ class ChapterStore:
         return out
 
 
-def _still(blocks: Sequence[Block]) -> Iterator[Block]:
+def _still(blocks: Sequence[Block], folder: Path) -> Iterator[Block]:
     """The blocks, with pictures in place of drawings by the page."""
     for block in blocks:
-        yield from block.pictures if isinstance(block, Live) else (block,)
+        if isinstance(block, Drawing):
+            names = [name for name, _ in write_pictures(folder, [block], True)]
+            yield from (Picture(folder / name, block.caption) for name in names)
+        else:
+            yield block
 
 
 def _plain(block: Block) -> dict[str, Any]:

@@ -14,7 +14,8 @@ from chladni.progress import Progress, within
 from chladni.report.blocks import Block, Items, Picture, Section, Table
 from chladni.report.map_page import map_page
 from chladni.report.words import hertz, number
-from chladni.view import plots
+from chladni.view import charts
+from chladni.view.chart_png import png
 from chladni.workflows.map import map_formed
 from chladni.workflows.working_model import WorkingModel
 from chladni_bench import FREQUENCIES
@@ -36,7 +37,7 @@ def mapping_chapter(desk: Desk, progress: Progress) -> Chapter:
     found = map_formed(model, desk.folder / FORMED, progress=within(progress, 0.0, 0.3))
     assert model.deck is not None
     write_deck(model.deck, desk.folder / MAPPED, found.changes)
-    page = map_page(desk.folder, found)
+    page = map_page(found)
     progress("responses", 0.4)
     mapped = desk.deck(MAPPED)
     before, after = (
@@ -214,4 +215,5 @@ def compared(desk: Desk, name: str, models: Mapping[str, str]) -> Path:
         near = ", next to the shaker" if row == drive else ""
         channels[f"{frf.outputs[row]}{near}"] = curves
     unit = UNIT["accelerance"]
-    return plots.frf_grid(desk.folder / name, channels, unit, excluded=[CORDS], columns=1)
+    chart = charts.responses(channels, f"|H| [{unit}]", [CORDS])
+    return png(chart.grid(columns=1), desk.folder / name)

@@ -6,14 +6,16 @@ import numpy as np
 
 from chladni.dynamics.frf import UNIT
 from chladni.ema.realisation import realised
-from chladni.view import modal_plots, plots
+from chladni.report.identification_page import circles
+from chladni.view import charts
+from chladni.view.chart_png import png
 from chladni_bench import BenchRecording
 
 from .thesis_bench import FACTORS, ThesisTest
 from .thesis_findings import means
 from .thesis_modes import BAND, CORDS, ArticleIdentified
 
-ACCELERANCE = UNIT["accelerance"]
+ACCELERANCE = f"|H| [{UNIT['accelerance']}]"
 _DENSE = 30_000  # lines of a drawn model, so that a circle of 0.4 % damping is round
 _LEVELS = {0.5: "half the level", 2.0: "twice the level"}
 Curve = tuple[np.ndarray, np.ndarray]
@@ -62,7 +64,7 @@ def _cords(path: Path, test: ThesisTest) -> Path:
         }
         for k, a in enumerate(test.articles)
     }
-    return plots.frf_grid(path, channels, ACCELERANCE)
+    return png(charts.responses(channels, ACCELERANCE).grid(), path)
 
 
 def _circles(path: Path, test: ThesisTest, first: ArticleIdentified) -> Path:
@@ -72,7 +74,7 @@ def _circles(path: Path, test: ThesisTest, first: ArticleIdentified) -> Path:
     model, raw = realised(first.whole, "mobility").frf(dense), first.raw.to("mobility")
     rows = (test.subject.drive, _typical(test))
     curves = {_named(test, k): (raw.values[:, k, 0], model.values[:, k, 0]) for k in rows}
-    return modal_plots.nyquist_grid(path, curves, columns=2, wide=4.0)
+    return png(circles(curves).grid(tile=(4.0, 4.1)), path)
 
 
 def _levels(path: Path, test: ThesisTest) -> Path:
@@ -83,14 +85,14 @@ def _levels(path: Path, test: ThesisTest) -> Path:
         _named(test, row): {name: _of(r, row) for name, r in recordings.items()}
         for row in (test.subject.drive, _typical(test))
     }
-    return plots.frf_grid(path, channels, ACCELERANCE, columns=1)
+    return png(charts.responses(channels, ACCELERANCE).grid(columns=1), path)
 
 
 def _articles(path: Path, test: ThesisTest) -> Path:
     """Draw A, B and C by stepped sine, four channels."""
     rows = (test.subject.drive, *(_typical(test, share) for share in (0.25, 0.5, 0.75)))
     channels = {_named(test, row): {r.article: _of(r, row) for r in test.stepped} for row in rows}
-    return plots.frf_grid(path, channels, ACCELERANCE)
+    return png(charts.responses(channels, ACCELERANCE).grid(), path)
 
 
 def _excitations(path: Path, test: ThesisTest) -> Path:
@@ -105,7 +107,8 @@ def _excitations(path: Path, test: ThesisTest) -> Path:
         name: (f, np.sqrt((np.abs(H) ** 2).mean(axis=1)).astype(complex))
         for name, (f, H) in mean.items()
     }
-    return plots.frf_grid(path, {"rms of all channels": rms, **channels}, ACCELERANCE)
+    every = {"rms of all channels": rms, **channels}
+    return png(charts.responses(every, ACCELERANCE).grid(), path)
 
 
 def _state_space(path: Path, row: int, first: ArticleIdentified) -> Path:
@@ -118,4 +121,4 @@ def _state_space(path: Path, row: int, first: ArticleIdentified) -> Path:
         "identified": (f, model.values[:, row, 0]),
     }
     title = f"Tailgate A, {frf.outputs[row]}: recording and identified state space"
-    return plots.frf(path, curves, title, ACCELERANCE, excluded=[CORDS])
+    return png(charts.responses({title: curves}, ACCELERANCE, [CORDS]).at(title), path)

@@ -13,7 +13,8 @@ from chladni.report.blocks import Block, Facts, Items, Picture, Section, Table, 
 from chladni.report.sentence import sentence
 from chladni.report.words import hertz, number, quantity
 from chladni.units import units
-from chladni.view import plots
+from chladni.view import charts
+from chladni.view.chart_png import png
 from chladni.workflows.diagnose import diagnose
 from chladni.workflows.diagnosis_result import DiagnosisResult
 from chladni_bench import FREQUENCIES, WEIGHTS
@@ -59,12 +60,9 @@ def results_chapter(desk: Desk, progress: Progress) -> Chapter:
                 ("nominal", "calibrated")]  # fmt: skip
     progress("figures 34 and 35", 0.6)
     whole = compared(desk, "figure_35.png", {"nominal": "before", "calibrated": "after"})
-    fall = plots.waterfall(
-        desk.folder / "waterfall.png",
-        {k: s.fit for k, s in scores.items()},
-        floor,
-        "between articles",
-    )
+    steps = {"fitted": {k: s.fit for k, s in scores.items()}}
+    chart = charts.steps(steps, {"fitted": floor}, "between articles")
+    fall = png(chart, desk.folder / "waterfall.png")
     sections = (
         Section("Table 13: mass", _masses(scores, weights)),
         Section("Table 14: frequencies", _frequencies(nominal, calibrated)),
@@ -160,9 +158,8 @@ def _hertz(f: float | None) -> str:
 def _mac(desk: Desk, name: str) -> Any:
     with np.load(desk.folder / f"responses_{name}.npz", allow_pickle=False) as held:
         M, f = held["mac"], held["modes"]
-    test = [hertz(x) for x in told_scores(desk)["nominal"].test]
-    path = desk.folder / f"figure_34_{name}.png"
-    return plots.mac_matrix(path, M, [hertz(x) for x in f], test, f"{name} model against test A")
+    chart = charts.mac(f, {"test": (M, told_scores(desk)["nominal"].test, [])}, f"{name} model")
+    return png(chart, desk.folder / f"figure_34_{name}.png")
 
 
 def _likeness(scores: dict[str, ModelScore]) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from .arguments import checked
@@ -34,9 +35,9 @@ class View:
     ----------
     summary : result -> text
     html : result -> a whole page without pictures
-    pictures : result -> PNG by name, the main one first
-    save : (result, folder, home): writes all files of the command into a folder, which is moved
-        to its home afterwards
+    pictures : result -> what draws each picture at a path, by name, the main one first
+    save : (result, folder, home, pictures): writes all files of the command into a folder, which
+        is moved to its home afterwards; with ``pictures`` every drawing as PNG
     command : that returns such a result
     inputs : files that were read, which nothing may replace
     needs_origin : whether pictures and files need the model or the case of the result
@@ -45,8 +46,8 @@ class View:
     command: str
     summary: Callable[[Any], str]
     html: Callable[[Any], str]
-    pictures: Callable[[Any], Mapping[str, bytes]]
-    save: Callable[[Any, Path, Path], None]
+    pictures: Callable[[Any], Mapping[str, Callable[[Path], object]]]
+    save: Callable[[Any, Path, Path, bool], None]
     inputs: Callable[[Any], Iterable[Path]] = lambda _: ()
     needs_origin: bool = True
 
@@ -120,21 +121,28 @@ class Result:
             raise LabelError(f"no picture {name!r}; {hint}there are {named(drawn, 20)}")
         if not drawn:
             raise LabelError("this result has nothing to draw")
-        return DrawnPicture(drawn[name or next(iter(drawn))])
+        with TemporaryDirectory(prefix="chladni-") as folder:
+            path = Path(folder) / "picture.png"
+            drawn[name or next(iter(drawn))](path)
+            return DrawnPicture(path.read_bytes())
 
-    def _pictures(self) -> Mapping[str, bytes]:
-        """Draw all pictures once."""
+    def _pictures(self) -> Mapping[str, Callable[[Path], object]]:
+        """What draws each picture, found once."""
         self._check_origin()
-        if "_drawn" not in self.__dict__:
-            object.__setattr__(self, "_drawn", self._view.pictures(self))
-        drawn: Mapping[str, bytes] = self.__dict__["_drawn"]
-        return drawn
+        if "_stills" not in self.__dict__:
+            object.__setattr__(self, "_stills", self._view.pictures(self))
+        stills: Mapping[str, Callable[[Path], object]] = self.__dict__["_stills"]
+        return stills
 
     @checked
-    def save(self, folder: Path | str) -> Path:
-        """Write the files that the command writes: JSON, tables, pictures, ``report.html``.
+    def save(self, folder: Path | str, pictures: bool = False) -> Path:
+        """Write the files that the command writes: JSON, tables, ``report.html``.
 
         The folder holds the results of one command, as with ``--out``. Returns its path.
+
+        Parameters
+        ----------
+        pictures : True: every drawing of the page as PNG too, as with ``--pictures``
 
         Raises
         ------
@@ -146,7 +154,7 @@ class Result:
         self._check_origin()
         place, view = Path(folder), self._view
         with run_folder(place, view.command, view.inputs(self)) as scratch:
-            view.save(self, scratch, place)
+            view.save(self, scratch, place, pictures)
         return place
 
     def _check_origin(self) -> None:

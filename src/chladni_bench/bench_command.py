@@ -12,7 +12,7 @@ from chladni.arrays import real_number
 from chladni.case import Case, load_case
 from chladni.case.load import OUTSIDE
 from chladni.case.sensor_places import placed
-from chladni.cli.run import Allow, DeckOrCase, Out, Units, limits, started
+from chladni.cli.run import Allow, DeckOrCase, Out, Pictures, Units, limits, started
 from chladni.errors import FileError
 from chladni.io.tables.sensor_table import exciter, with_input
 from chladni.output import write_text
@@ -89,6 +89,7 @@ def run(
     ] = "",
     units: Units = None,
     allow: Allow = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Test a structure on the virtual bench: articles, shaker, sensors, front end, recordings.
@@ -117,7 +118,7 @@ def run(
     from .bench_folder import write_bench
     from .bench_page import bench_page
 
-    with started("bench", source, out) as job:
+    with started("bench", source, out, pictures=pictures) as job:
         job.progress("reading", 0.0)
         with tempfile.TemporaryDirectory() as scratch:
             stage = within(job.progress, 0.0, 0.2)
@@ -126,7 +127,7 @@ def run(
             job.progress("writing", 0.95)
             job.files += write_bench(job.folder, case, found)
         job.json("bench.json", to_json(found))
-        job.show(bench_page(job.folder, found))
+        job.show(bench_page(found))
 
 
 def _factors(text: str) -> tuple[float, ...]:

@@ -1,66 +1,79 @@
 """A virtual test as a page: the test setup, the schedule, a time signal, FRFs, overloads."""
 
+from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from chladni.dynamics.frf import UNIT
-from chladni.report import live_pages as live
-from chladni.report import live_panels
-from chladni.report.blocks import Block, Facts, PageParts, Picture, Section, Table
-from chladni.report.live_pages import Page
+from chladni.report import frf_charts
+from chladni.report.blocks import Block, Drawing, Facts, PageParts, Section, Table, still
 from chladni.report.words import number
+from chladni.view.chart import Chart, ChartAxis, Series
+from chladni.view.chart_page import extremes
+from chladni.view.charts import over
 
 from .bench_recording import BenchRecording
 from .bench_workflow import BenchResult, level_unit
 
 _SHOWN = 2  # responses drawn over time
+_POINTS = 2000  # of a curve
 
 
-def bench_page(folder: Path, found: BenchResult) -> PageParts:
-    """Sections of the page; its pictures are written into the folder."""
-    from . import bench_plots
-
-    files: list[tuple[str, str]] = []
-    first, page = found.recordings[0], Page()
+def bench_page(found: BenchResult) -> PageParts:
+    """Sections of the page."""
+    first = found.recordings[0]
     blocks: list[Block] = [Facts(_facts(found)), _table(found)]
     if found.schedule and first.transient is not None and first.force is not None:
-        path = folder / "schedule.png"
-        lines = np.array([(x.frequency, x.delay, x.measure) for x in found.schedule])
-        f, delay, measure = lines.T
-        drive = _drive(found)
-        bench_plots.sine_schedule(path, f, delay, measure, first.force, first.transient, drive)
-        still = Picture(path, "The schedule: force and transient of every line of article "
-                              f"{first.article}, all sweeps (largest transient of any channel, "
-                              "antiresonances included).")  # fmt: skip
-        data = live_panels.schedule(f, delay, measure, first.force, first.transient, drive)
-        blocks.append(live.panels(page, path.stem, data, still))
-        files.append((path.name, "the schedule of the stepped sine"))
+        text = (
+            f"The schedule: force and transient of every line of article {first.article}, all "
+            "sweeps (largest transient of any channel, antiresonances included)."
+        )
+        chart = sine_schedule(found, first.force, first.transient)
+        blocks.append(Drawing("schedule", chart, text, what="the schedule of the stepped sine"))
     if first.sample is not None:
-        path, t, signals = folder / "time.png", *_signals(first, _drive(found))
-        title = f"Article {first.article}, {first.test.excitation}"
-        bench_plots.time_histories(path, t, signals, title)
-        still = Picture(path, "One block of time data from the front end.")
-        blocks.append(live.panels(page, path.stem, live_panels.over_time(t, signals), still))
-        files.append(("time.png", "one block of time data"))
-    k = _typical(first)
-    path = folder / "frf.png"
+        chart = over_time(*_signals(first, _drive(found)))
+        text = "One block of time data from the front end."
+        blocks.append(Drawing("time", chart, text, what="one block of time data"))
     frf = first.frf
-    coherence = np.ones(len(frf.frequency)) if frf.coherence is None else frf.coherence[:, k, 0]
-    name = f"{frf.outputs[k]} from {frf.inputs[0]}, article {first.article}"
-    bench_plots.frf_over_coherence(
-        path, frf.frequency, frf.values[:, k, 0], first.truth[:, k], coherence, name,
-        UNIT.get(frf.quantity, ""),
-    )  # fmt: skip
-    still = Picture(path, "An estimated FRF, and the FRF of ideal sensors and an ideal front end "
-                          "at the same places.")  # fmt: skip
     ideal = replace(frf, values=first.truth[:, :, None], coherence=None, variance=None)
-    blocks.append(live.responses(page, path.stem, {"recorded": frf, "ideal": ideal}, [still]))
-    files.append((path.name, "an FRF and its coherence"))
-    sections = [Section("The test", blocks)]
-    return PageParts(lead(found), sections, found.notes, files, page.drawings)
+    chart, rows = frf_charts.responses({"recorded": frf, "ideal": ideal})
+    k = _typical(first)
+    view = next((name for name, output, _ in rows if output == frf.outputs[k]), rows[0][0])
+    blocks.append(Drawing(
+        "frf", chart, "An estimated FRF, and the FRF of ideal sensors and an ideal front end at "
+        "the same places.", {"frf": still(chart.at(view))}, "an FRF and its coherence",
+    ))  # fmt: skip
+    return PageParts(lead(found), [Section("The test", blocks)], found.notes)
+
+
+def sine_schedule(found: BenchResult, force: np.ndarray, transient: np.ndarray) -> Chart:
+    """Cycles waited and measured at each line; drive and transient (k, n) of every sweep."""
+    f, delay, measure = np.array([(x.frequency, x.delay, x.measure) for x in found.schedule]).T
+
+    def sweeps(what: str, values: np.ndarray, tint: str) -> list[Series]:
+        rows = enumerate(np.atleast_2d(values), 1)
+        return [_thinned(f"{what}, sweep {k}", f, y, tint) for k, y in rows]
+
+    cycles = [_thinned("waited", f, delay, "ink"), _thinned("measured", f, measure, "after")]
+    left = 100 * np.maximum(transient, 1e-12)
+    return over(
+        ChartAxis("frequency [Hz]", log=True),
+        (ChartAxis("cycles", log=True), cycles),
+        (ChartAxis(_drive(found), log=True), sweeps("drive", force, "after")),
+        (ChartAxis("transient left [%]", log=True), sweeps("transient", left, "before")),
+    )
+
+
+def over_time(t: np.ndarray, signals: Mapping[str, np.ndarray]) -> Chart:
+    """Signals (n,) by name and unit, one below the other, over time (n,) [s]."""
+    panels = [(ChartAxis(name), [_thinned("", t, x, "ink")]) for name, x in signals.items()]
+    return over(ChartAxis("time [s]"), *panels)
+
+
+def _thinned(name: str, x: np.ndarray, y: np.ndarray, tint: str) -> Series:
+    at = extremes(y, _POINTS)
+    return Series(name, x[at], y[at], tint=tint, width=1.0)
 
 
 def in_words(found: BenchResult) -> PageParts:

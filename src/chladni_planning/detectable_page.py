@@ -1,11 +1,11 @@
 """The smallest findings of a layout: a table, a map, JSON."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from chladni.report.blocks import Block, Picture, Section, Table
+from chladni.report.blocks import Block, Section, Table
+from chladni.report.mesh_drawings import field, mesh_of
 from chladni.report.words import number, quantity, rounded
 from chladni.search.detectable import Detectable
 from chladni.workflows.loaded_model import Model, on_faces
@@ -21,8 +21,8 @@ _CAPTION = (
 )
 
 
-def detectable_section(folder: Path, model: Model, found: Detectable, noise: float) -> Section:
-    """The section of the page; its picture ``smallest_mass.png`` is written into the folder."""
+def detectable_section(model: Model, found: Detectable, noise: float) -> Section:
+    """The section of the page."""
     from chladni.view import scene
 
     rows = [
@@ -35,10 +35,9 @@ def detectable_section(folder: Path, model: Model, found: Detectable, noise: flo
     grams = on_faces(model.seen, 1e3 * _of_shells(model, found))
     name = "smallest mass that a diagnosis finds"
     limits = scene.usual_limits(model.seen, grams)
-    path = scene.scalar_map(
-        folder / "smallest_mass.png", model.seen, grams, name, "g", "YlOrRd", limits
-    )
-    return Section("Smallest effects this layout can find", [*blocks, Picture(path)])
+    shown = mesh_of(model.seen, model.assembly)
+    drawn = field(shown, grams, limits, "smallest_mass", f"{name} [g]", colours="YlOrRd")
+    return Section("Smallest effects this layout can find", [*blocks, drawn])
 
 
 def detectable_json(found: Detectable) -> dict[str, Any]:

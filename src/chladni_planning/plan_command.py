@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from chladni.cli.run import Allow, DeckOrCase, Out, Units, started
+from chladni.cli.run import Allow, DeckOrCase, Out, Pictures, Units, started
 from chladni.progress import within
 from chladni.report.result_json import to_json
 from chladni.workflows.loaded_model import model_in_si
@@ -61,6 +61,7 @@ def run(
     ] = 0.01,
     units: Units = None,
     allow: Allow = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Plan a test: sensors by effective independence and exchange, shaker, cords, duration."""
@@ -80,7 +81,7 @@ def run(
     from .detectable_page import detectable_section
     from .plan_page import plan_page
 
-    with started("plan", source, out) as job:
+    with started("plan", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
         model, said = model_in_si(source, "plan", units, allow or ())
         job.note(model.notes)
@@ -94,9 +95,6 @@ def run(
             band, stage = durations(found).band_hz, within(job.progress, 0.8, 1.0)
             smallest = smallest_findings(model, job.folder / "plan.json", band, noise, stage)
             job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
-            section = detectable_section(job.folder, model, smallest, noise)
-            picture = ("smallest_mass.png", "smallest mass that a diagnosis finds")
-            parts = replace(
-                parts, sections=[*parts.sections, section], files=[*parts.files, picture]
-            )
+            section = detectable_section(model, smallest, noise)
+            parts = replace(parts, sections=[*parts.sections, section])
         job.show(parts)

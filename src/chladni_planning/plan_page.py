@@ -7,13 +7,21 @@ import numpy as np
 
 from chladni.fem.assemble import Structure
 from chladni.output import write_text
-from chladni.report import live_pages as live
-from chladni.report.blocks import Block, Facts, Items, PageParts, Picture, Section, Table, Text
-from chladni.report.live_pages import Page, mesh_of
+from chladni.report.blocks import (
+    Block,
+    Drawing,
+    Facts,
+    Items,
+    PageParts,
+    Section,
+    Table,
+    Text,
+    still,
+)
+from chladni.report.mesh_drawings import layout, mesh_of, mode_shapes
 from chladni.report.shown import Shown
 from chladni.report.words import direction, hertz, number, rounded
-from chladni.view import annotations, plots, scene
-from chladni.view.surface import Surface
+from chladni.view import annotations, charts
 from chladni.workflows.loaded_model import Model
 
 from .plan_summary import (
@@ -29,22 +37,17 @@ from .plan_summary import (
 from .sensor_candidates import FOOT, SensorCandidates
 from .whole_plan import Plan, motion
 
-PICTURES = {
-    "sensors.png": "the layout",
-    "shaker.png": "shaker and cords",
-    "auto_mac.png": "AutoMAC at the sensors",
-    "modes.png": "the modes that the sensors see least",
-}
+_FAINT = 12  # modes whose shapes are shown
 
 
 def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
-    """Sections of the page; its pictures and the table of sensors are written into the folder."""
+    """Sections of the page; the table of sensors is written into the folder."""
     write_text(folder / "sensors.csv", sensors_csv(found))
     result = summary(found)
-    page, shown = Page(), mesh_of(model.seen, model.assembly)
-    body = sections(found, result, shown, model.structure, page, folder)
-    files = [("sensors.csv", "sensors and shakers, for case.toml"), *PICTURES.items()]
-    return PageParts(lead(result), body, notes(found), files, page.drawings)
+    shown = mesh_of(model.seen, model.assembly)
+    body = sections(found, result, shown, model.structure)
+    files = [("sensors.csv", "sensors and shakers, for case.toml")]
+    return PageParts(lead(result), body, notes(found), files)
 
 
 def in_words(found: Plan) -> PageParts:
@@ -149,34 +152,29 @@ def _rattle_notes(found: Plan) -> list[str]:
     return out
 
 
-def sections(
-    found: Plan, result: PlanSummary, shown: Shown, built: Structure, page: Page, folder: Path
-) -> list[Section]:
-    """The page; its pictures (:data:`PICTURES`) are written into the folder."""
+def sections(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> list[Section]:
+    """The sections of the page."""
     return [
-        Section("Sensors", _sensors(found, result, shown, page, folder / "sensors.png")),
-        Section("Modes", _modes(found, result, shown, built, page, folder)),
-        Section("Shaker and cords", _shaker(found, result, shown.seen, folder / "shaker.png")),
+        Section("Sensors", _sensors(found, result, shown)),
+        Section("Modes", _modes(found, result, shown, built)),
+        Section("Shaker and cords", _shaker(found, result, shown)),
         Section("Lines and duration", [Text([_test(result.test)])]),
     ]
 
 
-def _sensors(found: Plan, result: PlanSummary, shown: Shown, page: Page, path: Path) -> list[Block]:
-    seen = shown.seen
+def _sensors(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     outputs = [_marker(s.at, str(s.rank)) for s in result.sensors]
     shakers = [_marker(at, "shaker") for at in result.actuators_together]
-    still = Picture(
-        scene.sensors(path, seen, outputs, shakers), "Sensors by rank (blue), shaker (orange)."
-    )
     cords = [_hanger(found, int(g)) for g in result.hangers]
     placed = replace(shown, outputs=outputs, inputs=shakers, cords=cords)
+    caption = "Sensors by rank (blue), shaker (orange)."
     moves = [
         f"Mode {m.mode} was barely visible ({number(m.before, 2)} of its largest motion): the "
         f"sensor at {m.given_up} moves to {m.taken} ({number(m.after, 2)})."
         for m in result.moves
     ]
     return [
-        *live.layout(page, "where", placed, [still]),
+        layout("where", placed, "sensors", caption, "the layout"),
         _layout(result),
         Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
         Items(moves or ["All modes were visible, so no sensor was moved."]),
@@ -212,9 +210,7 @@ def _arrow(point: np.ndarray, direction: np.ndarray, text: str) -> annotations.M
     return annotations.Marker((x, y, z), (a, b, c), text)
 
 
-def _modes(
-    found: Plan, result: PlanSummary, shown: Shown, built: Structure, page: Page, folder: Path
-) -> list[Block]:
+def _modes(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> list[Block]:
     shift = found.loaded / found.modal.frequency - 1
     rows = [
         (
@@ -240,25 +236,22 @@ def _modes(
         caption="Share of the sensors that stay when the number of target modes changes from the "
         "row above to this one.",
     )
-    names = [str(m.mode) for m in result.modes]
-    mac = plots.mac_matrix(folder / "auto_mac.png", found.auto_mac, names, names, "AutoMAC")
-    faint = np.sort(np.argsort(found.visible, kind="stable")[:12])
+    faint = np.sort(np.argsort(found.visible, kind="stable")[:_FAINT])
     modal, moved = found.modal.sel(faint), motion(built, found.modal.sel(faint))
     numbers = [found.first + 1 + int(k) for k in faint]
-    drawn = scene.montage(folder / "modes.png", shown.seen, moved, modal.frequency, numbers)
-    least = [Picture(drawn, "The least visible modes at the sensors.")]
-    f, stills = found.modal.frequency, [Picture(mac, "AutoMAC at the sensors.")]
+    what = "the modes that the sensors see least"
+    f = found.modal.frequency
+    auto = charts.mac(f, {"model": (found.auto_mac, f, [])}, "model")
     return [
         table,
-        *live.mode_shapes(page, shown, moved, modal.frequency, numbers, least),
-        live.likeness(page, "mac", found.auto_mac, f, f, "model", [], stills),
+        *mode_shapes(shown, moved, modal.frequency, numbers, _FAINT, what, "modes"),
+        Drawing("mac", auto, "AutoMAC at the sensors.", {"auto_mac": still(auto)},
+                "AutoMAC at the sensors"),
         steps,
-    ]
+    ]  # fmt: skip
 
 
-def _shaker(
-    found: Plan, result: PlanSummary, seen: Surface, path: Path
-) -> list[Facts | Table | Picture]:
+def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     best = [_marker(a.at, str(k + 1)) for k, a in enumerate(result.actuators[:10])]
     rows = [
         (
@@ -289,10 +282,11 @@ def _shaker(
     words = ("rattles from", "allowed", "also a sensor")
     table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
     cords = [_hanger(found, int(g)) for g in result.hangers]
-    picture = scene.sensors(path, seen, (), best, cords, "shaker, by rank")
+    placed = replace(shown, inputs=best, cords=cords)
+    what, rank = "Ten best shaker places (orange), cords (green).", "shaker, by rank"
     return [
         Facts(facts),
-        Picture(picture, "Ten best shaker places (orange), cords (green)."),
+        layout("shaker", placed, "shaker", what, "shaker and cords", rank),
         table,
     ]
 

@@ -15,6 +15,7 @@ from chladni.cli.run import (
     Driven,
     Kind,
     Out,
+    Pictures,
     Units,
     limits,
     place_of,
@@ -71,6 +72,7 @@ def run(
     ] = None,
     units: Units = None,
     allow: Allow = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Sample parameters: frequencies, mass, responses, Q of every sample, and sensitivities.
@@ -94,13 +96,13 @@ def run(
     from .study_page import study_page
     from .study_tables import write_netcdf
 
-    with started("study", source, place) as job:
+    with started("study", source, place, pictures=pictures) as job:
         job.json("study.json", to_json(found))
         write_samples(job.keep("samples.csv", "one line per sample"), found.table())
         job.notes += write_netcdf(job.keep("study.nc", "all results, for xarray"), found)
         job.files.append(("samples.jsonl", "the samples in the order they finished"))
         job.progress("pictures", 0.5)
-        job.show(study_page(job.folder, found))
+        job.show(study_page(found))
     if 2 * len(found.failed) > len(found.rows):
         number, why = found.failed[0]
         raise AccuracyError(

@@ -1,16 +1,25 @@
 """A parameter study as a page: influences, parallel coordinates, results over parameters."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from chladni.output import plain
-from chladni.report import live_samples
-from chladni.report.blocks import Block, Code, Facts, Items, PageParts, Picture, Section, Table
-from chladni.report.live_pages import Page
+from chladni.report.blocks import (
+    Block,
+    Code,
+    Drawing,
+    Facts,
+    Items,
+    PageParts,
+    Section,
+    Table,
+    still,
+)
 from chladni.report.words import number, quantity, unit_text
+from chladni.view.chart import Column
 
+from . import study_charts
 from .parameter_study import ParameterStudy
 from .sensitivity import Sensitivity
 
@@ -57,21 +66,20 @@ def _range(y: np.ndarray) -> dict[str, float] | None:
     return {"low": y.min(), "mean": y.mean(), "high": y.max(), "sd": y.std()}
 
 
-def study_page(folder: Path, found: ParameterStudy) -> PageParts:
-    """Sections of the page; its pictures are written into the folder."""
-    said, page = in_words(found), Page()
-    files: list[tuple[str, str]] = []
+def study_page(found: ParameterStudy) -> PageParts:
+    """Sections of the page."""
+    said = in_words(found)
     sections = list(said.sections)
     if len(found.rows) > len(found.failed):
         sections += [
-            Section("Sensitivities", _sensitivities(page, folder, found, files)),
-            Section("Results over parameters", _pictures(page, folder, found, files)),
+            Section("Sensitivities", _sensitivities(found)),
+            Section("Results over parameters", _samples(found)),
         ]
     if found.failed:
         why_not = [f"sample {k}: {why}" for k, why in found.failed[:_LISTED]]
         sections.append(Section(f"{len(found.failed)} samples failed", [Items(why_not)]))
     sections.append(Section("Read it", [Code(READ)]))
-    return PageParts(said.lead, sections, said.notes, files, page.drawings)
+    return PageParts(said.lead, sections, said.notes)
 
 
 def in_words(found: ParameterStudy) -> PageParts:
@@ -116,31 +124,24 @@ def _ranges(found: ParameterStudy) -> Block:
     return Table(heads, rows, words=("parameter", "steps"), caption=caption)
 
 
-def _sensitivities(
-    page: Page, folder: Path, found: ParameterStudy, files: list[tuple[str, str]]
-) -> list[Block]:
-    from . import study_plots
-
+def _sensitivities(found: ParameterStudy) -> list[Block]:
     lawful = [s for s in found.sensitivities if np.isfinite(s.log_slope).any() and s.r2 >= _LAW]
     blocks: list[Block] = []
     if lawful:
-        path = folder / "slopes.png"
         values = np.stack([s.log_slope for s in lawful])
-        results = [label(s.result) for s in lawful]
-        names = [_drawable(name) for name in found.names]
-        study_plots.slope_map(path, values, results, names, "d ln result / d ln parameter")
-        files.append((path.name, "logarithmic slopes"))
-        still = Picture(
-            path, "d ln result / d ln parameter: at 1, a parameter one per cent higher gives a "
-            "result one per cent higher.",
-        )  # fmt: skip
-        data = live_samples.influences(values, results, found.names)
-        blocks.append(page.live(path.stem, "influences", data, [still], still.caption))
+        chart = study_charts.slopes(
+            values, [label(s.result) for s in lawful], [_shortened(n) for n in found.names]
+        )
+        text = (
+            "d ln result / d ln parameter: at 1, a parameter one per cent higher gives a result "
+            "one per cent higher."
+        )
+        blocks.append(Drawing("slopes", chart, text, what="logarithmic slopes"))
     for measure, title in (("total", "Total Sobol' index"), ("mu_star", "mean |effect|")):
         rows = [_row(s, measure) for s in found.sensitivities]
         if kept := [r for r in rows if any(cell != "–" for cell in r[1:])]:
             caption = f"{title}; ± is half the 95 % interval." if measure == "total" else title
-            blocks.append(_indices(page, found, measure))
+            blocks.append(_indices(found, measure))
             blocks.append(Table(("result", *found.names), kept, words=("result",), caption=caption))
     facts = [
         (label(s.result), f"R² {number(s.r2, 3)} of a power law, {s.used} samples")
@@ -150,12 +151,12 @@ def _sensitivities(
     return [*blocks, Facts(facts)] if facts else blocks
 
 
-def _indices(page: Page, found: ParameterStudy, measure: str) -> Block:
+def _indices(found: ParameterStudy, measure: str) -> Block:
     """Bars of a result's measure over its parameters, with the other measure of its method."""
     shown = [s for s in found.sensitivities if np.isfinite(getattr(s, measure)).any()]
     if measure == "total":
         axis = "Sobol' index; bars of error: 95 % interval"
-        results: dict[str, live_samples.Measures] = {
+        results: dict[str, study_charts.Measures] = {
             label(s.result): {
                 "first order": (s.first, s.first_interval),
                 "total": (s.total, s.total_interval),
@@ -168,8 +169,8 @@ def _indices(page: Page, found: ParameterStudy, measure: str) -> Block:
             label(s.result): {"mean |effect|": (s.mu_star, None), "its deviation": (s.sigma, None)}
             for s in shown
         }
-    data = live_samples.indices(results, found.names, axis)
-    return page.live(f"indices_{measure}", "indices", data)
+    chart = study_charts.indices(results, found.names, axis)
+    return Drawing(f"indices_{measure}", chart, what="sensitivity indices")
 
 
 def _row(s: Sensitivity, measure: str) -> tuple[str, ...]:
@@ -194,67 +195,46 @@ def label(column: str) -> str:
     return "mass [kg]" if column == "mass_kg" else column
 
 
-def _pictures(
-    page: Page, folder: Path, found: ParameterStudy, files: list[tuple[str, str]]
-) -> list[Block]:
-    from . import study_plots
-
-    parameters = {_with_unit(v.name, v.unit): found.column(v.name) for v in found.varied[:_AXES]}
-    labels = {v.name: _with_unit(v.name, v.unit) for v in found.varied}
-    results = {label(c): found.column(c) for c in _drawn(found)}
-    labels |= {c: label(c) for c in found.columns}
-    if not results:
+def _samples(found: ParameterStudy) -> list[Block]:
+    """Draw every sample across the axes, and one column over another."""
+    table = _columns(found)
+    drawn, names = _drawn(found), [v.name for v in found.varied[:_AXES]]
+    if not drawn:
         return []
-    decades = [_with_unit(v.name, v.unit) for v in found.varied if v.log]
-    whole, colour = {**parameters, **results}, next(iter(results))
-    nominal = {labels.get(k, k): v for k, v in plain(found.nominal).items()
-               if isinstance(v, float)}  # fmt: skip
+    said = study_charts.samples(list(table.values()))
     blocks: list[Block] = []
-    if np.isfinite(np.stack(list(whole.values()))).all(axis=0).sum() > 1:
-        path = study_plots.parallel_coordinates(folder / "parallel.png", whole, colour, decades)
-        files.append((path.name, "parallel coordinates"))
-        still = Picture(path, f"Each line is a sample; colour: {colour}.")
-        blocks.append(_lines(page, found, still))
-    path = study_plots.response_plots(
-        folder / "responses.png", results, parameters, nominal, decades
+    axes = [table[n] for n in (*names, *drawn)]
+    if np.isfinite(np.stack([c.values for c in axes])).all(axis=0).sum() > 1:
+        few = f" The first {study_charts.MOST} are drawn." * (len(found.rows) > study_charts.MOST)
+        text = (
+            f"Draw a box over an axis to keep the samples within it.{few} Each line is a sample; "
+            f"colour: {table[drawn[0]].name}."
+        )
+        chart = study_charts.parallel(axes, said, len(names))
+        blocks.append(Drawing("parallel", chart, text, what="parallel coordinates"))
+    at = {name: k for k, name in enumerate(table)}
+    chart = study_charts.cloud(list(table.values()), said, at[found.names[0]], at[drawn[0]])
+    grid = study_charts.results_over_parameters(
+        [table[n] for n in names], [table[n] for n in drawn]
     )
-    files.append((path.name, "results over parameters"))
-    still = Picture(path, "Dots: samples; dashed: the deck's own values.")
-    at = _share(page, found)
-    data = {"x": at[found.names[0]], "y": at[_drawn(found)[0]]}
-    return [*blocks, page.live("responses", "cloud", data, [still], still.caption)]
+    text = "Dots: samples; dashed: the deck's own values."
+    blocks.append(
+        Drawing("responses", chart, text, {"responses": still(grid)}, "results over parameters")
+    )
+    return blocks
 
 
-def _share(page: Page, found: ParameterStudy) -> dict[str, int]:
-    """Give the page all samples; return the position of each column in them, by its name."""
+def _columns(found: ParameterStudy) -> dict[str, Column]:
+    """Parameters and results by their own names."""
     units = {v.name: unit_text(v.unit) for v in found.varied}
     text = {n: f"{_shortened(n)} [{u}]" if u else _shortened(n) for n, u in units.items()}
     text |= {c: _shortened(label(c)) for c in found.columns}
     nominal = {k: v for k, v in plain(found.nominal).items() if isinstance(v, float)}
-    columns = {name: found.column(name) for name in text}
-    decades = [v.name for v in found.varied if v.log]
-    page.shared = {"samples": live_samples.samples(columns, text, nominal, decades)}
-    return {name: k for k, name in enumerate(text)}
-
-
-def _lines(page: Page, found: ParameterStudy, still: Picture) -> Block:
-    """Every sample as a line across parameters and results."""
-    at, results = _share(page, found), _drawn(found)
-    axes = [at[name] for name in (*(v.name for v in found.varied[:_AXES]), *results)]
-    few = f" The first {live_samples.MOST} are drawn." * (len(found.rows) > live_samples.MOST)
-    text = f"Draw a box over an axis to keep the samples within it.{few} {still.caption}"
-    data = {"axes": axes, "by": at[results[0]]}
-    return page.live("parallel", "parallel", data, [still], text)
-
-
-def _with_unit(name: str, unit: str) -> str:
-    """Label of an axis."""
-    return f"{_drawable(name)} [{unit_text(unit)}]" if unit_text(unit) else _drawable(name)
-
-
-def _drawable(name: str) -> str:
-    """Shorten a user's name for a picture's label, and prevent its reading as a formula."""
-    return _shortened(name).replace("$", r"\$")
+    decades = {v.name for v in found.varied if v.log}
+    return {
+        n: Column(t, np.asarray(found.column(n), float), n in decades, nominal.get(n, np.nan))
+        for n, t in text.items()
+    }
 
 
 def _shortened(name: str) -> str:

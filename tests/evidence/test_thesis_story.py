@@ -13,7 +13,7 @@ from chladni.errors import FileError
 from chladni.geometry.formed_mesh import FormedMesh
 from chladni.io.nastran import write_assembly
 from chladni.progress import silent
-from chladni.report.blocks import Facts, Items, Live, Picture, Section, Table, Text
+from chladni.report.blocks import Drawing, Facts, Items, Picture, Section, Table, Text
 from chladni.units import units
 from chladni_bench.sine_schedule import Stage
 from chladni_evidence.recovery import panel
@@ -79,7 +79,8 @@ def test_a_chapter_is_read_as_it_was_kept(tmp_path):
     """Every kind of block comes back, its picture from wherever the folder now lies."""
     store = ChapterStore(tmp_path)
     blocks = every_block(tmp_path)
-    live = Live("map", "map", [blocks[-1]])
+    bytes_of = blocks[-1].path.read_bytes()
+    live = Drawing("map", None, blocks[-1].caption, {"drawn": lambda at: at.write_bytes(bytes_of)})
     made = Chapter(
         "lead", (Section("title", [*blocks[:-1], live]),), {"x": np.array([1.0])}, (("f", "what"),)
     )

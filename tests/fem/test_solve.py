@@ -8,6 +8,7 @@ from tests.builders.refusals import says
 
 import chladni
 from chladni.dynamics.eigen import normal_modes
+from chladni.errors import LabelError
 from chladni.fem import solve
 from chladni.fem.assemble import structure
 from chladni.model.analysis import Analysis, Load, Motion, Subcase

@@ -8,8 +8,8 @@ from chladni.fem.modelled import modelled
 from chladni.model.added_beams import with_beam_line
 from chladni.model.added_points import with_points
 from chladni.model.properties import BeamSection, Isotropic
-from chladni.report import figures
-from chladni.report.live_pages import mesh_of
+from chladni.report import diagnosis_drawings
+from chladni.report.mesh_drawings import mesh_of
 from chladni.view.surface import surface
 from chladni_specimens import plate
 
@@ -29,9 +29,11 @@ def test_modes_are_drawn_on_the_grids_of_the_given_deck(tmp_path, monkeypatch):
     )
     drawn = []
     monkeypatch.setattr(
-        figures.scene, "montage", lambda path, seen, motion, *rest: drawn.append(motion) or path
+        diagnosis_drawings.scene,
+        "montage",
+        lambda path, seen, motion, *rest: drawn.append(motion),
     )
-    figures._modes(tmp_path, result, mesh_of(surface(deck), deck))
+    diagnosis_drawings._montage(result, mesh_of(surface(deck), deck), tmp_path)
     assert drawn[0].shape == (len(deck.points), 3, len(flexible))
     whole = (final.structure.T @ final.modes.shapes).reshape(len(grown.points), 6, -1)
     at = int(np.abs(final.modes.frequency - flexible[0]).argmin())

@@ -1,4 +1,4 @@
-"""What a page draws: packed and taken out again, thinned without losing a peak."""
+"""What a page draws: packed and taken out again, its pictures where they are asked for."""
 
 from dataclasses import replace
 
@@ -6,38 +6,62 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.frf import FRF
-from chladni.report.blocks import Live, Section
-from chladni.report.drawings import Drawing, Drawings, drawings_of, rounded
-from chladni.report.live_curves import frf, mac_map, thinned
+from chladni.report import frf_charts
+from chladni.report.blocks import Drawing, Section, still, write_pictures
+from chladni.report.drawings import drawings_of
+from chladni.report.frf_charts import responses, thinned
+from chladni.report.live_mesh import rounded
 from chladni.report.page import write_sections
+from chladni.view import charts
+from chladni.view.chart_page import page
+
+STEPS = charts.steps({"fitted": {"nominal": 1.0, "after": 0.5}})
 
 
-def resonances(damping=0.01, lines=4000, channels=2, gain=1.0):
+def resonances(damping=0.01, lines=4000, channels=2, gain=1.0, coherence=None):
     f = np.linspace(10, 200, lines)
     H = sum(1 / (f0**2 - f**2 + 2j * damping * f0 * f) for f0 in (40.0, 90.0, 150.0))
     values = gain * H[:, None, None] * np.arange(1, channels + 1)[None, :, None]
     outputs = tuple(f"{k}:+Z" for k in range(channels))
-    return FRF(values, f, outputs, ("1:+Z",))
-
-
-def seen(**curves):
-    from chladni.report.shown import Shown
-
-    return Shown(None, curves=curves, held_out=["1:+Z"])
+    return FRF(values, f, outputs, ("1:+Z",), coherence=coherence)
 
 
 def test_a_page_gives_back_what_it_draws(tmp_path):
     """Word for word, whatever a name holds; a page without drawings or a damaged one has none."""
     name = '</script><script>alert("ö")</script>'
-    made = Drawings({name: Drawing("steps", "scores", {"x": [1, None], "y": name}, ("w",))})
-    page = tmp_path / "report.html"
-    write_sections(page, "t", [Section("s", [Live(name, "steps")])], drawings=made)
-    again = drawings_of(page).by_name[name]
-    assert (again.draw, again.data) == ("steps", {"x": [1, None], "y": name})
-    text = page.read_text()
-    page.write_text(text.replace('class="numbers">', 'class="numbers">AAAA'))
-    assert not drawings_of(page).by_name
-    assert not drawings_of(tmp_path / "none.html").by_name
+    made = Drawing(name, STEPS, name, {"waterfall": still(STEPS)}, place="scores")
+    path = write_sections(tmp_path / "report.html", "t", [Section("s", [made])])
+    _, (again,) = drawings_of(path)
+    assert (again.name, again.caption, again.place) == (name, name, "scores")
+    assert list(again.pictures) == ["waterfall"]
+    assert again.content["layout"] == page(STEPS)["layout"]
+    twice = write_sections(tmp_path / "again.html", "t", [Section("s", [again])])
+    assert drawings_of(twice)[1][0].content == again.content
+    text = path.read_text()
+    path.write_text(text.replace('class="numbers">', 'class="numbers">AAAA'))
+    assert drawings_of(path) == drawings_of(tmp_path / "none.html") == ({}, [])
+
+
+@pytest.mark.parametrize(
+    ("change", "every", "files"),
+    [
+        ({}, False, []),
+        ({}, True, ["steps.png"]),
+        ({"first": "steps"}, False, ["steps.png"]),
+        ({"content": None, "stills": {"a": still(STEPS)}}, False, ["a.png"]),
+        ({"stills": {}}, True, []),
+    ],
+)  # fmt: skip
+def test_pictures_are_drawn_where_they_are_due(tmp_path, change, every, files):
+    """Where they are asked for, on the first screen, and where a page cannot draw."""
+    drawing = replace(Drawing("steps", STEPS), **change)
+    assert [name for name, _ in write_pictures(tmp_path, [drawing], every)] == files
+    assert sorted(p.name for p in tmp_path.iterdir()) == files
+    figures = {name.removesuffix(".png"): tmp_path / name for name in files}
+    body = [Section("s", [drawing])]
+    text = write_sections(tmp_path / "p.html", "t", body, figures=figures).read_text()
+    assert text.count("data:image/png") == len(files)
+    assert ("A script draws this" in text) == (not files)
 
 
 def test_a_page_without_drawings_carries_no_library(tmp_path):
@@ -63,40 +87,59 @@ def test_thinning_keeps_peaks_and_troughs():
 
 def test_each_channel_says_how_far_each_deck_is_off():
     """A gain of 10 is one decade: Q is 1."""
-    drawn = frf(seen(test=resonances(), before=resonances(gain=10.0), after=resonances()))
-    off = [[c["off"][name] for name in ("before", "after")] for c in drawn["channels"]]
-    np.testing.assert_allclose(off, [[1.0, 0.0]] * 2, atol=1e-9)
-    assert [c["held"] for c in drawn["channels"]] == [False, True]
-    level = drawn["channels"][0]["curves"]["test"][0]
-    assert len(level) == len(drawn["frequency"])
-    peak = drawn["frequency"][int(np.argmax(level))]
-    assert peak == pytest.approx(40.0, abs=0.1)
+    curves = {"test": resonances(), "before": resonances(gain=10.0), "after": resonances()}
+    chart, rows = responses(curves, held_out=["1:+Z"])
+    one, two = chart.views
+    assert one.startswith("0:+Z from 1:+Z, Q before 1, Q after ")
+    assert two.startswith("1:+Z from 1:+Z (held out), Q before 1, Q after ")
+    np.testing.assert_allclose([off for *_, off in rows], 0, atol=1e-9)
+    test = chart.panels[0].series[0]
+    assert test.x[np.argmax(test.y)] == pytest.approx(40.0, abs=0.1)
 
 
 def test_a_channel_at_a_support_is_drawn_without_a_deviation():
     """A response of exactly zero has no logarithm; the other channels keep theirs."""
     free = np.array([1.0, 0.0])[None, :, None]
     test, deck = (replace(r, values=r.values * free) for r in (resonances(), resonances(gain=2.0)))
-    moving, held = frf(seen(test=test, after=deck))["channels"]
-    assert moving["off"]["after"] == pytest.approx(np.log10(2.0) ** 2, rel=1e-2)
-    assert held["off"]["after"] == 0.0
+    chart, rows = responses({"test": test, "after": deck})
+    (*_, moving), (*_, held) = rows
+    assert moving == pytest.approx(np.log10(2.0) ** 2, rel=1e-2)
+    assert held == 0.0
+    assert set(page(chart)["choices"][0]["options"][1]["data"][0]["y"]["log"]) == {None}
 
 
 def test_where_channels_are_many_the_worst_stay(monkeypatch):
-    from chladni.report import live_curves
-
-    monkeypatch.setattr(live_curves, "_VALUES", 3 * 3 * 300)
+    monkeypatch.setattr(frf_charts, "_VALUES", 3 * 3 * 300)
     test = resonances(channels=6)
     gains = np.array([1.0, 3.0, 1.0, 5.0, 1.0, 9.0])[None, :, None]
     off = FRF(test.values * gains, test.frequency, test.outputs, test.inputs)
-    drawn = frf(seen(test=test, before=off, after=off))
-    assert [c["name"].split()[0] for c in drawn["channels"]] == ["1:+Z", "3:+Z", "5:+Z"]
-    assert drawn["of"] == 6
+    chart, _ = responses({"test": test, "before": off, "after": off})
+    assert [name.split()[0] for name in chart.views] == ["1:+Z", "3:+Z", "5:+Z"]
+    assert chart.marked["worst"] == 2
 
 
-def test_a_matrix_keeps_three_digits():
-    drawn = mac_map(
-        np.array([10.0]), {"after": (np.array([[0.98765]]), np.array([11.0]), [(0, 0)])}
-    )
-    assert drawn["maps"]["after"]["mac"] == [[988]]
-    assert drawn["maps"]["after"]["pairs"] == [[0, 0]]
+def test_the_coherence_of_a_channel_goes_with_its_response():
+    """On the same lines; none where the recording has none."""
+    gamma = np.repeat(np.linspace(0.5, 1, 4000)[:, None, None], 2, axis=1)
+    chart, _ = responses({"test": resonances(coherence=gamma)})
+    (line,) = chart.panels[2].series
+    due = np.interp(line.x, np.linspace(10, 200, 4000), gamma[:, 0, 0])
+    np.testing.assert_allclose(line.y, due, atol=1e-3)
+    assert len(responses({"test": resonances()})[0].panels) == 2
+
+
+def test_many_recordings_share_the_room_of_a_page():
+    frf, lines = resonances(lines=30_000, channels=1), []
+    for share in (1, 100):
+        chart, _ = responses({"test": frf}, share=share)
+        lines.append(len(chart.panels[0].series[0].x))
+    alone, of_many = lines
+    assert of_many < alone / 2
+
+
+def test_what_is_not_fitted_is_grey():
+    """Between the fitted bands, and where lines are left out; nothing where nothing is fitted."""
+    both = {"test": resonances(), "model": resonances()}
+    grey = responses(both, [(20.0, 80.0), (100.0, 300.0)], [(30.0, 35.0)])[0].panels[0].grey
+    assert grey == [(10.0, 20.0), (80.0, 100.0), (30.0, 35.0)]
+    assert responses(both, (), [(5.0, 15.0)])[0].panels[0].grey == [(10.0, 15.0)]

@@ -18,7 +18,8 @@ from chladni.report.page import write_page, write_sections
 from chladni.report.sentence import sentence
 from chladni.report.states_table import states_table
 from chladni.report.verdict import HEADING, sections
-from chladni.view import plots
+from chladni.view import charts
+from chladni.view.chart_png import png
 from chladni.workflows.diagnosis_result import StateResult
 
 EVIL = '<script>alert("x")</script>'
@@ -126,7 +127,7 @@ def test_a_notebook_shows_the_page_in_a_frame_that_runs_nothing():
 
 
 def test_page_is_self_contained(tmp_path):
-    figure = plots.waterfall(tmp_path / "w.png", {"a": 1.0, "b": 0.5})
+    figure = png(charts.steps({"fitted": {"a": 1.0, "b": 0.5}}), tmp_path / "w.png")
     page = write_page(tmp_path, RESULT, {"waterfall": figure, "where": figure, "mine": figure})
     text, tags = read(page)
     assert tags.seen.count("img") == 3

@@ -56,7 +56,7 @@ def folder(deck, tmp_path_factory):
 def out(folder, tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "out"
     options = ("--samples", 21, "--sampler", "oat", "--modes", 4, "--workers", 1, "--frf")
-    done = ran("study", folder, *options, "--out", place)
+    done = ran("study", folder, *options, "--pictures", "--out", place)
     assert "21 of 21 samples" in done.output
     return place
 

@@ -56,7 +56,7 @@ def test_one_article_is_what_it_was(three, calibrated):
 
 def test_the_folder_shows_the_articles(three, tmp_path):
     case, found = three
-    write_diagnosis(tmp_path, case, found)
+    write_diagnosis(tmp_path, case, found, pictures=True)
     told = json.loads((tmp_path / "calibration.json").read_text())["articles"]
     assert [a["article"] for a in told[0]["articles"]] == list(THICKER)
     assert read_diagnosis(tmp_path).study.articles == found.study.articles

@@ -57,7 +57,7 @@ def test_a_good_case_is_not_blamed(case):
 def test_what_the_command_writes(copied, tmp_path):
     out = tmp_path / "out"
     with coarse_pictures():
-        done = ran("check", copied, "--out", out)
+        done = ran("check", copied, "--pictures", "--out", out)
     assert "Nothing looks wrong" in done.output
     case = chladni.load_case(copied)
     assert json.loads((out / "check.json").read_text()) == plain(to_json(chladni.check(case)))
@@ -68,7 +68,7 @@ def test_what_the_command_writes(copied, tmp_path):
         assert word in page
 
 
-def test_the_page_counts_what_it_found(case, tmp_path):
+def test_the_page_counts_what_it_found(case):
     checked = chladni.check(replace(case, recordings=()))
     for faults, rest, said in (
         (1, 0, "1 thing is to be corrected first."),
@@ -77,7 +77,7 @@ def test_the_page_counts_what_it_found(case, tmp_path):
         (0, 0, "Nothing looks wrong with the case."),
     ):
         found = (CaseFinding("a", "b", True),) * faults + (CaseFinding("c", "d"),) * rest
-        assert check_page(tmp_path, case, replace(checked, findings=found)).lead == said
+        assert check_page(case, replace(checked, findings=found)).lead == said
 
 
 def test_words_nobody_reads_are_told_by_command(copied):

@@ -121,7 +121,7 @@ def test_a_plan_tells_what_it_would_find(planned, tmp_path):
     """The table on the page, a map, and JSON place by place."""
     deck, _ = planned
     words = ["--units", "mm-t-s", "--sensors", 8, "--modes", 5, "--drawn", 0, "--detect"]
-    done = ran("plan", deck, *words, "--out", tmp_path)
+    done = ran("plan", deck, *words, "--pictures", "--out", tmp_path)
     assert "Smallest effects this layout can find" in done.output
     assert "\nsoftening " in done.output  # the table, on the terminal too
     rows = json.loads((tmp_path / "smallest.json").read_text())["mass"]

@@ -95,7 +95,7 @@ def test_what_modes_writes_correlate_reads(plain, tmp_path):
     path = plain[0].source
     ran("modes", path, "--units", "SI", "--count", 12, "--out", tmp_path / "a")
     words = ["correlate", path, "--modes", tmp_path / "a" / "modes.unv", "--units", "SI"]
-    ran(*words, "--out", tmp_path / "b")
+    ran(*words, "--pictures", "--out", tmp_path / "b")
     found = json.loads((tmp_path / "b" / "correlation.json").read_text())
     assert len(found["modes"]) == 6
     assert min(m["in_span"] for m in found["modes"]) > 0.9999

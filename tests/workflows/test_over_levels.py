@@ -91,7 +91,7 @@ def folder(tmp_path_factory):
 def run(folder):
     """The command itself, and what it wrote."""
     out = folder / "out"
-    done = call("diagnose", folder, "--out", out)
+    done = call("diagnose", folder, "--pictures", "--out", out)
     assert done.exit_code in (0, 3), done.output
     return done, out, json.loads((out / "diagnosis.json").read_text())
 
@@ -139,7 +139,7 @@ def test_page_and_json_hold_the_levels(run):
 def identified(folder):
     """The command that identifies, and where it wrote."""
     out = folder / "identified"
-    return call("identify", folder, "--out", out), out
+    return call("identify", folder, "--pictures", "--out", out), out
 
 
 def test_identify_says_it_on_the_terminal_and_in_its_files(identified):

@@ -10,13 +10,14 @@ from tests.builders.commands import ran
 import chladni
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.report.diagnosis_json import read_diagnosis
+from chladni.report.drawings import drawings_of
 from chladni.report.verdict import PLACES
 
 
 @pytest.fixture(scope="module")
 def run_folder(case, diagnosed, tmp_path_factory):
     out = tmp_path_factory.mktemp("run")
-    write_diagnosis(out, case, diagnosed)
+    write_diagnosis(out, case, diagnosed, pictures=True)
     return out
 
 
@@ -31,10 +32,25 @@ def test_the_page_is_written_again_from_its_folder(run_folder, tmp_path):
 
 
 def test_every_picture_of_a_run_stands_on_its_page(run_folder):
-    """A picture without a row in PLACES is drawn for nobody; where the effect is has its own."""
+    """On its page by its drawing; on that of an old run, which has none, in its section."""
     drawn = {p.stem for p in run_folder.glob("*.png")}
-    assert {name for name in drawn if not name.startswith("where")} <= set(PLACES)
+    placed = {name for names in PLACES.values() for name in names}
+    assert {name for name in drawn if not name.startswith("where")} <= placed
     assert (run_folder / "report.html").read_text().count("data:image/png") == len(drawn)
+
+
+def test_without_a_wish_for_pictures_there_is_that_of_the_first_screen(case, diagnosed, tmp_path):
+    """The page draws the others itself, and a second page from the folder does too."""
+    write_diagnosis(tmp_path / "run", case, diagnosed)
+    assert [p.name for p in (tmp_path / "run").glob("*.png")] == ["where.png"]
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert page.count("data:image/png") == 1
+    ran("report", tmp_path / "run", "--out", tmp_path / "again")
+    again = (tmp_path / "again" / "report.html").read_text()
+    assert [d.name for d in drawings_of(tmp_path / "again" / "report.html")[1]] == [
+        d.name for d in drawings_of(tmp_path / "run" / "report.html")[1]
+    ]
+    assert again.count('class="live') == page.count('class="live')
 
 
 def test_the_result_is_read_back(run_folder, diagnosed):
@@ -83,7 +99,7 @@ def test_a_page_of_frequencies_claims_no_fitted_response(case, folder, tmp_path)
         "\n".join(["label,grid,direction,role,position_sd", *rows, ""])
     )
     made = chladni.load_case(source)
-    result = write_diagnosis(tmp_path / "out", made, chladni.calibrate(made))
+    result = write_diagnosis(tmp_path / "out", made, chladni.calibrate(made), pictures=True)
     assert result.compared == "frequencies"
     page = (tmp_path / "out" / "report.html").read_text()
     assert "frequencies were compared" in page
@@ -96,14 +112,14 @@ def test_a_page_of_frequencies_claims_no_fitted_response(case, folder, tmp_path)
 def test_no_curve_no_picture(case, diagnosed, tmp_path):
     """A result without responses still has its page."""
     bare = replace(diagnosed, models=replace(diagnosed.models, curves={}))
-    write_diagnosis(tmp_path, case, bare)
+    write_diagnosis(tmp_path, case, bare, pictures=True)
     assert not list(tmp_path.glob("frf*"))
 
 
 def test_a_correlation_explains_itself(folder, case, tmp_path):
     """Pairs with the model's own mode numbers, CoMAC, shapes side by side, Q in words."""
     out = tmp_path / "out"
-    ran("correlate", folder, "--out", out)
+    ran("correlate", folder, "--pictures", "--out", out)
     page = (out / "report.html").read_text()
     found = json.loads((out / "correlation.json").read_text())
     f = chladni.modes(case, 20).modal.frequency

@@ -41,7 +41,7 @@ def folder(demo, tmp_path_factory):
     words += ["--articles", "2", "--levels", "1,2", "--time", "--hide", "point-mass"]
     words += ["--seed", "540"]
     with coarse_pictures():
-        ran(*words, "--out", out)
+        ran(*words, "--pictures", "--out", out)
     return out
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..workflows.calibrate import calibrate
-from .run import CaseFolder, Out, diagnosed, opened, started
+from .run import CaseFolder, Out, Pictures, diagnosed, opened, started
 
 
 def run(
@@ -25,6 +25,7 @@ def run(
             help="Draw from the posterior (needs emcee: pip install 'chladni[posterior]').",
         ),
     ] = False,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Fit E, rho and t of the parts, or the case's parameters; write the updated deck and a page.
@@ -43,4 +44,4 @@ def run(
             job.json("variants.json", to_json(found))
             job.show(joint_models_page(job.folder, found))
     else:
-        diagnosed("calibrate", source, out, partial(calibrate, sample=sample))
+        diagnosed("calibrate", source, out, partial(calibrate, sample=sample), pictures)

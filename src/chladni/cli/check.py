@@ -11,12 +11,13 @@ from ..report.words import counted
 from ..workflows.case_check import check
 from ..workflows.deck_check import check_deck
 from ..workflows.loaded_model import is_case
-from .run import Allow, DeckOrCase, Out, opened, say_sections, started
+from .run import Allow, DeckOrCase, Out, Pictures, opened, say_sections, started
 
 
 def run(
     source: DeckOrCase,
     allow: Allow = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Check a case before a long run: units, mass, size, places, band, words; or a deck's cards."""
@@ -28,12 +29,12 @@ def run(
     if allow:
         raise FileError("--allow is of a bare deck; a case says [model] allow")
 
-    with started("check", source, out) as job:
+    with started("check", source, out, pictures=pictures) as job:
         case = opened(source)
         found = check(case, progress=within(job.progress, 0.0, 0.7))
         job.json("check.json", to_json(found))
         job.progress("the picture", 0.7)
-        job.show(check_page(job.folder, case, found))
+        job.show(check_page(case, found))
         for what, text in found.facts:
             job.say(f"{what}: {text}")
         for finding in found.findings:

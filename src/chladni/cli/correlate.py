@@ -11,7 +11,7 @@ from ..report.result_json import to_json
 from ..workflows.correlate import correlate
 from ..workflows.loaded_model import is_case, load_model
 from ..workflows.other_modes import other_modes
-from .run import Allow, DeckOrCase, Out, Run, Units, opened, started
+from .run import Allow, DeckOrCase, Out, Pictures, Run, Units, opened, started
 
 
 def run(
@@ -25,6 +25,7 @@ def run(
     ] = None,
     units: Units = None,
     allow: Allow = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Compare model and test without a fit: paired modes, MAC, deviation Q by channel and band.
@@ -32,7 +33,7 @@ def run(
     A case is compared with its recording. With --modes, a case or a bare deck is compared with
     the modes of another program.
     """
-    with started("correlate", source, out) as job:
+    with started("correlate", source, out, pictures=pictures) as job:
         if modes is not None:
             _with_other_modes(job, source, modes, units, allow or [])
             return
@@ -53,7 +54,7 @@ def _with_test(job: Run, source: Path) -> None:
     found = correlate(case, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
-    job.show(correlation_page(job.folder, case, found))
+    job.show(correlation_page(case, found))
 
 
 def _with_other_modes(
@@ -65,4 +66,4 @@ def _with_other_modes(
     found = other_modes(model, modes, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
-    job.show(other_modes_page(job.folder, model, found))
+    job.show(other_modes_page(model, found))

@@ -9,13 +9,13 @@ from ..io.package_files import mesh_path
 from ..workflows.diagnose import diagnose
 from ..workflows.diagnosis_result import DiagnosisResult
 from .console import say
-from .run import Out, diagnosed
+from .run import Out, Pictures, diagnosed
 
 
-def run(out: Out = None) -> None:
+def run(pictures: Pictures = False, out: Out = None) -> None:
     """Diagnose the case that ships with chladni, then compare with its sealed truth."""
     source = mesh_path("demo/case.toml").parent
-    found = diagnosed("diagnose", source, out or Path("runs") / "demo", diagnose)
+    found = diagnosed("diagnose", source, out or Path("runs") / "demo", diagnose, pictures)
     truth = json.loads(mesh_path("demo.truth.json").read_text(encoding="utf-8"))
     say("The answer is on disk; the concealed effect is now shown.")
     for line in compared(found, truth):

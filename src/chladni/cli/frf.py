@@ -32,6 +32,7 @@ from .run import (
     Driven,
     Kind,
     Out,
+    Pictures,
     Run,
     Units,
     limits,
@@ -53,6 +54,7 @@ def run(
         Path | None,
         typer.Option(help="Outputs and, without --input, inputs: plan.json or a table of sensors."),
     ] = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Compute frequency responses between degrees of freedom.
@@ -64,7 +66,7 @@ def run(
     per_force = [name for name in UNIT if name != "transmissibility"]
     if quantity not in per_force:
         raise LabelError(f"no quantity {quantity!r}; there are {', '.join(per_force)}")
-    with started("frf", source, out) as job:
+    with started("frf", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
         if sensors is not None and output:
             raise FileError("--sensors defines the outputs; leave out --output")
@@ -83,7 +85,7 @@ def run(
                 one = one.to(cast(Quantity, quantity))
             stem = f"frf_{k + 1}" if k else "frf"
             _written(job, stem, one, given, ends)
-            job.show(response_page(job.folder, one))
+            job.show(response_page(one))
 
 
 def _written(

@@ -10,7 +10,7 @@ from ..report.result_json import to_json
 from ..workflows.identify import PoleChoice, identify
 from ..workflows.loaded_model import is_case
 from ..workflows.recordings_of import load_recordings
-from .run import Out, limits, started
+from .run import Out, Pictures, limits, started
 
 
 def run(
@@ -40,6 +40,7 @@ def run(
         int | None,
         typer.Option(help="Use all poles of a state space of this order (subspace method)."),
     ] = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Identify poles, damping and shapes with standard deviations; write a state space."""
@@ -47,7 +48,7 @@ def run(
 
     limit = limits(band) if band else None
     choice = PoleChoice(states, tuple(drop or ()), tuple(pick or ()))
-    with started("identify", source, out) as job:
+    with started("identify", source, out, pictures=pictures) as job:
         is_one = source.exists() and is_case(source)
         read = load_case(source) if is_one else load_recordings(source, quantity or None)
         found = identify(read, limit, averages, choice, progress=job.progress)

@@ -12,7 +12,7 @@ from ..report.result_json import to_json
 from ..units import units as unit_system
 from ..workflows.loaded_model import load_deck
 from ..workflows.map import map_formed
-from .run import Allow, Out, Units, started
+from .run import Allow, Out, Pictures, Units, started
 
 
 def run(
@@ -40,6 +40,7 @@ def run(
         ),
     ] = False,
     allow: Allow = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Map the thickness of a forming simulation or a scan onto the shells of a deck.
@@ -52,7 +53,7 @@ def run(
     place = "mirrored" if mirror else "aligned" if align else "as it lies"
     pairs = dict(_pair(text) for text in pair or []) or None
     other = None if formed_units is None else unit_system(formed_units)
-    with started("map", deck, out) as job:
+    with started("map", deck, out, pictures=pictures) as job:
         job.progress("reading the deck", 0.0)
         model = load_deck(deck, units, allow or ()).model()
         stage = within(job.progress, 0.1, 0.7)
@@ -63,7 +64,7 @@ def run(
         write_deck(model.deck, path, found.changes)
         job.json("mapping.json", to_json(found))
         job.progress("pictures", 0.8)
-        job.show(map_page(job.folder, found))
+        job.show(map_page(found))
 
 
 def _pair(text: str) -> tuple[str, int]:

@@ -8,7 +8,7 @@ from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.loaded_model import load_model
 from ..workflows.modes import modes
-from .run import Allow, DeckOrCase, Out, Units, started
+from .run import Allow, DeckOrCase, Out, Pictures, Units, started
 
 
 def run(
@@ -20,12 +20,13 @@ def run(
         int | None,
         typer.Option(help="Subcase whose supports apply; default: the first with modes.", min=0),
     ] = None,
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Compute normal modes: frequencies, shapes, mass, energy of each part, VTU file, pictures."""
     from ..report.modes_page import modes_page
 
-    with started("modes", source, out) as job:
+    with started("modes", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units, allow or (), subcase)
         found = modes(model, count, progress=within(job.progress, 0.0, 0.7))

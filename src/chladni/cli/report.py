@@ -1,7 +1,7 @@
 """``chladni report``: the page of a run again, from its JSON and its pictures."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -27,11 +27,12 @@ def run(
     files = [p for p in sorted(folder.iterdir()) if not p.is_symlink()]
     figures = {p.stem: p for p in files if p.suffix in (".png", ".gif", ".svg")}
     tables = [Section("Pictures as files", [Links([(p.name, n) for n, p in figures.items()])])]
-    old = drawings_of(folder / "report.html")
+    shared, old = drawings_of(folder / "report.html")
+    about: dict[str, Any] = {"title": title, "drawn": old, "shared": shared}
     if out is None or out.resolve() == folder.resolve():
-        page = write_page(folder, result, figures, result.notes, tables, title=title, drawings=old)
+        page = write_page(folder, result, figures, result.notes, tables, **about)
     else:
         with run_folder(out, "report", [folder / "diagnosis.json"]) as part:
-            write_page(part, result, figures, result.notes, tables, title=title, drawings=old)
+            write_page(part, result, figures, result.notes, tables, **about)
         page = out / "report.html"
     say_results(page)

@@ -14,8 +14,17 @@ from ..arrays import real_number
 from ..errors import FileError
 from ..output import run_folder, write_json
 from ..progress import Progress, within
-from ..report.blocks import Block, Code, Items, Links, PageParts, Section, Table
-from ..report.drawings import Drawings
+from ..report.blocks import (
+    Block,
+    Code,
+    Items,
+    Links,
+    PageParts,
+    Section,
+    Table,
+    drawings,
+    write_pictures,
+)
 from ..report.page import write_sections
 from ..units import UNITS
 from .console import console, say, say_results, say_table, watched
@@ -66,6 +75,9 @@ Answering = Annotated[
 ]
 MOST_LINES = 1_000_000  # of responses that are evaluated: beyond, memory and patience end
 Damping = Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)]
+Pictures = Annotated[
+    bool, typer.Option("--pictures", help="Write every drawing of the page as PNG too.")
+]
 Kind = Annotated[str, typer.Option(help="receptance, mobility or accelerance.")]
 
 
@@ -82,7 +94,7 @@ class Run:
     sections: list[Section] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     files: list[tuple[str, str]] = field(default_factory=list)
-    drawings: Drawings = field(default_factory=Drawings)
+    pictures: bool = False  # True: every drawing of the page as PNG too
 
     def json(self, name: str, data: Any, what: str = "the result for other programs") -> Path:
         """Write ``name`` next to the page and list it there."""
@@ -108,7 +120,8 @@ class Run:
         """Add a page's sections, notes and files, and say its lead."""
         self.sections += parts.sections
         self.files += parts.files
-        self.lead, self.drawings = parts.lead, parts.drawings
+        self.files += write_pictures(self.folder, drawings(parts.sections), self.pictures)
+        self.lead = parts.lead
         say_sections(parts.lead, parts.sections)
         self.note(parts.notes)
 
@@ -129,20 +142,22 @@ class Run:
         title = f"{self.command} – {self.source.name}"
         path = self.folder / "report.html"
         body = [*self.sections, *foot]
-        return write_sections(path, title, body, lead=self.lead, drawings=self.drawings)
+        figures = {p.stem: p for p in self.folder.glob("*.png")}
+        return write_sections(path, title, body, lead=self.lead, figures=figures)
 
 
 @contextmanager
 def started(
-    command: str, source: Path | str, out: Path | None, *, listed: bool = True, adds: bool = False
-) -> Iterator[Run]:
+    command: str, source: Path | str, out: Path | None, *, listed: bool = True, adds: bool = False,
+    pictures: bool = False,
+) -> Iterator[Run]:  # fmt: skip
     """A run whose files appear in ``out`` only if nothing failed; by default in ./runs."""
     from ..case.files_of_source import files_of
 
     place = place_of(command, Path(source), out)
     with run_folder(place, command, files_of(Path(source)), listed=listed, adds=adds) as folder:
         with watched() as progress:
-            run = Run(command, Path(source), folder, place, progress)
+            run = Run(command, Path(source), folder, place, progress, pictures=pictures)
             yield run
         if run.sections:
             run.page()
@@ -178,7 +193,11 @@ def opened(source: Path) -> "Case":
 
 
 def diagnosed(
-    command: str, source: Path, out: Path | None, workflow: Callable[..., "DiagnosisResult"]
+    command: str,
+    source: Path,
+    out: Path | None,
+    workflow: Callable[..., "DiagnosisResult"],
+    pictures: bool = False,
 ) -> "DiagnosisResult":
     """Diagnose or calibrate a case into a folder and say the verdict.
 
@@ -195,7 +214,7 @@ def diagnosed(
         case = opened(source)
         found = workflow(case, progress=within(job.progress, 0.0, 0.85))
         stage = within(job.progress, 0.85, 1.0)
-        found = write_diagnosis(job.folder, case, found, command_line(), stage, job.place)
+        found = write_diagnosis(job.folder, case, found, command_line(), stage, job.place, pictures)
         say_sections(sentence(found), sections(found, {}, (), (), ""))
         for note in found.notes:
             console().aside(f"note: {note}")

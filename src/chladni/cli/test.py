@@ -11,7 +11,7 @@ from ..report.result_json import to_json
 from ..workflows.evaluation import evaluate_recordings
 from ..workflows.loaded_model import is_case
 from ..workflows.recordings_of import load_recordings
-from .run import Out, limits, started
+from .run import Out, Pictures, limits, started
 
 
 def run(
@@ -41,6 +41,7 @@ def run(
         str,
         typer.Option(help="receptance, mobility or accelerance, if the file does not state it."),
     ] = "",
+    pictures: Pictures = False,
     out: Out = None,
 ) -> None:
     """Estimate FRFs with coherence and variance from time data; screen recordings for faults.
@@ -56,7 +57,7 @@ def run(
         exponential,
         limits(band) if band else None,
     )
-    with started("test", source, out) as job:
+    with started("test", source, out, pictures=pictures) as job:
         job.progress("reading", 0.0)
         is_one = source.exists() and is_case(source)
         read = load_case(source) if is_one else load_recordings(source, quantity or None)

@@ -1,12 +1,20 @@
 """Building blocks of a page: titled sections of text, tables, facts and pictures."""
 
+from __future__ import annotations
+
 from base64 import b64encode
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError
-from .drawings import Drawings
+from ..view.chart import Chart
+
+if TYPE_CHECKING:
+    from .shown import Shown
+
+Still = Callable[[Path], object]  # draws a picture at a path
 
 _MIME = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml", ".jpg": "image/jpeg"}
 
@@ -76,18 +84,55 @@ class Picture:
         return round(int.from_bytes(head[16:20], "big") / 1.9)
 
 
-@dataclass(frozen=True)
-class Live:
-    """A drawing by the page; its pictures replace it on paper and without scripts.
+@dataclass(frozen=True, eq=False)
+class Spatial:
+    """Numbers for the function of ``page.js`` that draws them on the mesh."""
 
-    ``name`` is the one of its numbers, ``draw`` the function of ``page.js`` that draws them.
+    draw: str  # name of the function
+    data: Mapping[str, Any]  # plain numbers and texts
+    shown: Shown  # the structure, which all drawings of a page share
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A drawing by the page, and the pictures that stand for it on paper and without scripts.
+
+    They are drawn where a user asks for pictures, or the page cannot draw.
     """
 
     name: str
-    draw: str
-    pictures: Sequence[Picture] = ()
+    content: Chart | Spatial | Mapping[str, Any] | None  # a mapping: as a page held it; None: no
     caption: str = ""
-    kind: str = "live"
+    stills: Mapping[str, Still] | None = None  # by the name of the file; None: the chart's own
+    what: str = ""  # the pictures are, in the list of files
+    first: str = ""  # still of the first screen, which every page holds
+    place: str = ""  # section of a diagnosis
+    kind: str = "drawing"
+
+    @property
+    def pictures(self) -> Mapping[str, Still]:
+        """What draws each picture, by its name."""
+        if self.stills is None and isinstance(self.content, Chart):
+            return {self.name: still(self.content)}
+        return self.stills or {}
+
+    @property
+    def draws(self) -> str:
+        """The function of ``page.js``."""
+        if isinstance(self.content, Mapping):
+            return str(self.content["draw"])
+        return self.content.draw if isinstance(self.content, Spatial) else "chart"
+
+
+def still(chart: Chart) -> Still:
+    """The chart as a picture."""
+
+    def draw(path: Path) -> Path:
+        from ..view.chart_png import png
+
+        return png(chart, path)
+
+    return draw
 
 
 @dataclass(frozen=True)
@@ -106,7 +151,7 @@ class Code:
     kind: str = "code"
 
 
-Block = Text | Items | Facts | Table | Picture | Live | Links | Code
+Block = Text | Items | Facts | Table | Picture | Drawing | Links | Code
 
 
 @dataclass(frozen=True)
@@ -125,11 +170,25 @@ class PageParts:
     ----------
     lead : the result in one sentence
     files : (name, description) of the files written with the page
-    drawings : drawings by the page itself, by the names in its sections
     """
 
     lead: str
     sections: Sequence[Section] = ()
     notes: Sequence[str] = ()
     files: Sequence[tuple[str, str]] = ()
-    drawings: Drawings = field(default_factory=Drawings)
+
+
+def drawings(sections: Sequence[Section]) -> Iterator[Drawing]:
+    """The drawings of a page in its order."""
+    yield from (b for s in sections for b in s.blocks if isinstance(b, Drawing))
+
+
+def write_pictures(folder: Path, shown: Iterable[Drawing], every: bool) -> list[tuple[str, str]]:
+    """Draw every picture, or those that a page needs; return (file, what it is) of each."""
+    files = []
+    for d in shown:
+        for name, draw in d.pictures.items():
+            if every or d.content is None or name == d.first:
+                draw(folder / f"{name}.png")
+                files.append((f"{name}.png", d.what or name.replace("_", " ")))
+    return files

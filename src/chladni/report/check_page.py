@@ -1,7 +1,6 @@
 """A checked case as a page: its content, suspected errors, places of the sensors."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from ..case import Case
@@ -9,9 +8,8 @@ from ..output import plain
 from ..view.surface import surface
 from ..workflows.case_check import CaseCheck, CheckedDof
 from ..workflows.case_model import cords, markers
-from . import live_pages as live
-from .blocks import Block, Facts, Items, PageParts, Picture, Section, Table
-from .live_pages import Page
+from .blocks import Block, Facts, Items, PageParts, Section, Table
+from .mesh_drawings import layout, mesh_of
 from .words import counted, direction, number
 
 
@@ -26,26 +24,19 @@ def check_json(found: CaseCheck) -> dict[str, Any]:
     }
 
 
-def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
-    """Sections of the page; the picture is written into the folder."""
-    from ..view import scene
-
-    path = folder / "sensors.png"
-    page, at = Page(), cords(case)
-    outputs, inputs = markers(case.outputs), markers(case.inputs)
+def check_page(case: Case, found: CaseCheck) -> PageParts:
+    """Sections of the page."""
     shown = replace(
-        live.mesh_of(surface(case.assembly), case.assembly),
-        outputs=outputs, inputs=inputs, cords=at,
+        mesh_of(surface(case.assembly), case.assembly),
+        outputs=markers(case.outputs), inputs=markers(case.inputs), cords=cords(case),
     )  # fmt: skip
-    scene.sensors(path, shown.seen, outputs, inputs, cords=at)
-    still = Picture(path, "Sensors, shakers and cords; arrows: their directions.")
-    blocks: list[Block] = [*live.layout(page, "where", shown, [still])]
+    caption = "Sensors, shakers and cords; arrows: their directions."
+    blocks: list[Block] = [layout("where", shown, "sensors", caption, "sensors on the mesh")]
     if found.dofs:
         blocks.append(_table(found.dofs))
     looks, facts, *told = in_words(found).sections
     sections = [looks, facts, Section("Sensors", blocks), *told]
-    files = [(path.name, "sensors on the mesh")]
-    return PageParts(_lead(found), sections, (), files, page.drawings)
+    return PageParts(_lead(found), sections)
 
 
 def in_words(found: CaseCheck) -> PageParts:

@@ -1,26 +1,25 @@
 """A correlation as a page: paired modes, MAC, Q by band and channel."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..case import Case
 from ..ema.correlation import Quality
+from ..view import charts
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
 from ..workflows.correlate import Correlation
-from . import live_pages as live
-from .blocks import Block, Facts, PageParts, Picture, Section, Table, Text
-from .figures import curves, frequencies, mac_picture, setup
-from .live_pages import Page
+from . import frf_charts
+from .blocks import Block, Drawing, Facts, PageParts, Section, Table, Text
+from .diagnosis_drawings import frequencies
+from .mesh_drawings import layout, mesh_of, shape_pairs
 from .screening_blocks import screening_json, screening_section
 from .shown import Shown
 from .words import criterion, hertz, number, percent
 
 _SAME = 1e-6  # Q of responses that nobody could tell apart
-_DRAWN = 8  # pairs of shapes
 _WORST = 10  # sensors in the table
 _MEANING = (
     "δ = log10(H model / H test) is a complex number at every line of every channel. Its real "
@@ -46,48 +45,53 @@ _HALVES = (
     "not prove the pair: random mixtures of the model's modes may agree as well on their best "
     "half."
 )
-_CAPTIONS = {
-    "mac": "Modal assurance criterion in per cent; framed: the pairs of the table.",
-    "shapes": "Each pair twice: the test's motion at the sensors, and the model's shape with its "
-    "motion at the same sensors. Arrows are shares of the largest motion; orange "
-    "along, blue against the sensor's direction.",
-    "setup": "Sensors and shaker.",
-    "frequencies": "Deviation of each frequency from the test.",
-}
+_MAC = "Modal assurance criterion in per cent; framed: the pairs of the table."
+_SHAPES = (
+    "Each pair twice: the test's motion at the sensors, and the model's shape with its motion at "
+    "the same sensors."
+)
 
 
-def correlation_page(folder: Path, case: Case, found: Correlation) -> PageParts:
-    """Sections of the page; its pictures are written into the folder."""
-    p, shown = found.pairs, _shown(case, found)
+def correlation_page(case: Case, found: Correlation) -> PageParts:
+    """Sections of the page."""
+    p, shown = found.pairs, _shown(case)
     rows = [(found.f_test[j], found.f_model[i], None) for i, j in zip(p.model, p.test, strict=True)]
-    drawn = frequencies(folder, rows) | mac_picture(folder, shown)
-    drawn |= curves(folder, shown) | setup(folder, shown) | _shapes(folder, shown, found)
-    page = Page()
-    shapes = live.shape_pairs(
-        page, shown, found.shapes, found.sensors, _pictures(drawn, ("shapes",))
-    )
-    sensors = live.layout(page, "where", shown, _pictures(drawn, ("setup",)))
-    mac: Sequence[Block] = ()
-    if shown.mac is not None:
-        stills = _pictures(drawn, ("mac",))
-        mac = [live.likeness(page, "mac", *shown.mac, "model", shown.pairs, stills)]
-    responses: Sequence[Block] = ()
-    if shown.curves:
-        stills, bands = _pictures(drawn, ("frf", "frf_grid")), (shown.fitted, shown.excluded)
-        responses = [live.responses(page, "frf", shown.curves, stills, bands)]
+    ladder = frequencies(rows, ("model", "after"))
+    shapes = shape_pairs(shown, found.shapes, found.sensors, _SHAPES)
+    mac: list[Block] = []
+    if found.mac is not None and found.mac.size:
+        pairs = list(zip(p.test.tolist(), p.model.tolist(), strict=True))
+        chart = charts.mac(found.f_test, {"model": (found.mac.T, found.f_model, pairs)})
+        mac.append(Drawing("mac", chart, _MAC))
+    sensors: list[Block] = []
+    if shown.outputs or shown.inputs:
+        sensors.append(layout("where", shown, "setup", "Sensors and shaker."))
     return PageParts(
         _lead(found),
         [
             screening_section(found.screening),
-            Section("Modes", [_modes(found), *_pictures(drawn, ("frequencies",)), *mac]),
+            Section("Modes", [_modes(found), *ladder, *mac]),
             Section("Shapes", [*_worth(found), *shapes]),
             Section("Sensors", [*_sensors(found), *sensors]),
-            Section("Responses", [*_scores(found), *responses]),
+            Section("Responses", [*_scores(found), *_responses(case, found)]),
         ],
         found.notes,
-        [(path.name, path.stem.replace("_", " ")) for path in drawn.values()],
-        page.drawings,
     )
+
+
+def _responses(case: Case, found: Correlation) -> list[Block]:
+    """Every channel of test and model on the lines that were compared."""
+    if found.model is None:
+        return []
+    f = found.model.frequency
+    test = case.frfs[0].sel(band=(float(f[0]), float(f[-1])))
+    chart, rows = frf_charts.responses(
+        {"test": test, "model": found.model}, [case.band] if case.band else [], case.exclude
+    )
+    stills = {"frf": frf_charts.typical(chart, rows)}
+    if len(rows) > 2:
+        stills["frf_grid"] = frf_charts.overview(chart)
+    return [Drawing("frf", chart, frf_charts.CAPTION, stills)]
 
 
 def in_words(found: Correlation) -> PageParts:
@@ -121,42 +125,11 @@ def _off_by(q: Quality) -> str:
     return f"a factor of {number(float(factor), 3)} and {angle:.0f}° of phase (rms)"
 
 
-def _shown(case: Case, found: Correlation) -> Shown:
-    curves_of, mac_of = {}, None
-    if found.model is not None:
-        f = found.model.frequency
-        test = case.frfs[0].sel(band=(float(f[0]), float(f[-1])))
-        curves_of = {"test": test, "model": found.model}
-    if found.mac is not None and found.mac.size:
-        mac_of = (found.mac.T, found.f_test, found.f_model)
-    return Shown(
-        surface(case.assembly),
-        [p.name for p in case.assembly.parts],
-        case.assembly.ids,
-        curves=curves_of,
-        compared=False,
-        fitted=[case.band] if case.band else [],
-        excluded=case.exclude,
-        outputs=markers(case.outputs),
-        inputs=markers(case.inputs),
-        cords=cords(case),
-        mac=mac_of,
-        pairs=list(zip(found.pairs.test.tolist(), found.pairs.model.tolist(), strict=True)),
-    )
-
-
-def _pictures(drawn: dict[str, Path], names: Sequence[str]) -> list[Picture]:
-    return [Picture(drawn[name], _CAPTIONS.get(name, "")) for name in names if name in drawn]
-
-
-def _shapes(folder: Path, shown: Shown, found: Correlation) -> dict[str, Path]:
-    """Draw the first pairs, test next to model."""
-    from ..view.shape_pairs import shape_pairs
-
-    pairs = found.shapes
-    if pairs is None or not len(pairs.f_test):
-        return {}
-    return {"shapes": shape_pairs(folder / "shapes.png", shown.seen, pairs.first(_DRAWN))}
+def _shown(case: Case) -> Shown:
+    return replace(
+        mesh_of(surface(case.assembly), case.assembly),
+        outputs=markers(case.outputs), inputs=markers(case.inputs), cords=cords(case),
+    )  # fmt: skip
 
 
 def _modes(found: Correlation) -> Table:

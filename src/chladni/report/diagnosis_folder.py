@@ -13,11 +13,10 @@ from ..progress import Progress, silent
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
 from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Code, Section, Text
+from .blocks import Code, Section, Text, write_pictures
 from .calibration_blocks import calibration_json
+from .diagnosis_drawings import drawings
 from .diagnosis_json import diagnosis_json
-from .figures import figures
-from .live_diagnosis import drawings, mac_of
 from .page import write_page
 from .shown import Shown
 from .states_table import state_folder
@@ -32,6 +31,7 @@ def write_diagnosis(
     command: str = "",
     progress: Progress = silent,
     home: Path | None = None,
+    pictures: bool = False,
 ) -> DiagnosisResult:
     """Write the whole folder; return the result with the names of the files.
 
@@ -39,10 +39,11 @@ def write_diagnosis(
     ----------
     command : the line that makes this run again
     home : where the folder is moved to afterwards, if it is
+    pictures : True: every drawing as PNG too; False: that of the first screen
     """
     folder.mkdir(parents=True, exist_ok=True)
     home = home or folder
-    result = _with_states(folder, case, result, progress, home)
+    result = _with_states(folder, case, result, progress, home, pictures)
     files = _decks(folder, case, result, home)
     files |= {"report": "report.html", "diagnosis": "diagnosis.json"}
     if result.study is not None:
@@ -51,25 +52,28 @@ def write_diagnosis(
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)
-    seen = shown(case, result)
-    drawn = figures(folder, result, seen)
+    drawn = drawings(case, result, shown(case, result))
+    figures = {name: folder / name for name, _ in write_pictures(folder, drawn, pictures)}
     title = f"{'Diagnosis' if result.searched else 'Calibration'} – {case.path.parent.name}"
-    live = drawings(case, result, seen)
     write_page(
-        folder, result, drawn, result.notes, _changed(case, result), command, title, live
+        folder, result, {path.stem: path for path in figures.values()}, result.notes,
+        _changed(case, result), command, title, drawn,
     )  # fmt: skip
     return result
 
 
 def _with_states(
-    folder: Path, case: Case, result: DiagnosisResult, progress: Progress, home: Path
-) -> DiagnosisResult:
+    folder: Path, case: Case, result: DiagnosisResult, progress: Progress, home: Path,
+    pictures: bool,
+) -> DiagnosisResult:  # fmt: skip
     """Write every state except the first into its own folder; the first is the run itself."""
     done = list(result.states)
     for k, state in enumerate(result.states):
         if k:
             name = state_folder(result, k)
-            written = write_diagnosis(folder / name, case, state.result, "", progress, home / name)
+            written = write_diagnosis(
+                folder / name, case, state.result, "", progress, home / name, pictures
+            )
             done[k] = replace(state, result=written)
     return replace(result, states=tuple(done))
 
@@ -113,11 +117,6 @@ def _changed(case: Case, result: DiagnosisResult) -> list[Section]:
 def shown(case: Case, result: DiagnosisResult) -> Shown:
     """Mesh, sensors, test and model responses for the pictures."""
     models, compared = result.models, result.compared == "responses"
-    found, after = list(mac_of(case, result).values()), None
-    pairs: Sequence[tuple[int, int]] = ()
-    if found and models is not None:
-        mac, f_model, pairs = found[-1]
-        after = mac, models.test.frequency, f_model
     return Shown(
         surface(case.assembly),
         [p.name for p in case.assembly.parts],
@@ -130,6 +129,4 @@ def shown(case: Case, result: DiagnosisResult) -> Shown:
         markers(case.outputs),
         markers(case.inputs),
         cords(case),
-        after,
-        pairs,
     )

@@ -4,59 +4,61 @@ import gzip
 import json
 import re
 from base64 import b64decode, b64encode
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from collections.abc import Sequence
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..view.chart import Chart
+from ..view.chart_page import page
+from .blocks import Drawing, Spatial
+from .live_mesh import mesh
+
 _NUMBERS = re.compile(r'<script type="text/plain" class="numbers">([A-Za-z0-9+/=]*)</script>')
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """Numbers for one function of ``page.js``.
+def packed(drawn: Sequence[Drawing], shared: Any = None) -> list[str]:
+    """What the drawings share, then each of them: words that a browser reads when it needs them.
 
-    Attributes
-    ----------
-    draw : name of the function
-    place : section of the page
-    data : plain numbers and texts
-    instead_of : names of the pictures that stand for it on paper and where no script runs
-    caption : str
+    ``shared`` is what an earlier page held of it.
     """
-
-    draw: str
-    place: str
-    data: Mapping[str, Any]
-    instead_of: Sequence[str] = ()
-    caption: str = ""
+    meshes = [d.content.shown for d in drawn if isinstance(d.content, Spatial)]
+    own = {"mesh": mesh(meshes[0])} if meshes else shared or {}
+    return [_packed(_json(data)) for data in (own, *(_entry(d) for d in drawn))]
 
 
-@dataclass(frozen=True)
-class Drawings:
-    """All drawings of a page by name, and what they share: the mesh."""
-
-    by_name: Mapping[str, Drawing] = field(default_factory=dict)
-    shared: Mapping[str, Any] = field(default_factory=dict)
-
-    def packed(self) -> list[str]:
-        """The shared data, then each drawing: words that a browser reads when they are needed."""
-        each = ({"name": name, **vars(d)} for name, d in self.by_name.items())
-        return [_packed(_json(data)) for data in (self.shared, *each)]
+def _entry(d: Drawing) -> dict[str, Any]:
+    held: Any = d.content
+    if isinstance(held, Chart):
+        held = {"draw": "chart", **page(held)}
+    elif isinstance(held, Spatial):
+        held = {"draw": held.draw, "data": held.data}
+    about = {"name": d.name, "place": d.place, "caption": d.caption, "stills": list(d.pictures)}
+    return {**held, "about": about}
 
 
-def drawings_of(page: Path) -> Drawings:
-    """The drawings of a page that was written before; none where it holds none."""
+def drawings_of(path: Path) -> tuple[dict[str, Any], list[Drawing]]:
+    """What the drawings of a page share, and the drawings; none where it holds none."""
     try:
-        words = _NUMBERS.findall(page.read_text(encoding="utf-8"))
+        words = _NUMBERS.findall(path.read_text(encoding="utf-8"))
         shared, *each = (json.loads(gzip.decompress(b64decode(word))) for word in words)
-        return Drawings({d.pop("name"): Drawing(**d) for d in each}, shared)
+        return shared, [_drawing(held) for held in each]
     except (OSError, EOFError, ValueError, TypeError, KeyError, AttributeError):
-        return Drawings()  # damaged: its pictures stand for them
+        return {}, []  # damaged: its pictures stand for them
+
+
+def _drawing(held: dict[str, Any]) -> Drawing:
+    about = held.pop("about")
+    stills = {str(name): partial(_lost, name) for name in about.pop("stills")}
+    return Drawing(**about, content={**held, "draw": str(held["draw"])}, stills=stills)
+
+
+def _lost(name: str, path: Path) -> Path:
+    """A page holds no structure to draw again."""
+    raise ValueError(f"{name} is drawn by its command alone")
 
 
 @cache
@@ -66,17 +68,9 @@ def library() -> str:
     return _packed(script.read_text(encoding="utf-8"))
 
 
-def rounded(values: np.ndarray, step: float) -> list[Any]:
-    """Values over ``step`` as whole numbers, nan as None: short when compressed."""
-    finite = np.isfinite(values)
-    whole = np.rint(np.where(finite, values, 0.0) / step).astype(int).astype(object)
-    whole[~finite] = None
-    return list(whole.tolist())
-
-
 def _listed(value: Any) -> Any:
     """Arrays as lists."""
-    return value.tolist()
+    return value.item() if isinstance(value, np.generic) else value.tolist()
 
 
 def _json(data: Any) -> str:

@@ -1,5 +1,6 @@
 """The evaluation of a test as a page: findings, FRFs, coherence, distortion, free decays."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,39 +13,37 @@ from ..ema.ring_down import RingDown
 from ..io.tables.write_tables import write_npz
 from ..io.uff.estimate_stamp import stamp
 from ..io.uff.write_uff import write_uff
+from ..view.chart import Chart, ChartAxis, Series
+from ..view.chart_page import extremes
+from ..view.charts import FREQUENCY, over
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
-from . import live_pages as live
-from . import live_panels
-from .blocks import Block, PageParts, Picture, Section, Table
-from .level_blocks import draw_levels, level_section
-from .live_pages import Page
+from . import frf_charts
+from .blocks import Block, Drawing, PageParts, Section, Table
+from .level_blocks import level_drawings, level_section
 from .screening_blocks import lead_of, screening_json, screening_section
 from .typed_fields import as_data
 from .words import number
 
 _SHOWN = 12  # channels drawn
+_POINTS, _LEAST = 2000, 200  # of a curve; of one among many
 
 
 def evaluation_page(folder: Path, found: Evaluation) -> PageParts:
-    """Sections of the page; pictures and, of time data, the FRFs are written into the folder."""
+    """Sections of the page; the FRFs of time data are written into the folder."""
     sections = [screening_section(*(r.screening for r in found.recordings))]
     files: list[tuple[str, str]] = []
-    page, share = Page(), len(found.recordings)
+    share = len(found.recordings)
     for k, r in enumerate(found.recordings):
         stem = "" if len(found.recordings) == 1 else f"_{k + 1}"
         files += _written(folder, stem, r)
-        blocks, drawn = _blocks(page, folder, stem, r, share)
-        sections.append(Section(r.recording.name, blocks))
-        files += drawn
+        sections.append(Section(r.recording.name, _blocks(stem, r, share)))
         if r.levels.nonlinear:
             tables = level_tables(r.levels)
-            pictures = draw_levels(folder, tables, f"_decay{stem}")
             of = f"Free decays of {r.recording.name} by amplitude"
-            drawings = live.levels(page, tables, pictures)
-            sections.append(replace(level_section(tables, drawings), title=of))
-            files += [(path.name, "a mode over its amplitudes") for path in pictures.values()]
+            drawn = level_drawings(tables, f"_decay{stem}")
+            sections.append(replace(level_section(tables, drawn), title=of))
     lead = lead_of([r.screening for r in found.recordings])
-    return PageParts(lead, sections, found.notes, files, page.drawings)
+    return PageParts(lead, sections, found.notes, files)
 
 
 def in_words(found: Evaluation) -> PageParts:
@@ -70,59 +69,63 @@ def _written(folder: Path, stem: str, r: RecordingEvaluation) -> list[tuple[str,
     return list(zip(names, what, strict=True))
 
 
-def _blocks(
-    page: Page, folder: Path, stem: str, r: RecordingEvaluation, share: int
-) -> tuple[list[Block], list[tuple[str, str]]]:
-    from ..view import evaluation_plots, plots
-
+def _blocks(stem: str, r: RecordingEvaluation, share: int) -> list[Block]:
+    """Draw FRFs, coherence, distortion and free decays; the page shows ``share`` recordings."""
     frf = r.recording.frf
     assert frf is not None
     channels = [(i, j) for j in range(len(frf.inputs)) for i in range(len(frf.outputs))][:_SHOWN]
-    named = {f"{frf.outputs[i]} from {frf.inputs[j]}": (i, j) for i, j in channels}
-    blocks: list[Block] = [_table(frf)]
-    files = []
-    grid = folder / f"frf_grid{stem}.png"
-    curves = {n: {"test": (frf.frequency, frf.values[:, i, j])} for n, (i, j) in named.items()}
-    plots.frf_grid(grid, curves, UNIT.get(frf.quantity, ""), columns=min(2, len(curves)))
-    blocks.append(
-        live.responses(page, grid.stem, {"test": frf}, [Picture(grid, "FRFs.")], share=share)
-    )
-    files.append((grid.name, "FRFs"))
+    chart, _ = frf_charts.responses({"test": frf}, share=share)
+    grid = {f"frf_grid{stem}": frf_charts.overview(chart)}
+    caption = frf_charts.CAPTION
+    blocks: list[Block] = [_table(frf), Drawing(f"frf_grid{stem}", chart, caption, grid, "FRFs")]
     if frf.coherence is not None:
-        path = folder / f"coherence{stem}.png"
         alone = len(frf.inputs) == 1
         lines = {
-            frf.outputs[i] if alone else name: frf.coherence[:, i, j]
-            for name, (i, j) in named.items()
-        }
-        evaluation_plots.lines_over_frequency(
-            path, frf.frequency, lines, "coherence [-]", (0.0, 1.02)
+            frf.outputs[i] if alone else f"{frf.outputs[i]} from {frf.inputs[j]}":
+            frf.coherence[:, i, j] for i, j in channels
+        }  # fmt: skip
+        axis, text = (
+            ChartAxis("coherence [-]", limits=(0.0, 1.02)),
+            "low values show noise or leakage.",
         )
-        still = Picture(path, "Coherence: low values show noise or leakage.")
-        data = live_panels.over_frequency(frf.frequency, lines, "coherence [-]", (0.0, 1.02), share)
-        blocks.append(live.panels(page, path.stem, data, still))
-        files.append((path.name, "coherence"))
+        drawn = over_frequency(frf.frequency, lines, axis, share)
+        blocks.append(Drawing(f"coherence{stem}", drawn, f"Coherence: {text}", what="coherence"))
     distortion = r.estimate.distortion if r.estimate is not None else None
     if distortion is not None:
-        path = folder / f"distortion{stem}.png"
         each = {o: 100 * distortion[:, i] for i, o in enumerate(frf.outputs[:_SHOWN])}
-        evaluation_plots.lines_over_frequency(path, frf.frequency, each, "harmonics 2 to 5 [%]")
-        still = Picture(path, "Harmonics of the responses over their fundamental.")
-        data = live_panels.over_frequency(frf.frequency, each, "harmonics 2 to 5 [%]", share=share)
-        blocks.append(live.panels(page, path.stem, data, still))
-        files.append((path.name, "harmonic distortion"))
+        axis = ChartAxis("harmonics 2 to 5 [%]", zero=True)
+        drawn = over_frequency(frf.frequency, each, axis, share)
+        text = "Harmonics of the responses over their fundamental."
+        blocks.append(Drawing(f"distortion{stem}", drawn, text, what="harmonic distortion"))
     if r.decays:
-        path = folder / f"decays{stem}.png"
-        each_decay = {
-            f"{number(d.frequency)} Hz, {d.output}": (d.amplitude, d.frequency_at, d.damping_at)
-            for d in r.decays
-        }
-        evaluation_plots.amplitude_dependence(path, each_decay)
-        still = Picture(path, "Frequency and damping against amplitude.")
-        data = live_panels.decays(each_decay)
-        blocks += [_decays(r.decays), live.panels(page, path.stem, data, still)]
-        files.append((path.name, "free decays"))
-    return blocks, files
+        text = "Frequency and damping against amplitude."
+        drawn = over_amplitude(r.decays)
+        blocks += [_decays(r.decays), Drawing(f"decays{stem}", drawn, text, what="free decays")]
+    return blocks
+
+
+def over_frequency(
+    f: np.ndarray, lines: Mapping[str, np.ndarray], axis: ChartAxis, share: int = 1
+) -> Chart:
+    """Real functions of frequency (n,) [Hz] by channel; ``share`` such drawings are on the page."""
+    most = max(_LEAST, _POINTS // share)
+    series = []
+    for name, y in lines.items():
+        at = extremes(np.nan_to_num(y), most)
+        series.append(Series(name, f[at], y[at], width=1.0))
+    return over(FREQUENCY, (axis, series))
+
+
+def over_amplitude(decays: Sequence[RingDown]) -> Chart:
+    """Frequency relative to the faintest, and damping, against the amplitude of free decays."""
+    both = [(f"{number(d.frequency)} Hz, {d.output}", d) for d in decays]
+    f = [Series(n, d.amplitude, 100 * (d.frequency_at / d.frequency_at[-1] - 1), "both")
+         for n, d in both]  # fmt: skip
+    z = [Series(n, d.amplitude, 100 * d.damping_at, "both") for n, d in both]
+    x = ChartAxis("amplitude of the response [SI]", log=True)
+    return over(
+        x, (ChartAxis("frequency, relative [%]"), f), (ChartAxis("damping [%]", zero=True), z)
+    )
 
 
 def _table(frf: FRF) -> Table:

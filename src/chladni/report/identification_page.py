@@ -1,13 +1,13 @@
 """Identified modes as a page: the table, the stabilisation diagram, indicators, shapes, the fit."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..dynamics.frf import UNIT
+from ..dynamics.frf import FRF, UNIT
 from ..ema.correlation import auto_mac
 from ..ema.finding import of_all
 from ..ema.identification import evaluate
@@ -16,49 +16,52 @@ from ..ema.mode_indicators import cmif, mif
 from ..ema.shapes import driven_shapes, shape_spread, shapes
 from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_levels, write_poles
+from ..view import charts
+from ..view.chart import Chart, ChartAxis, Mark, Panel, Series
 from ..workflows.identify import Identification, RecordingModes
-from . import live_pages as live
-from .blocks import Block, PageParts, Picture, Section, Table
-from .level_blocks import draw_levels, level_section
-from .live_pages import Page
+from . import frf_charts
+from .blocks import Block, Drawing, PageParts, Section, Table, still
+from .level_blocks import level_drawings, level_section
 from .screening_blocks import SEVERAL, screening_json, screening_section
 from .typed_fields import as_data
 from .words import hertz, number
 
-_SHOWN = 6  # channels drawn
+_SHOWN = 6  # channels in the picture of the fit
 _CIRCLES = 30  # modes drawn
 _MATRIX = 40  # modes of an AutoMAC that can still be read
-_FILES = {
-    "stabilisation": "stabilisation diagram",
-    "indicators": "mode indicators",
-    "fit": "the recording and the identified model",
-    "circles": "Nyquist circles of the modes",
-    "automac": "AutoMAC of the modes",
+_MOST_POLES = 5000
+_CLASSES = {  # letter of a pole: (mark, tint, size, meaning)
+    "o": ("dot", "line", 3.0, "new"),
+    "f": ("cross", "soft", 3.5, "frequency"),
+    "d": ("up", "#e69f00", 4.0, "and damping"),
+    "v": ("down", "#56b4e9", 4.0, "and shape"),
+    "s": ("circle", "calm", 5.0, "all steady"),
 }
+_POLES = (
+    "Poles of every order, compared with the order before (Heylen, Lammens and Sas, 1997). "
+    "Lines: poles kept; dotted: poles rejected. Point at a pole for its numbers, click it to "
+    "pick it."
+)
 _AROUND = 4.0  # half bandwidths of a circle
 
 
 def identification_page(folder: Path, found: Identification) -> PageParts:
-    """Sections of the page; its pictures and tables are written into the folder."""
+    """Sections of the page; its tables are written into the folder."""
     sections, files = [screening_section(*(r.screening for r in found.recordings))], []
-    page, share = Page(), len(found.recordings)
+    share = len(found.recordings)
     for k, r in enumerate(found.recordings):
         stem, name = "" if len(found.recordings) == 1 else f"_{k + 1}", r.recording.name
         write_poles(folder / f"poles{stem}.csv", r.poles)
         files.append((f"poles{stem}.csv", f"poles of {name}"))
-        pictures = _pictures(folder, stem, r)
-        sections.append(Section(name, [_table(r), *_live(page, stem, r, pictures, share)]))
+        sections.append(Section(name, [_table(r), *_drawings(stem, r, share)]))
         files += _modal_files(folder, stem, r)
-        files += [(p.path.name, _FILES[p.path.stem.removesuffix(stem)]) for p in pictures]
     for k, study in enumerate(found.levels):
         tables = level_tables(study)
         stem = "" if len(found.levels) == 1 else f"_{k + 1}"
         write_levels(folder / f"levels{stem}.csv", tables)
         files.append((f"levels{stem}.csv", "every mode at every level, with its intervals"))
-        drawn = draw_levels(folder, tables, stem)
-        sections.insert(k, level_section(tables, live.levels(page, tables, drawn)))
-        files += [(path.name, "a mode over levels") for path in drawn.values()]
-    return PageParts(_lead(found.recordings), sections, found.notes, files, page.drawings)
+        sections.insert(k, level_section(tables, level_drawings(tables, stem)))
+    return PageParts(_lead(found.recordings), sections, found.notes, files)
 
 
 def in_words(found: Identification) -> PageParts:
@@ -121,76 +124,97 @@ def _table(r: RecordingModes) -> Table:
     return Table(heads, rows, caption=caption)
 
 
-def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Picture]:
-    from ..view import modal_plots, plots
+def _drawings(stem: str, r: RecordingModes, share: int) -> list[Block]:
+    """The stabilisation diagram, indicators, the fit, circles, AutoMAC.
 
+    The page shows ``share`` recordings.
+    """
     frf, modal = r.recording.frf, r.modes
     assert frf is not None
-    inside = (modal.band[0] <= frf.frequency) & (frf.frequency <= modal.band[1])
-    f = frf.frequency[inside]
-    unit = UNIT.get(frf.quantity, "")
-    H, fitted = frf.values[inside], evaluate(r.whole, 2j * np.pi * f)
-    size = np.sqrt((np.abs(H) ** 2).mean(axis=(1, 2)))
-    path = {name: folder / f"{name}{stem}.png" for name in _FILES}
-    d, kept = r.diagram, modal.frequency[r.firm]
-    modal_plots.stabilisation_classes(
-        path["stabilisation"],
-        d.states, d.frequency, d.kind, kept, modal.frequency[r.struck], (f, size), unit,
-    )  # fmt: skip
-    modal_plots.mode_indicators(
-        path["indicators"], f, cmif(frf)[inside], mif(frf)[inside], kept, unit
-    )
-    channels = {
-        f"{o} from {i}": {"test": (f, H[:, a, b]), "identified": (f, fitted[:, a, b])}
-        for b, i in enumerate(frf.inputs)
-        for a, o in enumerate(frf.outputs)
-    }
-    chosen = dict(list(channels.items())[:_SHOWN])
-    plots.frf_grid(path["fit"], chosen, unit, columns=min(2, len(chosen)))
-    blocks = [
-        Picture(path["stabilisation"], "Poles of every order; lines: the poles kept."),
-        Picture(path["indicators"], "Singular values of the responses; share in quadrature."),
-        Picture(path["fit"]),
-    ]
+    low, high = modal.band
+    test = frf.sel(band=(float(low), float(high)))
+    fitted = replace(test, values=evaluate(r.whole, 2j * np.pi * test.frequency))
+    fit, _ = frf_charts.responses({"test": test, "identified": fitted}, share=share)
+    kept = modal.frequency[r.firm]
+    blocks: list[Block] = [
+        Drawing(f"stabilisation{stem}", stabilisation(r), _POLES, what="stabilisation diagram"),
+        Drawing(f"indicators{stem}", indicators(r, test), "Singular values of the responses; share "
+                "in quadrature.", what="mode indicators"),
+        Drawing(f"fit{stem}", fit, frf_charts.CAPTION,
+                {f"fit{stem}": frf_charts.overview(fit, _SHOWN)},
+                "the recording and the identified model"),
+    ]  # fmt: skip
     if len(kept):
-        modal_plots.nyquist_grid(path["circles"], _circles(r))
-        blocks.append(Picture(path["circles"], "Each mode at the channel where it is clearest."))
+        chart = circles(_circles(r))
+        names = list(chart.views)
+        grid = {f"circles{stem}": still(chart.grid(names, 5, (1.9, 1.9)))}
+        text = "Each mode at the channel where it is clearest."
+        what = "Nyquist circles of the modes"
+        blocks.append(Drawing(f"circles{stem}", chart, text, grid, what))
     if 1 < len(kept) <= _MATRIX and len(frf.outputs) > 1:
-        labels = [hertz(x) for x in kept]
-        psi = driven_shapes(modal.sel(r.firm))
-        plots.mac_matrix(path["automac"], auto_mac(psi), labels, labels, "AutoMAC of the test [Hz]")
-        blocks.append(
-            Picture(path["automac"], "Off the diagonal: modes that are similar at these sensors.")
-        )
+        auto: dict[str, Any] = {"test": (auto_mac(driven_shapes(modal.sel(r.firm))), kept, [])}
+        text = "Off the diagonal: modes that are similar at these sensors."
+        chart = charts.mac(kept, auto)
+        blocks.append(Drawing(f"automac{stem}", chart, text, what="AutoMAC of the modes"))
     return blocks
 
 
-def _live(
-    page: Page, stem: str, r: RecordingModes, pictures: Sequence[Picture], share: int
-) -> list[Block]:
-    """The pictures, some of them drawn by the page, which shows ``share`` recordings."""
-    frf = r.recording.frf
+def stabilisation(r: RecordingModes) -> Chart:
+    """Poles over model order by class, kept ones as lines, struck ones as dotted lines."""
+    frf, d = r.recording.frf, r.diagram
     assert frf is not None
-    low, high = r.modes.band
-    test = frf.sel(band=(float(low), float(high)))
-    curves = {
-        "test": test,
-        "identified": replace(test, values=evaluate(r.whole, 2j * np.pi * test.frequency)),
-    }
-    shapes = driven_shapes(r.modes.sel(r.firm))
-    kept = r.modes.frequency[r.firm]
+    low, high = (float(f) for f in r.modes.band)
+    at = np.flatnonzero((low <= d.frequency) & (d.frequency <= high))[:_MOST_POLES]
+    series = []
+    for letter, (mark, tint, size, text) in _CLASSES.items():
+        some = at[d.kind[at] == letter]
+        tips = [f"{f:.2f} Hz, damping {100 * z:.3f} %\n{n} states, {text}" for f, z, n in
+                zip(d.frequency[some], d.damping[some], d.states[some], strict=True)]  # fmt: skip
+        place = np.round(d.frequency[some], 3), d.states[some].astype(float)
+        series.append(Series(text, *place, "points", tint, size=size, tips=tips,
+                             symbol=mark))  # type: ignore[arg-type] # fmt: skip
+    lines = frf_charts.thinned(frf, 2000)
+    lines = lines[(low <= frf.frequency[lines]) & (frf.frequency[lines] <= high)]
+    rms = np.sqrt((np.abs(frf.values[lines]) ** 2).mean(axis=(1, 2)))
+    series.append(Series("rms of |H|", frf.frequency[lines], rms, tint="steel", width=1.0,
+                         right=True))  # fmt: skip
+    marks = [Mark(f, tint="before", name="kept") for f in r.modes.frequency[r.firm]]
+    marks += [Mark(f, tint="ink", dash="dot", name="struck out")
+              for f in r.modes.frequency[r.struck]]  # fmt: skip
+    unit = UNIT.get(frf.quantity, "")
+    behind = ChartAxis(f"rms of |H| [{unit}]" if unit else "rms of |H|", log=True)
+    x = replace(charts.FREQUENCY, limits=(low, high))
+    panel = Panel(series, x, ChartAxis("states"), marks=marks, right=behind)
+    return Chart.of(panel, size=(8.2, 4.6), height=28, pick="chladni identify ...")
 
-    def block(picture: Picture) -> Block:
-        kind, still = picture.path.stem.removesuffix(stem), [picture]
-        if kind == "stabilisation":
-            return live.poles(page, kind + stem, r, still)
-        if kind == "fit":
-            return live.responses(page, kind + stem, curves, still, share=share)
-        if kind == "automac":
-            return live.likeness(page, kind + stem, auto_mac(shapes), kept, kept, "test", [], still)
-        return picture
 
-    return [block(picture) for picture in pictures]
+def indicators(r: RecordingModes, test: FRF) -> Chart:
+    """Singular values of H (complex mode indicator), and the share in quadrature."""
+    at = frf_charts.thinned(test, 4000)
+    f, values, share = test.frequency[at], cmif(test)[at], mif(test)[at]
+    unit = UNIT.get(test.quantity, "")
+    above = [Series("", f, values[:, k], tint=("ink", "after", "calm")[k % 3])
+             for k in range(values.shape[1])]  # fmt: skip
+    marks = [Mark(x, tint="before") for x in r.modes.frequency[r.firm]]
+    quadrature = [Series("", f, share, tint="ink")]
+    return Chart.of(
+        Panel(above, charts.FREQUENCY, ChartAxis(f"CMIF [{unit}]", log=True), marks=marks, share=2),
+        Panel(quadrature, charts.FREQUENCY, ChartAxis("MIF", limits=(0, 1.02)), marks=marks),
+        one_x=True, size=(8.2, 4.0), height=28,
+    )  # fmt: skip
+
+
+def circles(modes: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Chart:
+    """A Nyquist circle of each mode: measured lines as dots (n,), the model as a curve (m,)."""
+    views = {
+        name: [Panel(
+            [Series("identified", model.real, model.imag, tint="after", width=1.2),
+             Series("test", test.real, test.imag, "points", "ink", size=3)],
+            ChartAxis("Re H"), ChartAxis("Im H"), marks=(Mark(0.0), Mark(0.0, "x")), equal=True,
+        )]
+        for name, (test, model) in modes.items()
+    }  # fmt: skip
+    return Chart(views, size=(4.0, 4.0), height=30, choice="mode")
 
 
 def _circles(r: RecordingModes) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -1,14 +1,15 @@
 """Modes over levels of excitation: tables and pictures of a page."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from ..ema.finding import TINY
 from ..ema.level_study import CALM
 from ..ema.level_table import LevelRow, LevelTable
-from .blocks import Block, Items, Section, Table
+from ..view.chart import Chart, ChartAxis, Series
+from ..view.charts import over
+from .blocks import Block, Drawing, Items, Section, Table
 from .words import interval, number
 
 SHOWN = 6  # modes that are drawn
@@ -25,7 +26,7 @@ def level_section(tables: Sequence[LevelTable], drawn: Mapping[int, Block]) -> S
 
     Parameters
     ----------
-    drawn : pictures or drawings by the position of the mode
+    drawn : drawings by the position of the mode
     """
     if not tables:
         return Section("Levels", [])
@@ -150,30 +151,44 @@ def moving(tables: Sequence[LevelTable]) -> list[int]:
     return [k for k, t in enumerate(tables) if t.signature not in CALM][:SHOWN]
 
 
-def draw_levels(folder: Path, tables: Sequence[LevelTable], stem: str = "") -> dict[int, Path]:
-    """Pictures of the modes that move: {position of the mode: path}."""
-    from ..view import level_plots
+def over_levels(t: LevelTable) -> Chart:
+    """Frequency and damping of one mode over its amplitude: measured, fitted, predicted, linear."""
+    rows = [(r.amplitude_m, r.frequency_hz, r.frequency_sd_hz, r.foretold_hz,
+             r.damping, r.damping_sd, r.foretold_damping) for r in t.rows]  # fmt: skip
+    a, *values = np.array(rows, dtype=float).T
+    fitted = np.array(t.curve, dtype=float).reshape(-1, 3).T
+    element = t.elements[0].name if t.elements else "the element"
 
-    made: dict[int, Path] = {}
-    for k in moving(tables):
-        t = tables[k]
-        path = folder / f"levels{stem}_{k + 1}.png"
-        f = [(r.frequency_hz, r.frequency_sd_hz, r.foretold_hz) for r in t.rows]
-        z = [(r.damping, r.damping_sd, r.foretold_damping) for r in t.rows]
-        mean = (t.mean_hz, t.mean_damping)
-        made[k] = level_plots.mode_over_levels(
-            path, f"{t.signature}: {number(t.rows[0].frequency_hz)} Hz at {t.output}",
-            np.array([r.amplitude_m for r in t.rows]), _columns(f), _columns(z),
-            np.array(t.curve) if t.curve else None,
-            t.elements[0].name if t.elements else "",
-            (mean[0], mean[1]) if mean[0] and mean[1] else None,
-        )  # fmt: skip
-    return made
+    def side(measured: Sequence[np.ndarray], line: np.ndarray, mean: float | None) -> list[Series]:
+        value, sd, foretold = measured
+        ends = value - 2 * sd, value + 2 * sd
+        series = [Series("measured", 1e3 * a, value, "points", "ink", ends=ends)]
+        if len(line):
+            name = f"{element}, fitted to all"
+            series.append(Series(name, 1e3 * fitted[0], line, tint="after"))
+        if np.isfinite(foretold).any():
+            series.append(
+                Series("predicted from the others", 1e3 * a, foretold, "points", "after",
+                       symbol="diamond", size=8)
+            )  # fmt: skip
+        if mean:
+            level = 1e3 * a[[0, -1]], np.full(2, mean)
+            series.append(Series("one linear model", *level, tint="before", dash="dash"))
+        return series
+
+    mean = None if t.mean_damping is None else 100 * t.mean_damping
+    return over(
+        ChartAxis("amplitude [mm]", log=True),
+        (ChartAxis("natural frequency [Hz]"), side(values[:3], fitted[1], t.mean_hz)),
+        (ChartAxis("damping [% of critical]", zero=True),
+         side([100 * v for v in values[3:]], 100 * fitted[2], mean)),
+    )  # fmt: skip
 
 
-def _columns(
-    rows: Sequence[tuple[float, float, float | None]],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return value, spread and prediction (nan: none), each (k,)."""
-    value, sd, foretold = np.array(rows, dtype=float).T
-    return value, sd, foretold
+def level_drawings(tables: Sequence[LevelTable], stem: str = "") -> dict[int, Drawing]:
+    """Modes that depend on the level over it, by the position of the mode."""
+    return {
+        k: Drawing(f"levels{stem}_{k + 1}", over_levels(tables[k]), what="a mode over levels",
+                   place="levels")
+        for k in moving(tables)
+    }  # fmt: skip

@@ -9,8 +9,6 @@ import numpy as np
 
 from ..geometry.cells import directed_edges
 from ..view.camera import best_view
-from .drawings import rounded
-from .shown import CALM
 
 if TYPE_CHECKING:
     from ..effects.estimate import Location
@@ -28,6 +26,14 @@ _ALL_EDGES = 5000  # faces up to which every edge is drawn
 _SHAPE_VALUES = 1_500_000  # of all motions on a page: about 4 MB
 _FINE = 1e-5  # of the structure's size: how exactly places are kept
 _THOUSANDTH = 1e-3
+
+
+def rounded(values: np.ndarray, step: float) -> list[Any]:
+    """Values over ``step`` as whole numbers, nan as None: short when compressed."""
+    finite = np.isfinite(values)
+    whole = np.rint(np.where(finite, values, 0.0) / step).astype(int).astype(object)
+    whole[~finite] = None
+    return list(whole.tolist())
 
 
 def mesh(shown: Shown) -> dict[str, Any]:
@@ -102,21 +108,15 @@ def _markers(markers: Sequence[Marker]) -> list[dict[str, Any]]:
     return [{"at": m.point, "along": m.direction, "label": m.label} for m in markers]
 
 
-def left(gain: np.ndarray, shown: Shown) -> dict[str, Any]:
-    """Gain of a local change on every face that is drawn; None where the test is blind."""
-    values = np.full(len(shown.seen.faces), np.nan)
-    values[: len(gain)] = gain
-    return field(values, shown, (0.0, max(float(np.nanmax(values)), CALM)), "gain")
-
-
 def field(
-    values: np.ndarray, shown: Shown, limits: tuple[float, float], title: str
+    values: np.ndarray, shown: Shown, limits: tuple[float, float], title: str, colours: str
 ) -> dict[str, Any]:
     """Values (m,) of all faces; not finite: grey."""
     low, top = limits
     step = max(top - low, 1e-300) / 1000
     drawn = rounded(values[~np.asarray(shown.seen.joint)], step)
-    return {"value": drawn, "step": step, "low": low, "top": top, "title": title}
+    return {"value": drawn, "step": step, "low": low, "top": top, "title": title,
+            "colours": colours}  # fmt: skip
 
 
 def shapes(

@@ -1,7 +1,6 @@
 """A mapped thickness as a page: result for each part, its accuracy, places of change."""
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,9 +8,8 @@ import numpy as np
 from ..view.surface import surface
 from ..workflows.loaded_model import on_faces
 from ..workflows.map import MappedDeck
-from . import live_pages as live
-from .blocks import Block, Facts, PageParts, Picture, Section, Table
-from .live_pages import Page
+from .blocks import Block, Facts, PageParts, Section, Table
+from .mesh_drawings import field, mesh_of
 from .words import number
 
 _HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
@@ -28,22 +26,18 @@ _GUESS = (
 )
 
 
-def map_page(folder: Path, found: MappedDeck) -> PageParts:
-    """Sections of the page; its pictures are written into the folder."""
+def map_page(found: MappedDeck) -> PageParts:
+    """Sections of the page."""
     from ..view import scene
 
-    shown, t = live.mesh_of(surface(found.after), found.after), found.after.thickness()
-    seen, page = shown.seen, Page()
+    shown, t = mesh_of(surface(found.after), found.after), found.after.thickness()
+    seen = shown.seen
     change = on_faces(seen, 100 * (t / found.before.thickness() - 1))
-    after = scene.thickness_map(folder / "thickness.png", seen, on_faces(seen, t))
-    limits = scene.usual_limits(seen, change)
-    changed = scene.scalar_map(
-        folder / "change.png", seen, change, "change of thickness", "%", "YlGnBu_r", limits
-    )
     mm = on_faces(seen, 1e3 * t)
+    limits = [scene.usual_limits(seen, values) for values in (mm, change)]
     maps = [
-        live.field(page, shown, mm, scene.usual_limits(seen, mm), Picture(after), "t [mm]"),
-        live.field(page, shown, change, limits, Picture(changed), "change of t [%]"),
+        field(shown, mm, limits[0], "thickness", "thickness [mm]"),
+        field(shown, change, limits[1], "change", "change of thickness [%]", colours="YlGnBu_r"),
     ]
     was, now = found.mass
     facts = [("Sheets before", f"{number(was)} kg"), ("after", f"{number(now)} kg")]
@@ -51,8 +45,7 @@ def map_page(folder: Path, found: MappedDeck) -> PageParts:
     sections = [Section("Thickness", blocks)]
     if found.thinning is not None:
         sections.append(Section("Parts missing from the file", _guessed(found)))
-    files = [("thickness.png", "thickness"), ("change.png", "change of thickness")]
-    return PageParts(_lead(found), sections, found.notes, files, page.drawings)
+    return PageParts(_lead(found), sections, found.notes)
 
 
 def in_words(found: MappedDeck) -> PageParts:

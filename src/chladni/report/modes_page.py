@@ -7,42 +7,37 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .blocks import Facts, PageParts, Picture, Section, Table
-from .live_pages import Page, mesh_of, mode_shapes
+from .blocks import Facts, PageParts, Section, Table
+from .mesh_drawings import mesh_of, mode_shapes
 from .words import hertz, number
 
 if TYPE_CHECKING:
     from ..workflows.loaded_model import Model
     from ..workflows.modes import NormalModes
 
-_SHOWN = 12  # modes in the picture
+_SHOWN = 12  # modes in the picture; rigid ones on the page where there are no others
 LEFT = 1e-3  # of the strain energy; more of it that is in no part has a column
 _NODES = 20_000  # in the universal file, a text of a hundred bytes per node and mode
 
 
 def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
-    """Sections of the page; the picture and the shapes for ParaView are written into the folder."""
+    """Sections of the page; the shapes for other programs are written into the folder."""
     from ..io.vtu import write_vtu
-    from ..view.scene import montage
 
     modal = found.modal
     motion, f = model.motion(modal.shapes), modal.frequency
     write_vtu(folder / "modes.vtu", model.assembly, motion, f)
     other, notes = _universal(folder, model, motion, f)
     elastic = np.flatnonzero(~found.rigid)
-    shown = elastic[:_SHOWN] if len(elastic) else np.arange(min(_SHOWN, len(modal)))
-    numbers = [int(k) + 1 for k in shown]
-    montage(folder / "modes.png", model.seen, motion[:, :, shown], f[shown], numbers=numbers)
-    still = Picture(folder / "modes.png", "Colour: displacement, 0 to its largest.")
-    page, whole = Page(), mesh_of(model.seen, model.assembly)
-    every = elastic if len(elastic) else shown
-    order = [int(k) + 1 for k in every]
-    shapes = mode_shapes(page, whole, motion[:, :, every], f[every], order, [still])
+    every = elastic if len(elastic) else np.arange(min(_SHOWN, len(modal)))
+    numbers = [int(k) + 1 for k in every]
+    whole = mesh_of(model.seen, model.assembly)
+    shapes = mode_shapes(whole, motion[:, :, every], f[every], numbers, _SHOWN,
+                         "the first elastic modes", "modes")  # fmt: skip
     said = in_words(found)
     files = [("modes.vtu", "shapes for ParaView"), *other]
-    files.append(("modes.png", "the first elastic modes"))
     sections = [Section("Mode shapes", list(shapes)), *said.sections]
-    return PageParts(said.lead, sections, (*said.notes, *notes), files, page.drawings)
+    return PageParts(said.lead, sections, (*said.notes, *notes), files)
 
 
 def in_words(found: NormalModes) -> PageParts:

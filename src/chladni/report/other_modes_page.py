@@ -1,13 +1,14 @@
 """Modes of a model compared with those of another program, as a page."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..view import charts
 from ..workflows.loaded_model import Model
 from ..workflows.other_modes import OtherModes
-from .blocks import Block, PageParts, Picture, Section, Table
+from .blocks import Block, Drawing, PageParts, Section, Table
+from .mesh_drawings import mesh_of, mode_shapes
 from .words import criterion, hertz
 
 _SHOWN = 12  # shapes in a picture
@@ -19,30 +20,25 @@ _CAPTION = (
 )
 
 
-def other_modes_page(folder: Path, model: Model, found: OtherModes) -> PageParts:
-    """Sections of the page; its pictures are written into the folder."""
-    from ..view import plots
-    from ..view.scene import montage
-
+def other_modes_page(model: Model, found: OtherModes) -> PageParts:
+    """Sections of the page."""
     blocks: list[Block] = [_table(found)]
-    files = []
     if max(found.mac.shape) <= _MOST:
-        rows, columns = ([hertz(f) for f in side] for side in (found.f_other, found.f_model))
-        title = f"{found.source.name} (rows), model (columns) [Hz], pairs framed"
         pairs = list(zip(found.pairs.test.tolist(), found.pairs.model.tolist(), strict=True))
-        path = plots.mac_matrix(folder / "mac.png", found.mac.T, rows, columns, title, pairs)
-        blocks.append(Picture(path))
-        files.append(("mac.png", "MAC"))
+        both = {"model": (found.mac.T, found.f_model, pairs)}
+        caption = f"MAC, {found.source.name} against the model; framed: the pairs."
+        chart = charts.mac(found.f_other, both, found.source.name)
+        blocks.append(Drawing("mac", chart, caption, what="MAC"))
     sections, notes = [Section("Modes", blocks)], list(found.notes)
     if found.whole:
-        path, count = folder / "shapes.png", slice(_SHOWN)
-        f, names = found.f_other[count], found.numbers_other[count]
-        montage(path, model.seen, found.shapes[:, :, count], f, numbers=names)
-        sections.append(Section(f"Shapes of {found.source.name}", [Picture(path)]))
-        files.append(("shapes.png", f"shapes of {found.source.name}"))
+        (shapes,) = mode_shapes(
+            mesh_of(model.seen, model.assembly), found.shapes, found.f_other, found.numbers_other,
+            _SHOWN, f"shapes of {found.source.name}",
+        )  # fmt: skip
+        sections.append(Section(f"Shapes of {found.source.name}", [shapes]))
     else:
         notes.append("The file does not move every grid of the model, so its shapes are not drawn.")
-    return PageParts(_lead(found), sections, notes, files)
+    return PageParts(_lead(found), sections, notes)
 
 
 def in_words(found: OtherModes) -> PageParts:

@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from ..output import own_version, write_text
-from .blocks import Facts, Picture
-from .drawings import Drawings, library
+from .blocks import Drawing, Facts, Picture, drawings
+from .drawings import library, packed
 from .glossary import meaning
 
 if TYPE_CHECKING:
@@ -33,69 +33,68 @@ def write_page(
     tables: Sequence[Section] = (),
     command: str = "",
     title: str = "",
-    drawings: Drawings | None = None,
+    drawn: Sequence[Drawing] = (),
+    shared: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write ``report.html`` of a diagnosis into ``folder``.
 
     Parameters
     ----------
     result : DiagnosisResult
-    figures : dict     name to picture; ``where`` stands on top, known names are put in their
-                       section, others at the end (``verdict.PLACES`` lists the known ones)
+    figures : dict     pictures by name; those of a drawing replace it on paper, known names are put
+                       in their section (``verdict.PLACES``), others at the end
     notes : sentences  what was done and why
     tables : sections  anything more, put before the files
     command : str      the line that makes this run again
-    drawings : Drawings    what the page draws itself; its pictures stand for it on paper
+    drawn : drawings   that of the first screen is ``where``
+    shared : dict      what the drawings of an earlier page share
     """
-    text = diagnosis_page(result, figures, notes, tables, command, title, drawings)
+    text = diagnosis_page(result, figures, notes, tables, command, title, drawn, shared)
     return write_text(Path(folder) / "report.html", text)
 
 
 def diagnosis_page(
     result: DiagnosisResult,
-    figures: Mapping[str, Path | str] | None = None,
+    figures: Mapping[str, Path] | None = None,
     notes: Sequence[str] = (),
     tables: Sequence[Section] = (),
     command: str = "",
     title: str = "",
-    drawings: Drawings | None = None,
+    drawn: Sequence[Drawing] = (),
+    shared: Mapping[str, Any] | None = None,
 ) -> str:
     """The page of a diagnosis as text, its parameters those of :func:`write_page`."""
     from .next_steps import next_steps
     from .sentence import sentence
-    from .verdict import HEADING, TONE, live, sections, three_numbers
+    from .verdict import HEADING, TONE, sections, three_numbers
 
     shown = {name: Path(path) for name, path in (figures or {}).items()}
-    drawings = drawings or Drawings()
-    hero: Block | None = Picture(shown["where"]) if "where" in shown else None
-    if "where" in drawings.by_name:
-        hero = live("where", drawings.by_name["where"], shown)
+    hero: Block | None = next((d for d in drawn if d.name == "where"), None)
+    if hero is None and "where" in shown:
+        hero = Picture(shown["where"])
     return page_text(
         title or "Diagnosis",
-        sections(result, shown, notes, tables, command, drawings),
+        sections(result, shown, notes, tables, command, drawn),
         lead=sentence(result),
         badge=HEADING.get(result.verdict, result.verdict),
         tone="warn" if result.distrust else TONE.get(result.verdict, "neutral"),
         hero=hero,
         facts=three_numbers(result),
         steps=next_steps(result),
-        drawings=drawings,
+        figures=shown,
+        shared=shared,
     )
 
 
 def write_sections(
-    path: Path | str,
-    title: str,
-    body: Sequence[Section],
-    *,
-    lead: str = "",
-    drawings: Drawings | None = None,
-) -> Path:
+    path: Path | str, title: str, body: Sequence[Section], *, lead: str = "",
+    figures: Mapping[str, Path] | None = None,
+) -> Path:  # fmt: skip
     """Write one page of titled sections; the page of every command but the diagnosis.
 
-    ``drawings`` holds the numbers of the ``Live`` blocks.
+    ``figures`` are the pictures of its drawings by name.
     """
-    return write_text(path, page_text(title, body, lead=lead, drawings=drawings))
+    return write_text(path, page_text(title, body, lead=lead, figures=figures))
 
 
 def page_text(
@@ -108,7 +107,8 @@ def page_text(
     hero: Block | None = None,
     facts: Sequence[tuple[str, str]] = (),
     steps: Sequence[str] = (),
-    drawings: Drawings | None = None,
+    figures: Mapping[str, Path] | None = None,
+    shared: Mapping[str, Any] | None = None,
 ) -> str:
     """One page of titled sections as HTML.
 
@@ -125,7 +125,12 @@ def page_text(
     )
     environment.filters["relative_link"] = lambda name: "./" + quote(str(name))
     environment.filters["meaning"] = meaning
-    drawn = drawings is not None and drawings.by_name
+    environment.filters["id"] = id
+    environment.filters["stills"] = lambda block: [
+        Picture(figures[name]) for name in block.pictures if figures and name in figures
+    ]
+    every = [*([hero] if isinstance(hero, Drawing) else []), *drawings(body)]
+    drawn = [d for d in every if d.content is not None]
     return environment.get_template("page.html").render(
         title=title,
         lead=lead,
@@ -134,8 +139,8 @@ def page_text(
         hero=hero,
         first=Facts(facts),
         steps=steps,
-        numbers=drawings.packed() if drawings is not None and drawn else [],
-        places={name: k for k, name in enumerate(drawings.by_name)} if drawings else {},
+        numbers=packed(drawn, shared) if drawn else [],
+        places={id(d): k for k, d in enumerate(drawn)},
         library=library() if drawn else "",
         sections=[s for s in body if s.blocks],
         made=made_with(),

@@ -1,46 +1,38 @@
 """Frequency responses as a page: the outputs that move most."""
 
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..dynamics.frf import FRF, UNIT
 from ..workflows.frf import FrequencyResponses
-from .blocks import PageParts, Picture, Section, Table
+from . import frf_charts
+from .blocks import Drawing, PageParts, Section, Table, still
 from .words import number
 
 _MOTION = {"receptance": "m", "mobility": "m/s", "accelerance": "m/s²"}  # under a deck's own loads
-_SHOWN = 12  # pictures
+_SHOWN = 12  # outputs in the table
 
 
-def response_page(folder: Path, found: FRF) -> PageParts:
-    """Sections of the page; its pictures are written into the folder."""
-    from ..view import plots
-    from .live_pages import Page, responses
-
-    unit = _unit(found)
-    peak = np.abs(found.values).max(axis=0)
-    shown = _shown(found)
-    pictures, files = [], []
-    for j, drive in enumerate(found.inputs):
-        for i in (i for i in shown if peak[i, j] > 0):
-            title = f"{found.outputs[i]} from {drive}"
-            path = folder / _name(found.outputs[i], drive)
-            plots.frf(path, {"model": (found.frequency, found.values[:, i, j])}, title, unit)
-            pictures.append(Picture(path))
-            files.append((path.name, title))
+def response_page(found: FRF) -> PageParts:
+    """Sections of the page."""
+    peak, shown = np.abs(found.values).max(axis=0), _shown(found)
+    chart, _ = frf_charts.responses({"model": found}, unit=_unit(found))
+    drawn = [(f"{found.outputs[i]} from {drive}", _name(found.outputs[i], drive))
+             for j, drive in enumerate(found.inputs) for i in shown if peak[i, j] > 0]  # fmt: skip
+    stills = {"frf": frf_charts.overview(chart)}
+    stills |= {file: still(chart.at(name)) for name, file in drawn if name in chart.views}
     notes = []
     if len(found.outputs) > len(shown):
         notes.append(
-            f"The {len(shown)} outputs that move most are shown; all {len(found.outputs)} are in "
-            "the arrays."
+            f"The {len(shown)} outputs that move most are in the table; all "
+            f"{len(found.outputs)} are in the arrays."
         )
-    page, said = Page(), _words(found)
-    live = responses(page, "frf", {"model": found}, pictures)
-    sections = [Section("Responses", [live, *said.sections[0].blocks])]
-    return PageParts(said.lead, sections, notes, files, page.drawings)
+    said = _words(found)
+    block = Drawing("frf", chart, frf_charts.CAPTION, stills, "a response")
+    sections = [Section("Responses", [block, *said.sections[0].blocks])]
+    return PageParts(said.lead, sections, notes)
 
 
 def in_words(found: FrequencyResponses) -> PageParts:
@@ -106,4 +98,4 @@ def response_json(found: FRF, in_si: bool) -> dict[str, Any]:
 
 def _name(output: str, drive: str) -> str:
     text = f"frf_{output}_from_{drive}".replace("-", "m")
-    return f"{re.sub(r'[^A-Za-z0-9]+', '_', text)}.png"
+    return re.sub(r"[^A-Za-z0-9]+", "_", text)

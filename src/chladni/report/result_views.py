@@ -1,15 +1,15 @@
 """How results are put into words, drawn and saved: what the commands write, from Python."""
 
-import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..output import write_json
 from ..results import View, show_by
-from .blocks import Items, Live, PageParts, Picture, Section
+from .blocks import Items, PageParts, Section, Still, drawings, write_pictures
 
 if TYPE_CHECKING:
     from ..workflows.diagnosis_result import DiagnosisResult
@@ -48,25 +48,31 @@ class Paged:
             self.command,
             lambda found: _text(words(found)),
             lambda found: _html(self.command, words(found)),
-            lambda found: _drawn(lambda folder: _stills(self.page(module, folder, found))),
-            lambda found, folder, _: self._write(module, found, folder),
+            lambda found: self._stills(module, found),
+            lambda found, folder, _, pictures: self._write(module, found, folder, pictures),
             _inputs,
             self.needs_origin,
         )
 
-    def _write(self, module: ModuleType, found: Any, folder: Path) -> None:
+    def _stills(self, module: ModuleType, found: Any) -> Mapping[str, Still]:
+        """What draws each picture; files that the page brings with it are of no use here."""
+        with TemporaryDirectory(prefix="chladni-") as folder:
+            parts = self.page(module, Path(folder), found)
+        return {name: draw for d in drawings(parts.sections) for name, draw in d.pictures.items()}
+
+    def _write(self, module: ModuleType, found: Any, folder: Path, pictures: bool) -> None:
         from .page import write_sections
         from .result_json import to_json
 
         parts = self.page(module, folder, found)
-        files = [*self.files(found, folder), *parts.files]
+        drawn = write_pictures(folder, drawings(parts.sections), pictures)
+        files = [*self.files(found, folder), *parts.files, *drawn]
         if self.json:
             write_json(folder / self.json, to_json(found))
             files.append((self.json, "the result for other programs"))
         body = [*parts.sections, *closing_sections(parts.notes, files)]
-        write_sections(
-            folder / "report.html", self.command, body, lead=parts.lead, drawings=parts.drawings
-        )
+        figures = {Path(name).stem: folder / name for name, _ in drawn}
+        write_sections(folder / "report.html", self.command, body, lead=parts.lead, figures=figures)
 
 
 def closing_sections(notes: Sequence[str], files: Sequence[tuple[str, str]]) -> list[Section]:
@@ -93,22 +99,6 @@ def _html(title: str, parts: PageParts) -> str:
     return page_text(title, [*parts.sections, notes], lead=parts.lead)
 
 
-def _stills(parts: PageParts) -> Iterator[Path]:
-    """All pictures of a page in its order."""
-    for section in parts.sections:
-        for block in section.blocks:
-            if isinstance(block, Picture):
-                yield block.path
-            elif isinstance(block, Live):
-                yield from (picture.path for picture in block.pictures)
-
-
-def _drawn(draw: Callable[[Path], Iterable[Path]]) -> Mapping[str, bytes]:
-    """The pictures that a function draws into a folder, by their names."""
-    with tempfile.TemporaryDirectory(prefix="chladni-") as folder:
-        return {path.stem: path.read_bytes() for path in draw(Path(folder))}
-
-
 def _inputs(found: Any) -> Sequence[Path]:
     """The files of the deck."""
     deck = getattr(found.origin, "deck", None)
@@ -116,8 +106,8 @@ def _inputs(found: Any) -> Sequence[Path]:
 
 
 def _diagnosis() -> View:
+    from .diagnosis_drawings import drawings as drawings_of
     from .diagnosis_folder import shown, write_diagnosis
-    from .figures import figures
     from .page import diagnosis_page
     from .sentence import sentence
     from .verdict import sections, three_numbers
@@ -131,13 +121,14 @@ def _diagnosis() -> View:
         parts = PageParts(sentence(found), [first, *sections(found, {}, (), (), "")], ())
         return "\n".join([_text(parts), *([""] if steps else []), *steps])
 
-    def pictures(found: "DiagnosisResult") -> Mapping[str, bytes]:
-        return _drawn(lambda folder: figures(folder, found, shown(found.origin, found)).values())
+    def stills(found: "DiagnosisResult") -> Mapping[str, Still]:
+        drawn = drawings_of(found.origin, found, shown(found.origin, found))
+        return {name: draw for d in drawn for name, draw in d.pictures.items()}
 
-    def save(found: "DiagnosisResult", folder: Path, home: Path) -> None:
-        write_diagnosis(folder, found.origin, found, home=home)
+    def save(found: "DiagnosisResult", folder: Path, home: Path, pictures: bool) -> None:
+        write_diagnosis(folder, found.origin, found, home=home, pictures=pictures)
 
-    return View("diagnose", summary, diagnosis_page, pictures, save, _inputs)
+    return View("diagnose", summary, diagnosis_page, stills, save, _inputs)
 
 
 def _mapped(found: "MappedDeck", folder: Path) -> Sequence[tuple[str, str]]:
@@ -149,7 +140,7 @@ def _mapped(found: "MappedDeck", folder: Path) -> Sequence[tuple[str, str]]:
 
 def _responses(module: ModuleType, folder: Path, found: "FrequencyResponses") -> PageParts:
     """The pages of all sets of responses as one."""
-    parts = [module.response_page(folder, one) for one in found.frfs]
+    parts = [module.response_page(one) for one in found.frfs]
     return replace(
         parts[0],
         sections=[s for p in parts for s in p.sections],
@@ -177,13 +168,13 @@ _PAGES: Mapping[str, Paged] = {
     "chladni.workflows.correlate.Correlation": Paged(
         "correlate",
         ".correlation_page",
-        lambda m, at, x: m.correlation_page(at, x.origin, x),
+        lambda m, at, x: m.correlation_page(x.origin, x),
         "correlation.json",
     ),
     "chladni.workflows.other_modes.OtherModes": Paged(
         "correlate",
         ".other_modes_page",
-        lambda m, at, x: m.other_modes_page(at, x.origin, x),
+        lambda m, at, x: m.other_modes_page(x.origin, x),
         "correlation.json",
     ),
     "chladni.workflows.identify.Identification": Paged(
@@ -201,7 +192,7 @@ _PAGES: Mapping[str, Paged] = {
         needs_origin=False,
     ),
     "chladni.workflows.map.MappedDeck": Paged(
-        "map", ".map_page", lambda m, at, x: m.map_page(at, x), "mapping.json", _mapped
+        "map", ".map_page", lambda m, at, x: m.map_page(x), "mapping.json", _mapped
     ),
     "chladni.workflows.joint_models.JointModels": Paged(
         "calibrate",
@@ -210,7 +201,7 @@ _PAGES: Mapping[str, Paged] = {
         "variants.json",
     ),
     "chladni.workflows.case_check.CaseCheck": Paged(
-        "check", ".check_page", lambda m, at, x: m.check_page(at, x.origin, x), "check.json"
+        "check", ".check_page", lambda m, at, x: m.check_page(x.origin, x), "check.json"
     ),
     "chladni.workflows.frf.FrequencyResponses": Paged(
         "frf", ".response_page", _responses, files=_arrays, needs_origin=False

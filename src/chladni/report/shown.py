@@ -30,8 +30,6 @@ class Shown:
     compared : False if frequencies were compared, so that responses are only shown
     fitted, excluded : bands [Hz]
     outputs, inputs, cords : sensors, shakers and hangers as markers
-    mac : (test modes, model modes) after, with their frequencies [Hz], or None
-    pairs : (test, model) positions of the paired modes in it
     """
 
     seen: Surface
@@ -45,5 +43,3 @@ class Shown:
     outputs: Sequence[Marker] = ()
     inputs: Sequence[Marker] = ()
     cords: Sequence[Marker] = ()
-    mac: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-    pairs: Sequence[tuple[int, int]] = ()

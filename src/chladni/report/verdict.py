@@ -8,9 +8,8 @@ from ..effects.estimate import Estimate, Location
 from ..inference.calibration_result import ParameterKnowledge
 from ..inference.result import Adequacy, Agreement, LeftPlace, NamedEffect
 from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Block, Code, Facts, Items, Links, Live, Picture, Section, Table, Text
+from .blocks import Block, Code, Drawing, Facts, Items, Links, Picture, Section, Table, Text
 from .calibration_blocks import study_sections
-from .drawings import Drawing, Drawings
 from .level_blocks import level_section
 from .recording_scores import recording_scores
 from .screening_blocks import screening_section
@@ -33,66 +32,17 @@ TONE = {
     "nonlinear": "warn",
     "not in catalogue": "warn",
 }
-PLACES = {  # name of a figure: (section it belongs to, caption)
-    "frf": (
-        "frf",
-        "A typical channel: test, model before, model after; frequencies were compared, not "
-        "responses.",
-    ),
-    "frf_fitted": (
-        "frf",
-        "A fitted channel. Each mode of a deck has the damping identified for its partner in the "
-        "test.",
-    ),
-    "frf_held_out": ("frf", "A held-out channel."),
-    "frf_grid": ("frf", "Channels spread evenly over the list."),
-    "waterfall": ("scores", "Deviation Q on fitted data, step by step."),
-    "held_out": ("scores", "Deviation Q on held-out data."),
-    "fit_test": (
-        "scores",
-        "Residual of the explanation (dot) and of recordings drawn from the model (bar: 99 % of "
-        "them). A dot to the right of its bar is not explained; a dot to the left means that the "
-        "assumed noise is too large.",
-    ),
-    "left": (
-        "scores",
-        "Gain of a small local change of stiffness or mass, with the named effects in place. "
-        "Grey: the test is blind there; half of the stiffness or mass could be missing.",
-    ),
-    "deviation": ("scores", "Remaining deviation by channel and band."),
-    "profiles": (
-        "study",
-        "Profile likelihood of each parameter, and the parabola that its interval assumes; grey: "
-        "the limit of 95 %.",
-    ),
-    "corner": (
-        "study",
-        "Posterior of each pair of parameters, change in %: one and two standard deviations of the "
-        "Gaussian; points and steps are draws, if there are any.",
-    ),
-    "articles": (
-        "study",
-        "Deviation of each article from the mean of all, with 95 % intervals.",
-    ),
-    "energy": (
-        "guidance",
-        "Strain energy per area of the worst modes less that of the others, over the mean.",
-    ),
-    "bands": (
-        "study",
-        "Responses with the damping of the search: 90 % of the posterior, and the test.",
-    ),
-    "frequencies": ("modes", "Deviation of each frequency from the test."),
-    "mac": ("modes", "Modal assurance criterion, test against model."),
-    "modes": ("modes", "Mode shapes of the model after."),
-    "stabilisation": ("modes", "Stabilisation diagram of the test."),
-    "evidence": ("why", "Log evidence of every explanation tried, relative to the best."),
-    "setup": ("test", "Sensors and shaker."),
-    "where_2": ("found", "Place of the second effect."),
-    "where_3": ("found", "Place of the third effect."),
+PLACES = {  # section: pictures of a run that stand there where the page does not draw them
+    "frf": ("frf", "frf_fitted", "frf_held_out", "frf_grid"),
+    "scores": ("waterfall", "held_out", "fit_test", "left", "deviation"),
+    "study": ("profiles", "corner", "articles", "bands"),
+    "guidance": ("energy",),
+    "modes": ("frequencies", "mac", "modes", "stabilisation"),
+    "why": ("evidence",),
+    "test": ("setup",),
+    "found": ("where_2", "where_3"),
 }
-LEVELS = "levels_"  # figures of modes over levels: with the number of the mode
-_HALF = ("waterfall", "held_out")  # two of them stand side by side
+LEVELS = "levels_"  # pictures of modes over levels: with the number of the mode
 _FILES = {
     "deck": "the updated deck",
     "calibrated": "the deck calibrated without the effect",
@@ -101,16 +51,6 @@ _FILES = {
     "calibration": "what could be known, basins, covariance and profiles for other programs",
     "frf": "test and model as arrays",
 }
-
-
-def live(name: str, drawing: Drawing, figures: Mapping[str, Path]) -> Live:
-    """Return a drawing, with the existing pictures among its own."""
-    stills = [_picture(n, figures[n]) for n in drawing.instead_of if n in figures]
-    return Live(name, drawing.draw, stills, drawing.caption)
-
-
-def _picture(name: str, path: Path) -> Picture:
-    return Picture(path, PLACES.get(name, ("", ""))[1], wide=name not in _HALF)
 
 
 def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
@@ -149,41 +89,30 @@ def _joints(result: DiagnosisResult) -> list[Block]:
     return [Table(heads, rows, caption=what)] if rows else []
 
 
-def _levels(figures: Mapping[str, Path], drawn: Mapping[str, Drawing]) -> dict[int, Block]:
-    """Pictures or drawings of modes over levels by the mode's position."""
-    names = [n for n in figures if n.startswith(LEVELS) and n.removeprefix(LEVELS).isdecimal()]
-    return {
-        int(n.removeprefix(LEVELS)) - 1: live(n, drawn[n], figures)
-        if n in drawn
-        else Picture(figures[n])
-        for n in names
-    }
-
-
 def sections(
     result: DiagnosisResult,
     figures: Mapping[str, Path],
     notes: Sequence[str],
     more: Sequence[Section],
     command: str,
-    drawings: Drawings | None = None,
+    drawings: Sequence[Drawing] = (),
 ) -> list[Section]:
-    """Return all sections under the verdict, in the order of an engineer's questions."""
-    drawn = {} if drawings is None else drawings.by_name
-    replaced = {still for d in drawn.values() for still in d.instead_of}
+    """Return all sections under the verdict, in the order of an engineer's questions.
+
+    ``figures`` are the pictures that there are, by name.
+    """
+    held = {name for d in drawings for name in d.pictures}
+    rest = {name: path for name, path in figures.items() if name not in held and name != "where"}
 
     def shown(place: str) -> list[Block]:
-        own = [live(name, d, figures) for name, d in drawn.items() if d.place == place]
-        stills = [n for n in figures if n in PLACES and PLACES[n][0] == place]
-        return [*own, *(_picture(n, figures[n]) for n in stills if n not in replaced)]
+        own: list[Block] = [d for d in drawings if d.place == place]
+        known = [name for name in PLACES.get(place, ()) if name in rest]
+        return [*own, *(Picture(rest.pop(name)) for name in known)]
 
     found = screening_section(result.screening)
-    of_levels = _levels(figures, drawn)
-    rest = [
-        Picture(p, n)
-        for n, p in figures.items()
-        if n not in PLACES and n != "where" and not n.startswith(LEVELS)
-    ]
+    of_levels: dict[int, Block] = {_mode(d.name): d for d in drawings if d.place == "levels"}
+    for name in [n for n in rest if n.startswith(LEVELS) and n.removeprefix(LEVELS).isdecimal()]:
+        of_levels[_mode(name)] = Picture(rest.pop(name))
     return [
         Section("Reasons for doubt", [Items(result.distrust)] if result.distrust else []),
         *([found] if result.screening and result.screening.findings else []),
@@ -202,10 +131,15 @@ def sections(
         *([found] if result.screening and not result.screening.findings else []),
         Section("Steps and reasons", [Items(list(notes))] if notes else []),
         *more,
-        Section("More pictures", rest),
+        Section("More pictures", [Picture(path, name) for name, path in rest.items()]),
         Section("Files", _files(result)),
         Section("Run it again", [Code([command])] if command else []),
     ]
+
+
+def _mode(name: str) -> int:
+    """Position of the mode over levels in the name of its drawing."""
+    return int(name.removeprefix(LEVELS)) - 1
 
 
 def _glance(result: DiagnosisResult) -> list[Block]:

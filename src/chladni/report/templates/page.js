@@ -7,12 +7,6 @@ const wrapped = (text) => said(text).replace(/(.{60}\S*)\s/g, "$1<br>");
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 const hertz = (f) => (f == null ? "–" : f.toFixed(2) + " Hz");
 const scaled = (values, step) => values.map((v) => (v == null ? null : v * step));
-const CURVE = { test: "ink", before: "before", after: "after", model: "after", identified: "after", recorded: "ink", ideal: "after" };
-const TINTS = ["neutral", "before", "calm", "#cc79a7", "#e69f00", "#56b4e9", "soft", "ink"];
-const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
-const tinted = (name) => (name.startsWith("#") ? name : colour(name));
-const extent = (values) => values.reduce(([a, b], v) => (v == null ? [a, b] : [Math.min(a, v), Math.max(b, v)]), [Infinity, -Infinity]);
-const short = (v) => (v == null ? "–" : v && (Math.abs(v) >= 1e6 || Math.abs(v) < 1e-3) ? String(Number(v.toPrecision(4)).toExponential()).replace("e+", "e") : String(Number(v.toPrecision(5))));
 
 async function unpacked(script) {
   const bytes = Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0));
@@ -157,11 +151,11 @@ function structure(at, data, shared) {
 }
 
 function remainder(at, data, shared) {
-  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step), title = data.title || "gain";
+  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step), title = data.title;
   const seen = (f) => value[f] != null, shown = mesh.face.filter(seen).map((f) => value[f]);
   return draw(at, [
     sheet(mesh, xyz, {}, (f) => !seen(f)),
-    sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: data.low || 0, cmax: data.top, colorscale: title === "gain" ? "YlOrRd" : "YlGnBu", reversescale: true, colorbar: { thickness: 12, len: 0.8, title: { text: said(title), side: "right" } },
+    sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: data.low, cmax: data.top, colorscale: data.colours.replace("_r", ""), reversescale: !data.colours.endsWith("_r"), colorbar: { thickness: 12, len: 0.8, title: { text: said(title), side: "right" } },
       hovertemplate: `${said(title)} %{intensity:.4g}<extra></extra>` }, seen),
     lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz),
   ], { scene: space(at, mesh, "scene", {}, 100), margin: { l: 0, r: 0, t: 0, b: 0 } });
@@ -257,210 +251,92 @@ function turned(at, to) {  // both sides are seen from the same place
   Plotly.relayout(at, change).then(() => { at.following = false; });
 }
 
-// ---- curves, matrices, bars
+// ---- charts: data and layout come from Python; here are colours, choices and clicks
 
-function responses(at, data, shared, box) {
-  const names = Object.keys(data.channels[0].curves);
-  const text = (c) => c.name + (c.held ? " (held out)" : "") + Object.entries(c.off).map(([n, q]) => `, Q ${n} ${short(q)}`).join("");
-  const list = choice(box, "channel", data.channels.map((c, k) => [k, text(c)]), (k) => show(Number(k)));
-  const step = (by) => show((list.value = (Number(list.value) + by + data.channels.length) % data.channels.length));
-  button(box, "previous", () => step(-1));
-  button(box, "next", () => step(1));
-  const last = names[names.length - 1];
-  if (names.length > 1) button(box, "worst", () => show((list.value = data.channels.reduce((w, c, k, all) => (c.off[last] > all[w].off[last] ? k : w), 0))));
-  const [low, high] = [data.frequency[0], data.frequency[data.frequency.length - 1]];
-  const inside = ([a, b]) => [Math.max(a, low), Math.min(b, high)];
-  function grey() {
-    let free = data.fitted.length ? [] : [[low, high]], from = low;
-    for (const [a, b] of data.fitted.map(inside)) { if (a > from) free.push([from, a]); from = b; }
-    free = data.fitted.length ? free.concat(from < high ? [[from, high]] : []) : [];
-    return free.concat(data.excluded.map(inside)).map(([a, b]) => ({ type: "rect", xref: "x", yref: "paper", x0: a, x1: b, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour("soft"), opacity: 0.12, layer: "below" }));
-  }
-  function show(k) {
-    const c = data.channels[k], traces = [];
-    for (const name of names) {
-      const [level, phase] = c.curves[name], line = { color: colour(CURVE[name]), width: name === "test" ? 1.8 : 1.4 };
-      const cut = phase.map((p, n) => (n && Math.abs(p - phase[n - 1]) > 180 ? null : p));
-      traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, x: data.frequency, y: level.map((v) => (v == null ? null : 10 ** (v / 1000))), line, hovertemplate: `${name} %{y:.3g}<extra></extra>` });
-      traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, showlegend: false, x: data.frequency, y: cut, yaxis: "y2", line, hovertemplate: `${name} %{y}°<extra></extra>` });
-    }
-    const low = c.coherence ? 0.24 : 0;
-    if (low) traces.push({ type: "scatter", mode: "lines", name: "coherence", showlegend: false, x: data.frequency, y: scaled(c.coherence, 0.001), yaxis: "y3", line: { color: colour("neutral"), width: 1.2 }, hovertemplate: "coherence %{y:.3f}<extra></extra>" });
-    return draw(at, traces, { title: { text: said(text(c)), font: { size: at.clientWidth > 600 ? 13 : 10 } }, margin: { l: 60, r: 15, t: 40, b: 45 }, hovermode: "x unified", hoversubplots: "axis", shapes: grey(), uirevision: "kept",
-      xaxis: { title: { text: "frequency [Hz]" }, anchor: low ? "y3" : "y2", hoverformat: ".2f" }, yaxis: { type: "log", domain: [low ? 0.49 : 0.33, 1], exponentformat: "power", title: { text: said(`${data.quantity} [${data.unit}]`) } },
-      yaxis2: { domain: [low, low ? 0.44 : 0.27], range: [-190, 190], tickvals: [-180, -90, 0, 90, 180], title: { text: "phase [°]" } }, ...(low && { yaxis3: { domain: [0, 0.19], range: [0, 1.05], title: { text: "coherence" } } }), legend: at.clientWidth > 600 ? { orientation: "h", y: 1, yanchor: "bottom", x: 1, xanchor: "right" } : { orientation: "h", y: -0.15 } });
-  }
-  at.redraw = () => show(Number(list.value));
-  return show(0);
+const narrow = (at) => at.clientWidth < 600;
+const plain = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
+const merged = (a, b) => Object.entries(b ?? {}).reduce((all, [k, v]) => ({ ...all, [k]: plain(v) && plain(all[k]) ? merged(all[k], v) : v }), { ...a });
+
+// Colours of the page for those that begin with @, numbers for thousandths of a decade.
+function resolved(value, key = "") {
+  if (typeof value === "string") return value.startsWith("@") && /color$/.test(key) ? colour(value.slice(1)) : value;
+  if (Array.isArray(value)) return value.length && typeof value[0] === "object" ? value.map((v) => resolved(v, key)) : value;
+  if (!plain(value)) return value;
+  if (value.log) return value.log.map((v) => (v == null ? null : 10 ** (v * value.step)));
+  return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, resolved(v, k)]));
 }
 
-function assurance(at, data) {
-  const maps = Object.entries(data.maps), narrow = at.clientWidth < 700, traces = [], more = { shapes: [], annotations: [] };
-  maps.forEach(([name, map], k) => {
-    const n = k ? String(k + 1) : "", share = [k / maps.length + (k ? 0.06 : 0), (k + 1) / maps.length - (k < maps.length - 1 ? 0.04 : 0)];
-    const down = [1 - share[1], 1 - share[0]], value = map.mac.map((row) => scaled(row, 0.001));
-    const tip = value.map((row, i) => row.map((v, j) => `test ${hertz(data.test[i])}<br>${name} ${hertz(map.model[j])}<br>MAC ${v.toFixed(3)}`));
-    const ticks = (f) => ({ tickvals: f.map((_, i) => i), ticktext: f.map((v) => v.toFixed(1)), tickfont: { size: 10 }, showgrid: false, zeroline: false });
-    traces.push({ type: "heatmap", z: value, zmin: 0, zmax: 1, colorscale: "Viridis", showscale: k === 0, colorbar: { thickness: 10 }, text: tip, hoverinfo: "text", xaxis: "x" + n, yaxis: "y" + n });
-    more["xaxis" + n] = { ...ticks(map.model), domain: narrow ? [0, 1] : share, anchor: "y" + n, tickangle: -60, title: { text: ["test", "model"].includes(name) ? `${name} [Hz]` : `deck ${name} [Hz]` } };
-    more["yaxis" + n] = { ...ticks(data.test), domain: narrow ? down : [0, 1], anchor: "x" + n, autorange: "reversed", title: { text: "test [Hz]" } };
-    for (const [i, j] of map.pairs) more.shapes.push({ type: "rect", xref: "x" + n, yref: "y" + n, x0: j - 0.5, x1: j + 0.5, y0: i - 0.5, y1: i + 0.5, line: { color: "#ff5a36", width: 2 } });
+function chart(at, spec, shared, box) {
+  const choices = spec.choices ?? [], picked = choices.map((c) => c.chosen ?? 0);
+  function show() {
+    const more = narrow(at) ? spec.narrow : {}, options = choices.map((c, k) => c.options[picked[k]]);
+    const data = spec.data.map((trace, n) => options.reduce((t, o) => merged(t, o.data[n]), trace));
+    const made = [more, ...options].reduce((all, o) => merged(all, o.layout), spec.layout);
+    made.shapes = [...(made.shapes ?? []), ...options.flatMap((o) => o.shapes ?? [])];
+    at.style.height = (more.height ?? spec.height) + "rem";
+    const legend = { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 };
+    return draw(at, resolved(spec.brush ? brush.painted(data) : data), resolved({ legend, uirevision: "kept", ...made }));
+  }
+  choices.forEach((c, k) => {
+    const to = (n) => { picked[k] = Number((list.value = (n + c.options.length) % c.options.length)); return show(); };
+    const list = choice(box, c.label, c.options.map((o, n) => [n, o.text]), (n) => to(Number(n)));
+    list.value = picked[k];
+    if (!c.steps) return;
+    button(box, "previous", () => to(picked[k] - 1));
+    button(box, "next", () => to(picked[k] + 1));
+    for (const [word, n] of Object.entries(c.marked)) button(box, word, () => to(n));
   });
-  return draw(at, traces, more);
+  const brush = spec.brush && brushed(at, spec, box, show);
+  at.redraw = show;
+  return show().then(() => { if (spec.pick) picks(at, spec.pick, box); brush?.listen(); });
 }
 
-function poles(at, data, shared, box) {
-  const TINTS = { o: "line", f: "soft", d: "soft", v: "neutral", s: "calm" }, picked = new Set();
-  const list = document.createElement("code");
-  const say = () => { list.textContent = picked.size ? "chladni identify ... " + [...picked].map((f) => `--pick ${f}`).join(" ") : "click a pole to pick it"; };
-  const show = () => {
-    const traces = Object.entries(data.kinds).map(([kind, name]) => {
-      const of = data.kind.flatMap((k, n) => (k === kind ? [n] : [])), some = (values) => of.map((n) => values[n]);
-      return { type: "scatter", mode: "markers", name, x: some(data.frequency), y: some(data.states), marker: { color: colour(TINTS[kind]), size: kind === "s" ? 7 : 5 },
-        text: of.map((n) => `${hertz(data.frequency[n])}, damping ${data.damping[n]} %<br>${data.states[n]} states, ${name}`), hoverinfo: "text" };
-    });
-    traces.push({ type: "scatter", mode: "lines", name: "rms of |H|", x: data.curve[0], y: data.curve[1], yaxis: "y2", line: { color: colour("steel"), width: 1 }, hoverinfo: "skip" });
-    const line = (dash) => (f) => ({ type: "line", x0: f, x1: f, yref: "paper", y0: 0, y1: 1, line: { color: colour("before"), width: 1, dash } });
-    return draw(at, traces, { shapes: [...data.kept.map(line("solid")), ...data.struck.map(line("dot"))], xaxis: { title: { text: "frequency [Hz]" } },
-      yaxis: { title: { text: "states" } }, yaxis2: { type: "log", overlaying: "y", side: "right", showgrid: false, showticklabels: false } });
-  };
+// A click on a point adds its x to a command.
+function picks(at, command, box) {
+  const picked = new Set(), list = document.createElement("code");
+  const say = () => { list.textContent = picked.size ? command + [...picked].map((f) => ` --pick ${f}`).join("") : "click a pole to pick it"; };
   box.append(list);
   say();
-  at.redraw = show;
-  return show().then(() => at.on("plotly_click", ({ points: [p] }) => {
+  at.on("plotly_click", ({ points: [p] }) => {
     const f = String(p.x);
     if (!picked.delete(f)) picked.add(f);
     say();
-  }));
-}
-
-function steps(at, data) {
-  const tints = ["neutral", "before"], traces = Object.entries(data.sides).map(([name, q], k) => ({ type: "bar", name, x: Object.keys(q), y: Object.values(q), marker: { color: colour(tints[k]) }, hovertemplate: `${name}, %{x}: Q %{y:.4g}<extra></extra>` }));
-  Object.entries(data.floors).forEach(([name, v], k) => traces.push({ type: "scatter", mode: "lines", name: `noise, ${name}`, x: Object.keys(Object.values(data.sides)[0]), y: Object.values(Object.values(data.sides)[0]).map(() => v), line: { dash: "dash", color: colour(tints[k]) }, hovertemplate: `noise, ${name}: ${v.toPrecision(3)}<extra></extra>` }));
-  return draw(at, traces, { barmode: "group", yaxis: { title: { text: "Q" }, rangemode: "tozero" } });
-}
-
-function odds(at, data) {
-  const bars = data.bars.slice().reverse(), marks = [0, 2, 10, 30, 100, 300, 1000, 3000, 10000];
-  at.style.height = 90 + 26 * bars.length + "px";
-  return draw(at, [{ type: "bar", orientation: "h", y: bars.map((_, k) => k), x: bars.map((b) => b.against + 1), base: 0, marker: { color: bars.map((b) => colour(b.why === "named" ? "found" : "steel")) },
-    text: bars.map((b) => b.against.toFixed(b.against < 10 ? 1 : 0)), textposition: "outside", cliponaxis: false, hoverinfo: "text",
-    hovertext: bars.map((b) => `<b>${said(b.name)}</b>, 2 ln B ${b.against.toFixed(1)}<br>${wrapped(b.why || "")}`) }], {
-    xaxis: { type: "log", range: [0, Math.log10(Math.max(...bars.map((b) => b.against)) + 1) * 1.08 + 0.05], tickvals: marks.map((v) => v + 1), ticktext: marks.map(String), title: { text: "2 ln Bayes factor" } },
-    yaxis: { tickvals: bars.map((_, k) => k), ticktext: bars.map((b) => said(b.name)), showgrid: false } });
-}
-
-function ladder(at, data) {
-  const bar = (name) => ({ type: "bar", name, x: data.test.map((_, k) => k), y: data[name], marker: { color: colour(name) }, hovertext: data.test.map((f, k) => `test ${hertz(f)}<br>${name} ${data[name][k] == null ? "no partner" : (data[name][k] > 0 ? "+" : "") + data[name][k] + " %"}`), hoverinfo: "text" });
-  return draw(at, ["before", "after"].map(bar), { barmode: "group", xaxis: { tickvals: data.test.map((_, k) => k), ticktext: data.test.map((f) => f.toFixed(1)), title: { text: "frequency of the test [Hz]" } }, yaxis: { title: { text: "off [%]" } } });
-}
-
-// A logarithmic axis: a number at each decade, at 1, 2 and 5, or at every digit, as there are few.
-const decades = (values) => (([low, high]) => ({ type: "log", dtick: high > 30 * low ? 1 : high > 10 * low ? "D2" : "D1", exponentformat: "power" }))(extent(values));
-
-// Curves one below the other over one axis: of frequency, time or amplitude.
-function panels(at, data) {
-  const many = data.panels.length, named = [], traces = [], more = {}, wide = at.clientWidth > 600;
-  const marks = data.panels.some((p) => p.curves.some((c) => c.marks));
-  data.panels.forEach((panel, k) => {
-    const n = k ? String(k + 1) : "";
-    more["yaxis" + n] = { ...(panel.log ? decades(panel.curves.flatMap((c) => c.y)) : { exponentformat: "power" }), domain: [1 - (k + 1) / many + (k < many - 1 ? 0.04 : 0), 1 - k / many],
-      title: { text: said(panel.title), font: { size: 11 } }, ...(panel.range ? { range: panel.range } : { rangemode: panel.zero ? "tozero" : "normal" }) };
-    for (const c of panel.curves) {
-      const first = !named.includes(c.name);
-      if (first) named.push(c.name);
-      const look = tinted(c.tint || TINTS[named.indexOf(c.name) % TINTS.length]);
-      traces.push({ type: "scatter", mode: c.marks || "lines", name: said(c.name), legendgroup: said(c.name), showlegend: first, x: c.x, y: c.y, yaxis: "y" + n, connectgaps: false,
-        ...(c.sd && { error_y: { type: "data", array: c.sd.map((v) => 2 * v), color: look, thickness: 1 } }), line: { color: look, width: 1.3, dash: c.dash || ["solid", "dash", "dot"][Math.floor(named.indexOf(c.name) / TINTS.length) % 3] }, marker: { color: look, size: 6, symbol: c.symbol || "circle" },
-        hovertemplate: marks ? `${said(c.name)}<br>%{x:.4g}: %{y:.5g}<extra></extra>` : `${said(c.name)} %{y:.4g}<extra></extra>` });
-    }
   });
-  at.style.height = 7 + 12 * many + (wide ? 0 : 0.8 * named.length) + "rem";
-  return draw(at, traces, { ...more, margin: { l: 60, r: 15, t: 10, b: 45 }, showlegend: data.panels.some((p) => p.curves.length > 1), hovermode: marks ? "closest" : "x unified", hoversubplots: "axis",
-    xaxis: { ...(data.x.log ? decades(data.panels.flatMap((p) => p.curves.flatMap((c) => c.x))) : { hoverformat: ".5g" }), title: { text: said(data.x.title) }, anchor: "y" + (many > 1 ? many : "") }, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 } });
 }
 
-// ---- samples of a study
-
-const about = (samples, n) => `sample ${samples.number[n]}<br>` + samples.columns.map((c) => `${said(c.name)}: ${short(c.values[n])}`).join("<br>");
-
-// Every sample as a line across the axes. A box drawn over an axis keeps the samples within it.
-function parallel(at, data, shared, box) {
-  const samples = shared.samples, axes = data.axes.map((k) => samples.columns[k]), state = { by: data.axes.indexOf(data.by), kept: {} }, wide = at.clientWidth > 600;
-  const place = axes.map((a) => {
-    const run = a.values.map((v) => (v == null ? null : a.log ? Math.log(v) : v)), [low, high] = extent(run);
-    return run.map((v) => (v == null ? null : high > low ? (v - low) / (high - low) : 0.5));
-  });
-  const whole = samples.number.map((_, n) => n).filter((n) => place.every((p) => p[n] != null)), told = whole.map((n) => about(samples, n));
-  choice(box, "colour", axes.map((a, k) => [k, a.name]), (k) => { state.by = Number(k); show(); }).value = state.by;
+// Lines of samples over axes at 0, 1, 2 ...: a box over an axis keeps the samples within it. The first
+// trace has those left out, the last but one the scale of colours, the last the sample under the pointer.
+function brushed(at, spec, box, show) {
+  const own = spec.data.slice(1, -2), points = new Map(), state = { by: 0, kept: {} };
+  own.forEach((t) => t.customdata.forEach((n, k) => n == null || (points.get(n) ?? points.set(n, []).get(n)).push([t.x[k], t.y[k], t.text[k]])));
+  const all = [...points.keys()].sort((p, q) => p - q), height = (n, k) => points.get(n)[k][1];
+  const line = (some) => [0, 1, 2].map((c) => some.flatMap((n) => [...points.get(n).map((p) => p[c]), null]));
+  const over = (t, some) => (([x, y, text]) => ({ ...t, x, y, text, customdata: some.flatMap((n) => [...points.get(n).map(() => n), null]) }))(line(some));
+  choice(box, "colour", spec.brush.map((b, k) => [k, b.text]), (k) => { state.by = Number(k); show(); });
   const every = button(box, "show all", () => { state.kept = {}; show(); }), count = document.createElement("span");
   box.append(count);
-  const line = (list) => ({ x: list.flatMap(() => [...axes.keys(), null]), y: list.flatMap((m) => [...place.map((p) => p[whole[m]]), null]), text: list.flatMap((m) => [...axes.map(() => told[m]), null]), customdata: list.flatMap((m) => [...axes.map(() => m), null]) });
-  function show() {
-    const inside = whole.map((n) => Object.entries(state.kept).every(([k, [a, b]]) => a <= place[k][n] && place[k][n] <= b)), kept = [...whole.keys()].filter((m) => inside[m]);
-    const most = VIRIDIS.length - 1, bin = (m) => Math.round(most * place[state.by][whole[m]]), [low, high] = extent(axes[state.by].values), look = { type: "scatter", mode: "lines+markers", hoverinfo: "text", showlegend: false };
-    const opacity = Math.min(0.9, Math.max(0.15, 40 / Math.max(kept.length, 1)));
-    const traces = [{ ...look, ...line([...whole.keys()].filter((m) => !inside[m])), mode: "lines", hoverinfo: "skip", line: { color: colour("line"), width: 0.7 } }];
-    VIRIDIS.forEach((tint, k) => traces.push({ ...look, ...line(kept.filter((m) => bin(m) === k)), opacity, line: { color: tint, width: 1.2 }, marker: { color: tint, size: 4 } }));
-    traces.push({ ...look, x: [null], y: [null], hoverinfo: "skip", mode: "markers", marker: { color: [low], cmin: low, cmax: high, colorscale: "Viridis", showscale: wide, colorbar: { thickness: 10, title: { text: said(axes[state.by].name), side: "right", font: { size: 11 } } } } });
-    traces.push({ ...look, x: [], y: [], hoverinfo: "skip", line: { color: colour("found"), width: 3 }, marker: { color: colour("found"), size: 6 } });
-    const top = wide ? 1.06 : 1.1, note = (text, k, y) => ({ text, x: k, y, showarrow: false, textangle: wide ? 0 : -50, font: { size: 10, color: colour("soft") } });
-    const ends = axes.flatMap((a, k) => extent(a.values).map((v, end) => note(short(v), k, end ? top : 1 - top)));
-    const upright = axes.map((_, k) => ({ type: "line", x0: k, x1: k, y0: 0, y1: 1, line: { color: colour("soft"), width: 1 } }));
-    const chosen = Object.entries(state.kept).map(([k, [a, b]]) => ({ type: "rect", x0: k - 0.06, x1: Number(k) + 0.06, y0: a, y1: b, line: { width: 1, color: colour("found") }, fillcolor: colour("found"), opacity: 0.3 }));
-    count.textContent = `${kept.length} of ${whole.length} samples`;
-    every.disabled = !chosen.length;
-    return draw(at, traces, { shapes: [...upright, ...chosen], annotations: ends, selections: [], dragmode: "select", hovermode: "closest", margin: { l: wide ? 20 : 45, r: 15, t: 10, b: 45 },
-      xaxis: { tickvals: [...axes.keys()], ticktext: axes.map((a) => said(a.name)), tickangle: wide ? -25 : -60, range: [-0.4, axes.length - 0.6], showgrid: false, zeroline: false, fixedrange: true }, yaxis: { visible: false, range: [0.95 - top, top + 0.05], fixedrange: true } });
-  }
-  at.redraw = show;
-  return show().then(() => {
-    const mark = (list) => Plotly.restyle(at, (({ x, y }) => ({ x: [x], y: [y] }))(line(list)), [at.data.length - 1]);
-    at.on("plotly_hover", ({ points: [p] }) => { if (p.customdata != null) mark([p.customdata]); });
-    at.on("plotly_unhover", () => mark([]));
-    at.on("plotly_selected", (found) => {
-      if (!found?.range) return;
-      const [[a, b], [c, d]] = [found.range.x, found.range.y].map((r) => r.slice().sort((p, q) => p - q));
-      axes.forEach((_, k) => { if (a <= k && k <= b) state.kept[k] = [c, d]; });
-      show();
-    });
-    at.on("plotly_deselect", () => { state.kept = {}; show(); });
-  });
-}
-
-function cloud(at, data, shared, box) {
-  const samples = shared.samples, columns = samples.columns, state = { x: data.x, y: data.y, tint: -1 }, names = columns.map((c, k) => [k, c.name]);
-  for (const [label, key, first] of [["over", "x", []], ["result", "y", []], ["colour", "tint", [[-1, "none"]]]]) choice(box, label, [...first, ...names], (k) => { state[key] = Number(k); show(); }).value = state[key];
-  const told = samples.number.map((_, n) => about(samples, n));
-  function show() {
-    const [x, y, c] = [columns[state.x], columns[state.y], columns[state.tint]], line = (own, along) => ({ type: "line", [own + "0"]: (own === "x" ? x : y).nominal, [own + "1"]: (own === "x" ? x : y).nominal, [along + "0"]: 0, [along + "1"]: 1, [along + "ref"]: "paper", line: { color: colour("before"), width: 1, dash: "dash" } });
-    const marker = c ? { color: c.values, colorscale: "Viridis", showscale: true, colorbar: { thickness: 10, title: { text: said(c.name), side: "right" } } } : { color: colour("neutral") };
-    const axis = (one) => ({ title: { text: said(one.name) }, type: one.log ? "log" : "linear", exponentformat: "power" });
-    return draw(at, [{ type: "scatter", mode: "markers", x: x.values, y: y.values, text: told, hoverinfo: "text", marker: { size: 6, opacity: 0.75, ...marker } }], {
-      hovermode: "closest", xaxis: axis(x), yaxis: axis(y), shapes: [...(x.nominal == null ? [] : [line("x", "y")]), ...(y.nominal == null ? [] : [line("y", "x")])] });
-  }
-  at.redraw = show;
-  return show();
-}
-
-function influences(at, data) {
-  const most = Math.max(...data.values.flat().map((v) => Math.abs(v ?? 0))) || 1, tip = data.values.map((row, i) => row.map((v, j) => `${said(data.rows[i])} over ${said(data.columns[j])}: ${short(v)}`));
-  at.style.height = 9 + 1.5 * data.rows.length + "rem";
-  return draw(at, [{ type: "heatmap", z: data.values, zmin: -most, zmax: most, colorscale: "RdBu", reversescale: true, text: tip, hoverinfo: "text", texttemplate: "%{z:.2f}", colorbar: { thickness: 10 } }], {
-    xaxis: { tickvals: [...data.columns.keys()], ticktext: data.columns.map(said), tickangle: -25, showgrid: false }, yaxis: { tickvals: [...data.rows.keys()], ticktext: data.rows.map(said), autorange: "reversed", showgrid: false } });
-}
-
-function indices(at, data, shared, box) {
-  const list = choice(box, "result", data.results.map((r, k) => [k, r.name]), () => show());
-  function show() {
-    const { series } = data.results[Number(list.value)];
-    at.style.height = 8 + 1.6 * data.parameters.length * series.length + "rem";
-    return draw(at, series.map((s, k) => ({ type: "bar", orientation: "h", name: s.name, y: [...s.values.keys()], x: s.values, marker: { color: colour(["neutral", "before"][k % 2]) },
-      ...(s.half && { error_x: { type: "data", array: s.half, color: colour("soft") } }), hovertext: s.values.map((v, n) => `${said(data.parameters[n])}<br>${s.name} ${short(v)}` + (s.half ? ` ± ${short(s.half[n])}` : "")), hoverinfo: "text" })), {
-      barmode: "group", showlegend: series.length > 1, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, yaxis: { tickvals: [...data.parameters.keys()], ticktext: data.parameters.map(said), autorange: "reversed", showgrid: false }, xaxis: { title: { text: data.axis } } });
-  }
-  at.redraw = show;
-  return show();
+  return {
+    painted(data) {
+      const { text, tints, ends } = spec.brush[state.by], limits = Object.entries(state.kept);
+      const inside = all.filter((n) => limits.every(([k, [a, b]]) => a <= height(n, k) && height(n, k) <= b)), out = new Set(inside);
+      count.textContent = `${inside.length} of ${all.length} samples`;
+      every.disabled = !limits.length;
+      const scale = merged(data[data.length - 2], { marker: { color: ends, showscale: !narrow(at), colorbar: { title: { text: said(text) } } } });
+      return [over(data[0], all.filter((n) => !out.has(n))), ...own.map((t, k) => over(t, inside.filter((n) => tints[all.indexOf(n)] === k))), scale, data[data.length - 1]];
+    },
+    listen() {
+      const mark = (some) => Plotly.restyle(at, (([x, y]) => ({ x: [x], y: [y] }))(line(some)), [at.data.length - 1]);
+      at.on("plotly_hover", ({ points: [p] }) => { if (p.customdata != null) mark([p.customdata]); });
+      at.on("plotly_unhover", () => mark([]));
+      at.on("plotly_selected", (found) => {
+        if (!found?.range) return;
+        const [[a, b], ends] = [found.range.x, found.range.y].map((r) => r.slice().sort((p, q) => p - q));
+        points.get(all[0]).forEach((_, k) => { if (a <= k && k <= b) state.kept[k] = ends; });
+        show();
+      });
+      at.on("plotly_deselect", () => { state.kept = {}; show(); });
+    },
+  };
 }
 
 // ---- tables that are sorted by a click on their heads
@@ -490,12 +366,12 @@ function sortable(table) {
 
 // ---- all of it
 
-const DRAWN = { structure, remainder, shapes, responses, assurance, poles, steps, odds, ladder, panels, parallel, cloud, influences, indices };
+const DRAWN = { structure, remainder, shapes, chart };
 const SPATIAL = ["structure", "remainder", "shapes"];
 
 async function begin() {
   document.querySelectorAll("table").forEach(sortable);
-  const figures = [...document.querySelectorAll(".live")];
+  const figures = [...document.querySelectorAll(".live[data-word]")];
   if (!figures.length || !window.DecompressionStream) return;
   const [common, ...words] = document.querySelectorAll(".numbers"), shared = JSON.parse(await unpacked(common));
   const script = document.createElement("script");
@@ -503,7 +379,8 @@ async function begin() {
   document.head.append(script);
   const turns = !!document.createElement("canvas").getContext("webgl");
   async function start(figure) {
-    const { draw: name, data } = JSON.parse(await unpacked(words[figure.dataset.word])), at = figure.querySelector(".plot");
+    const held = JSON.parse(await unpacked(words[figure.dataset.word])), name = held.draw, at = figure.querySelector(".plot");
+    const data = held.data && name !== "chart" ? held.data : held;
     if (SPATIAL.includes(name) && !turns) return;
     figure.classList.add("drawn");
     try {
@@ -515,9 +392,16 @@ async function begin() {
       console.error(error);
     }
   }
-  const near = new IntersectionObserver((seen) => seen.filter((s) => s.isIntersecting).forEach((s) => { near.unobserve(s.target); start(s.target); }), { rootMargin: "300px" });
+  const begun = new Set();
+  const once = (figure) => begun.has(figure) || (begun.add(figure), start(figure));
+  const near = new IntersectionObserver((seen) => seen.filter((s) => s.isIntersecting).forEach((s) => once(s.target)), { rootMargin: "300px" });
   figures.forEach((figure) => near.observe(figure));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => figures.filter((f) => f.dataset.ready).forEach((f) => f.querySelector(".plot").redraw()));
+  const redraw = () => figures.filter((f) => f.dataset.ready).forEach((f) => f.querySelector(".plot").redraw());
+  for (const media of ["(prefers-color-scheme: dark)", "print"]) matchMedia(media).addEventListener("change", redraw);
+  for (const figure of figures) {  // all of it is there when it is printed
+    await new Promise((next) => (window.requestIdleCallback ?? setTimeout)(next));
+    await once(figure);
+  }
 }
 
 begin();
