@@ -127,7 +127,7 @@ class Result:
             return DrawnPicture(path.read_bytes())
 
     def _pictures(self) -> Mapping[str, Callable[[Path], object]]:
-        """What draws each picture, found once."""
+        """Functions that draw the pictures, found once."""
         self._check_origin()
         if "_stills" not in self.__dict__:
             object.__setattr__(self, "_stills", self._view.pictures(self))

@@ -43,29 +43,51 @@ _MASS_SD = 0.002  # of the mass, where the user gives none
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """The resolved request of the user: a model in SI, and what was measured on it."""
+    """The resolved request of the user: a model in SI, and what was measured on it.
 
-    path: Path  # of case.toml
+    Attributes
+    ----------
+    path : Path               of case.toml
+    deck, assembly, units     the model, SI
+    as_deck : Assembly        the deck's own, where `assembly` has other thickness, or the same
+    damping : float           fraction of critical the model is given, where nothing else says
+    recordings : tuple        one per file, article and level; FRFs share labels and quantity
+    setup : TestSetup         sensors as the user describes them, hangers, weighed mass
+    outputs, inputs : MeasuredDofs  of the FRFs' dofs, in the FRFs' order
+    asked : Request           the words of the case, and where each stands
+    band : (low, high) or None   to fit [Hz]; None: all
+    exclude : bands left out [Hz]
+    held_sensors : int, labels or None   None: chosen automatically
+    held_band : (low, high) or None
+    parameters : tuple        freed by the user; empty: a default set
+    gain_known : bool         else one real factor common to all channels is free
+    notes : tuple of str      what was read otherwise than it stands there
+    given : (section, key)    of every word
+    sensor_masses : (grid, kg) pairs of known mass: on the article while it was measured
+    effects : names           that a diagnosis tries; empty: all
+    """
+
+    path: Path
     deck: Deck
     assembly: Assembly
-    as_deck: Assembly  # the deck's own, where `assembly` has other thickness, or the same
+    as_deck: Assembly
     units: Units
-    damping: float | None  # fraction of critical the model is given, where nothing else says
-    recordings: tuple[Recording, ...]  # one per file, article and level, of the same labels
-    setup: TestSetup  # sensors as the user describes them, hangers, weighed mass
-    outputs: MeasuredDofs  # of the FRFs' dofs, in the FRFs' order
+    damping: float | None
+    recordings: tuple[Recording, ...]
+    setup: TestSetup
+    outputs: MeasuredDofs
     inputs: MeasuredDofs
-    asked: Request  # what was asked, word by word
-    band: Band | None  # to fit [Hz]; None: all
-    exclude: tuple[Band, ...]  # left out of it [Hz]
-    held_sensors: int | tuple[str, ...] | None  # number or labels; None: chosen automatically
+    asked: Request
+    band: Band | None
+    exclude: tuple[Band, ...]
+    held_sensors: int | tuple[str, ...] | None
     held_band: Band | None
-    parameters: tuple[FreeParameter, ...]  # freed by the user; empty: a default set
-    gain_known: bool  # else one real factor common to all channels is free
-    notes: tuple[str, ...]  # what was read otherwise than it stands there
-    given: tuple[tuple[str, str], ...]  # (section, key) of every word
-    sensor_masses: tuple[tuple[int, float], ...]  # (grid, kg), on the article as it was measured
-    effects: tuple[str, ...]  # names that a diagnosis tries; empty: all
+    parameters: tuple[FreeParameter, ...]
+    gain_known: bool
+    notes: tuple[str, ...]
+    given: tuple[tuple[str, str], ...]
+    sensor_masses: tuple[tuple[int, float], ...]
+    effects: tuple[str, ...]
 
     @property
     def frfs(self) -> tuple[FRF, ...]:

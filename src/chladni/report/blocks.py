@@ -111,7 +111,7 @@ class Drawing:
 
     @property
     def pictures(self) -> Mapping[str, Still]:
-        """What draws each picture, by its name."""
+        """Functions that draw the pictures, by name."""
         if self.stills is None and isinstance(self.content, Chart):
             return {self.name: still(self.content)}
         return self.stills or {}

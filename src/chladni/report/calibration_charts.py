@@ -1,4 +1,4 @@
-"""What a calibration knows, as charts: profiles, the posterior by pairs, articles, bands."""
+"""Charts of a calibration: profiles, the posterior by pairs, articles, bands."""
 
 from collections.abc import Iterator, Sequence
 

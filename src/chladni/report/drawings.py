@@ -21,7 +21,7 @@ _NUMBERS = re.compile(r'<script type="text/plain" class="numbers">([A-Za-z0-9+/=
 
 
 def packed(drawn: Sequence[Drawing], shared: Any = None) -> list[str]:
-    """What the drawings share, then each of them: words that a browser reads when it needs them.
+    """The shared data, then each drawing: texts that a browser reads when it needs them.
 
     ``shared`` is what an earlier page held of it.
     """
@@ -41,7 +41,7 @@ def _entry(d: Drawing) -> dict[str, Any]:
 
 
 def drawings_of(path: Path) -> tuple[dict[str, Any], list[Drawing]]:
-    """What the drawings of a page share, and the drawings; none where it holds none."""
+    """The drawings of a page and the data that they share; empty for a page without drawings."""
     try:
         words = _NUMBERS.findall(path.read_text(encoding="utf-8"))
         shared, *each = (json.loads(gzip.decompress(b64decode(word))) for word in words)

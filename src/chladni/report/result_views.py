@@ -55,7 +55,7 @@ class Paged:
         )
 
     def _stills(self, module: ModuleType, found: Any) -> Mapping[str, Still]:
-        """What draws each picture; files that the page brings with it are of no use here."""
+        """Functions that draw the pictures; files of the page are not used here."""
         with TemporaryDirectory(prefix="chladni-") as folder:
             parts = self.page(module, Path(folder), found)
         return {name: draw for d in drawings(parts.sections) for name, draw in d.pictures.items()}
