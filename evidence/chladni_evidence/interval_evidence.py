@@ -34,11 +34,11 @@ from chladni.search.diagnosis import without_effects
 from chladni.search.preparation import prepare
 from chladni.search.question import Question
 from chladni.workflows.question_of_case import question_of
-from chladni_bench import Scales
 
 from .bench_of_structure import SPECIMENS, form_bench, panel_bench
 from .made_case import MadeCase, made_case, write_case
 
+Scales = dict[str, dict[str, float]]  # {part: {"E": factor, "t": factor}}
 NOISES = ("formulation", "frequencies")  # the last: of a table without FRFs
 LISTED, ERROR = 14, 5e-4  # natural frequencies of that table, and sd of their logarithms
 STRUCTURES = ("plate", "panel", "bonded plates", "ribbed plate")

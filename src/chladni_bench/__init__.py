@@ -32,7 +32,6 @@ from .cords import cord as cord
 from .noisy_frf import MeasurementChain as MeasurementChain
 from .noisy_frf import recorded as recorded
 from .part_scatter import Draw as Draw
-from .part_scatter import Scales as Scales
 from .part_scatter import decades_apart as decades_apart
 from .part_scatter import recognisable as recognisable
 from .part_scatter import scaled_parts as scaled_parts
@@ -67,7 +66,6 @@ __all__ = [
     "Draw",
     "MeasurementChain",
     "PoleModel",
-    "Scales",
     "Stage",
     "bench_rig",
     "benched",
