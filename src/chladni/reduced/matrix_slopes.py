@@ -105,7 +105,7 @@ class MatrixSlopes:
 def spanned(Y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Q (m, k) and C (k, n) with Y = Q C up to ``RANK``: an orthonormal basis of complex columns.
 
-    Columns of lines that follow each other closely are nearly equal, and k is a tenth of their number.
+    Columns of neighbouring lines are nearly equal, so k is a tenth of their number.
     """
     size = np.linalg.norm(Y, axis=0)
     Y = Y / np.where(size > 0, size, 1.0)
