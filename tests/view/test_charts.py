@@ -208,6 +208,15 @@ def test_names_are_words_for_plotly(drawn):
     assert not [t for t in shown if "<" in t]
 
 
+def test_a_shape_between_grid_and_curves_lies_on_one_subplot(drawn):
+    """Plotly looks for its subplot by both axes and fails where one is a share of the domain."""
+    spec = page(drawn[0])
+    options = [o for c in spec.get("choices", ()) for o in c["options"]]
+    every = [*spec["layout"].get("shapes", ()), *(s for o in options for s in o.get("shapes", ()))]
+    between = [s for s in every if s.get("layer") == "between"]
+    assert not [s for s in between if "domain" in s["xref"] + s["yref"]]
+
+
 def test_the_colours_of_a_page_are_known_to_its_style(drawn):
     style = STYLE.read_text(encoding="utf-8")
     text = json.dumps(page(drawn[0]), default=lambda a: a.tolist())

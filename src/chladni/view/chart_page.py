@@ -285,7 +285,7 @@ def _line(mark: Mark, x: str, y: str) -> Spec:
     axis, across = (x, y) if own == "x" else (y, x)
     look = {"color": _tint(mark.tint), "width": 1, "dash": mark.dash}
     return {"type": "line", f"{own}0": mark.at, f"{own}1": mark.at, f"{own}ref": axis,
-            f"{other}0": 0, f"{other}1": 1, f"{other}ref": f"{across} domain", "layer": "between",
+            f"{other}0": 0, f"{other}1": 1, f"{other}ref": f"{across} domain", "layer": "below",
             "line": look}  # fmt: skip
 
 
