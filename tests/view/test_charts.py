@@ -217,6 +217,14 @@ def test_a_shape_between_grid_and_curves_lies_on_one_subplot(drawn):
     assert not [s for s in between if "domain" in s["xref"] + s["yref"]]
 
 
+def test_a_drag_over_samples_draws_a_box_and_moves_nothing(drawn):
+    layout, brushed = page(drawn[0])["layout"], bool(drawn[0].tints_of)
+    assert (layout.get("dragmode") == "select") == brushed
+    if brushed:
+        assert layout["xaxis"]["fixedrange"]
+        assert layout["yaxis"]["fixedrange"]
+
+
 def test_the_colours_of_a_page_are_known_to_its_style(drawn):
     style = STYLE.read_text(encoding="utf-8")
     text = json.dumps(page(drawn[0]), default=lambda a: a.tolist())

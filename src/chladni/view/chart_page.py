@@ -37,6 +37,9 @@ def page(chart: Chart) -> Spec:
     if chart.tints_of:
         made["brush"] = [{"text": name, "tints": list(bins), "ends": list(ends)}
                          for name, (bins, ends) in chart.tints_of.items()]  # fmt: skip
+        made["layout"] |= {"dragmode": "select", "selections": [], "hovermode": "closest"}
+        for axis in ("xaxis", "yaxis"):  # a drag draws a box and moves nothing
+            made["layout"][axis] |= {"fixedrange": True}
     return made | ({"pick": chart.pick} if chart.pick else {})
 
 

@@ -272,7 +272,7 @@ function chart(at, spec, shared, box) {
     const more = narrow(at) ? spec.narrow : {}, options = choices.map((c, k) => c.options[picked[k]]);
     const data = spec.data.map((trace, n) => options.reduce((t, o) => merged(t, o.data[n]), trace));
     const made = [more, ...options].reduce((all, o) => merged(all, o.layout), spec.layout);
-    made.shapes = [...(made.shapes ?? []), ...options.flatMap((o) => o.shapes ?? [])];
+    made.shapes = [...(made.shapes ?? []), ...options.flatMap((o) => o.shapes ?? []), ...(brush?.boxes() ?? [])];
     at.style.height = (more.height ?? spec.height) + "rem";
     const legend = { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 };
     return draw(at, resolved(spec.brush ? brush.painted(data) : data), resolved({ legend, uirevision: "kept", ...made }));
@@ -324,8 +324,11 @@ function brushed(at, spec, box, show) {
       const scale = merged(data[data.length - 2], { marker: { color: ends, showscale: !narrow(at), colorbar: { title: { text: said(text) } } } });
       return [over(data[0], all.filter((n) => !out.has(n))), ...own.map((t, k) => over(t, inside.filter((n) => tints[all.indexOf(n)] === k))), scale, data[data.length - 1]];
     },
+    boxes: () => Object.entries(state.kept).map(([k, [a, b]]) => ({ type: "rect", x0: k - 0.06, x1: Number(k) + 0.06, y0: a, y1: b, line: { width: 1, color: "@found" }, fillcolor: "@found", opacity: 0.3 })),
     listen() {
-      const mark = (some) => Plotly.restyle(at, (([x, y]) => ({ x: [x], y: [y] }))(line(some)), [at.data.length - 1]);
+      let marked = [];
+      const drawn = () => Plotly.restyle(at, (([x, y]) => ({ x: [x], y: [y] }))(line(marked)), [at.data.length - 1]);
+      const mark = (some) => { marked = some; requestAnimationFrame(drawn); };  // Plotly loses its points if it draws while it tells of them
       at.on("plotly_hover", ({ points: [p] }) => { if (p.customdata != null) mark([p.customdata]); });
       at.on("plotly_unhover", () => mark([]));
       at.on("plotly_selected", (found) => {
