@@ -274,8 +274,7 @@ function chart(at, spec, shared, box) {
     const made = [more, ...options].reduce((all, o) => merged(all, o.layout), spec.layout);
     made.shapes = [...(made.shapes ?? []), ...options.flatMap((o) => o.shapes ?? []), ...(brush?.boxes() ?? [])];
     at.style.height = (more.height ?? spec.height) + "rem";
-    const legend = { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 };
-    return draw(at, resolved(spec.brush ? brush.painted(data) : data), resolved({ legend, uirevision: "kept", ...made }));
+    return draw(at, resolved(spec.brush ? brush.painted(data) : data), resolved({ uirevision: "kept", ...made }));
   }
   choices.forEach((c, k) => {
     const to = (n) => { picked[k] = Number((list.value = (n + c.options.length) % c.options.length)); return show(); };
