@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from chladni.dynamics.frf import UNIT
+from chladni.effects.calibration_parameters import value as value_of
 from chladni.ema.mode_pairing import pair
 from chladni.fem.energy import mass_properties
 from chladni.io.nastran import write_deck
@@ -143,8 +144,11 @@ def adhesive_chapter(desk: Desk, progress: Progress) -> Chapter:
 
 
 def glued(model: WorkingModel, parts: Sequence[str], nu: float) -> WorkingModel:
-    """The model with adhesive as stiff as steel."""
-    return model.variant(E=dict.fromkeys(parts, STEEL), nu=dict.fromkeys(parts, nu))
+    """The model with adhesive as stiff as steel, in steps: a variant changes by a factor of 20."""
+    own = next(value_of(p, "E") for p in model.assembly.parts if p.name in parts)
+    for E in np.geomspace(own, STEEL, 6)[1:]:
+        model = model.variant(E=dict.fromkeys(parts, float(E)))
+    return model.variant(nu=dict.fromkeys(parts, nu))
 
 
 def _gain(before: float | None, after: float | None) -> str:
