@@ -239,8 +239,6 @@ def _functions(
 class LinearScale(Effect):
     """K + d ∂K/∂v + d²/2 ∂²K/∂v², d = v (e^x - 1), and M likewise; v is the structure's value.
 
-    ``bent`` is the second slope of an operator that is not linear in v (Poisson's ratio).
-    ``within`` is the whole of which the operator in K is a share. ``weight_slope`` is ∂m/∂v [kg].
     ``write`` puts a value into an assembly.
     """
 
@@ -249,9 +247,11 @@ class LinearScale(Effect):
 
     slope: Slope | None = None
     write: Callable[[Assembly, float], Assembly] | None = None
-    bent: Slope | None = None
-    weight_slope: float = 0.0
-    within: Within = field(default_factory=Within)
+    bent: Slope | None = (
+        None  # second slope, where an operator is not linear in v (Poisson's ratio)
+    )
+    weight_slope: float = 0.0  # ∂m/∂v [kg]
+    within: Within = field(default_factory=Within)  # the operator in K is a share of this whole
 
     def terms(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The slopes of the operators times the change of the value."""

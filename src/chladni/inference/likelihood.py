@@ -203,9 +203,8 @@ class Responses:
     ) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
-        dK and dM are multiplied with the few vectors that Φ D φ_i and s² Φ D φ_i span.
-        dφ_i is that of a moving base. dφ_o and dφ_i also occur if shapes change where they are
-        measured.
+        Φ D φ_i and s² Φ D φ_i span few vectors; dK and dM multiply these alone. A moving base has
+        dφ_i. Shapes that change where they are measured have dφ_o and dφ_i.
         """
         phi_o, phi_i, d = self.modal(state)
         phi_o, d, s = phi_o[outputs], d[lines], self.s[lines]
