@@ -247,9 +247,7 @@ class LinearScale(Effect):
 
     slope: Slope | None = None
     write: Callable[[Assembly, float], Assembly] | None = None
-    bent: Slope | None = (
-        None  # second slope, where an operator is not linear in v (Poisson's ratio)
-    )
+    bent: Slope | None = None  # second slope: Poisson's ratio is not linear in v
     weight_slope: float = 0.0  # ∂m/∂v [kg]
     within: Within = field(default_factory=Within)  # the operator in K is a share of this whole
 
