@@ -13,7 +13,6 @@ import numpy as np
 
 from chladni.decision.hypothesis_table import (
     AlternativeRow,
-    CalibratedDeck,
     HypothesisTable,
     Left,
     Row,
@@ -51,7 +50,6 @@ class RecordedCase:
 def write_case(case: RecordedCase, path: Path) -> None:
     """Write a recorded case."""
     table = asdict(case.table)
-    table["decks"] = {d.name: Q for d, Q in case.table.decks.items()}
     text = {
         "name": case.name, "truth": case.truth, "verdict": case.verdict, "names": case.names,
         "one_of": case.one_of, "table": table,
@@ -90,9 +88,8 @@ def _plain(value: object) -> object:
 def _table(given: Json) -> HypothesisTable:
     rows = {k: _row(r) for k, r in given["rows"].items()}
     sets = tuple(_set(s) for s in given["sets"])
-    decks = {CalibratedDeck[k]: tuple(Q) for k, Q in given["decks"].items()}
     return HypothesisTable(
-        **{**given, "rows": rows, "sets": sets, "decks": decks, "singles": tuple(given["singles"])}
+        **{**given, "rows": rows, "sets": sets, "singles": tuple(given["singles"])}
     )
 
 

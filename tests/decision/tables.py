@@ -5,7 +5,6 @@ from dataclasses import replace
 from chladni.decision.decide import RULES, decide
 from chladni.decision.hypothesis_table import (
     NULL,
-    CalibratedDeck,
     HypothesisTable,
     Left,
     Row,
@@ -18,7 +17,6 @@ from chladni.decision.reasons import Decision
 
 FOR = Votes(50.0, 50.0, 50.0)
 SERVES = Left((1.0, 0.1), (1.0, 0.1))
-DECKS = dict.fromkeys(CalibratedDeck, (1.0, 1.0))
 
 
 def row(name, gain, p=0.5, votes=FOR, left=SERVES, **more):
@@ -44,7 +42,7 @@ def table(*rows, null=None, then=None, sets=(), after_lead=1.0, **more):
         for lead in (singles[0], refined(singles[0])):
             key = after(refined(r.key), lead)
             held[key] = Row(key, r.names, 0.0, p_damping=after_lead)
-    given = {"decks": DECKS, "families": 20, **more}
+    given = {"families": 20, **more}
     return HypothesisTable(held, singles, tuple(made for made, _, _ in sets), **given)
 
 

@@ -14,7 +14,6 @@ from chladni.decision.hypothesis_table import (
     NULL,
     AlternativeRow,
     Ask,
-    CalibratedDeck,
     HypothesisTable,
     Left,
     Row,
@@ -339,49 +338,6 @@ def test_what_relieves_strained_joints_is_one_of_both():
         found = decision(table(*rows, null=row("", 0.0, strained=strained)))
         assert found.one_of == one_of
         assert found.verdict == ("calibration only" if strained else LITTLE)
-
-
-# numbers of a calibration
-
-
-@pytest.mark.parametrize(
-    ("found", "written", "plain", "implausible", "deck"),
-    [
-        ((0.9, 1.0), (0.9, 1.0), (0.9, 0.9), False, "FOUND"),
-        ((0.9, 1.1), (0.9, 0.9), (0.9, 0.9), False, "WRITTEN"),
-        ((), (0.9, 0.9), (0.9, 0.9), False, "WRITTEN"),  # no structure has these numbers
-        ((1.1, 1.1), (1.1, 1.1), (0.9, 1.1), False, "PLAIN"),
-        ((1.1, 1.1), (1.1, 1.1), (1.1, 1.1), False, "GIVEN"),
-        ((1.1, 1.1), (1.1, 1.1), (0.9, 0.9), True, "GIVEN"),
-        ((0.9, 1.1), (0.9, 1.1), (0.9, 1.1), False, "PLAIN"),
-        ((0.9, 1.1), (0.9, 1.1), (0.9, 1.1), True, "FOUND"),  # plain values, or mass, cannot be
-    ],
-)
-def test_numbers_of_a_calibration_serve_no_worse_than_the_deck(
-    found, written, plain, implausible, deck
-):
-    each = dict(zip(CalibratedDeck, (found, written, plain, (1.0, 1.0)), strict=True))
-    answer = decision(table(decks=each, nominal=100.0, implausible=implausible))
-    assert answer.deck is CalibratedDeck[deck]
-    assert answer.verdict == (LITTLE if deck == "GIVEN" else "calibration only")
-
-
-@pytest.mark.parametrize(
-    ("found", "written", "plain", "implausible", "deck"),
-    [
-        ((1.2, 1.3), (1.1, 1.2), (1.1, 1.1), False, "PLAIN"),
-        ((1.2, 1.3), (1.1, 1.2), (0.9, 0.9), True, "WRITTEN"),
-        ((0.9, 1.0), (0.9, 1.0), (0.5, 0.5), False, "FOUND"),  # no worse than the deck
-        ((), (), (1.1, 1.1), True, "GIVEN"),  # no structure has any of these numbers
-    ],
-)
-def test_a_deck_that_leaves_the_scales_does_not_stay(found, written, plain, implausible, deck):
-    each = dict(zip(CalibratedDeck, (found, written, plain, (1.0, 1.0)), strict=True))
-    answer = decision(
-        table(decks=each, nominal=100.0, implausible=implausible, off_the_scales=True)
-    )
-    assert answer.deck is CalibratedDeck[deck]
-    assert answer.verdict == (LITTLE if deck == "GIVEN" else "calibration only")
 
 
 # the leader of a round

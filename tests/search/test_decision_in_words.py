@@ -8,7 +8,7 @@ import pytest
 from tests.decision.tables import FOR, decision, row, table, together
 
 from chladni.decision.decision_rules import gain_due
-from chladni.decision.hypothesis_table import NULL, AlternativeRow, CalibratedDeck, Left, Votes
+from chladni.decision.hypothesis_table import NULL, AlternativeRow, Left, Votes
 from chladni.effects.estimate import Remarks
 from chladni.inference.adequacy import FitTest
 from chladni.search.deciding import Measured
@@ -25,7 +25,6 @@ TIES = together(
     DUE,
     alternatives=((), (AlternativeRow("hem-contact", 4.0, "odd"),)),
 )
-WORN = {"decks": dict.fromkeys(CalibratedDeck, (1.1, 1.1)) | {CalibratedDeck.GIVEN: (1.0, 1.0)}}
 
 
 def fit_of(name, key):
@@ -106,10 +105,6 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
         (table(*SINGLES, sets=[BAD]), ("too little for point-mass added to crack",)),
         (table(*SINGLES, sets=[TIES]), ("behind in -2 ln evidence: hem-contact by 4", "odd")),
         (table(row("crack", 200.0, p=0.005)), (f"near 7 Hz{UNEXPLAINED}",)),
-        (
-            table(nominal=100.0, **WORN),
-            ("keeps its numbers: no plausible calibrated values fit better; the residual",),
-        ),
     ],
 )
 def test_each_step_is_said_with_its_numbers(made, said):

@@ -75,8 +75,7 @@ def test_a_concealed_mass_is_named(heavy, diagnosed):
     (mass,) = [p for p in found.parameters if p.name == "M"]
     assert mass.low < 0.02 < mass.high
     held = diagnosed.agreement.held_out
-    assert held.with_effect < held.calibrated
-    assert held.with_mesh_error < 0.5 * held.calibrated_with_mesh_error
+    assert held.with_effect < 0.5 * held.calibrated
     assert diagnosed.adequate.passes
     assert any("motion of the base" in note for note in diagnosed.notes)
 

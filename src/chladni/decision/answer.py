@@ -1,8 +1,7 @@
-"""Complete a decision: tied explanations, doubts about calibration and the calibrated numbers."""
+"""Complete a decision: tied explanations and doubts about calibration."""
 
 from dataclasses import replace
 
-from .hypothesis_table import CalibratedDeck, HypothesisTable
 from .judgement import JudgedTable
 from .reasons import ALONE, BEYOND, Decision, Reason, Step, names_of, steps
 from .tied import tied
@@ -52,54 +51,3 @@ def _with_doubt(case: JudgedTable, decision: Decision) -> Decision:
     one_of = (*names, BEYOND) if unfit else (ALONE, *names)
     step = Step(Reason.DOUBT, lead.key, names=one_of)
     return replace(decision, one_of=one_of, steps=steps(decision, step))
-
-
-def _best_deck(table: HypothesisTable) -> CalibratedDeck | None:
-    """The calibration that fits best as it is written, where the given deck leaves the scales."""
-    plain = () if table.implausible else (CalibratedDeck.PLAIN,)
-    tried = (CalibratedDeck.FOUND, CalibratedDeck.WRITTEN, *plain)
-    Q = {deck: table.deck(deck)[-1] for deck in tried if table.deck(deck)}
-    return min(Q, key=Q.__getitem__, default=None)
-
-
-def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
-    """Choose the numbers of the calibration, where no effect is named.
-
-    Plain calibration would distort E, rho and t to compensate for errors of mesh and joints. The
-    candidates, in this order, are the numbers found by the null, these fitted again without
-    scatter, and plain calibration. The last must have plausible numbers and the weighed mass. The
-    first of the former two that fits no worse than the given deck, with and without its mesh error,
-    is taken. Otherwise it is plain calibration or the first of the two, if that is not worse in
-    both respects. Otherwise the given deck stays; where it leaves the scales, the best is taken
-    instead. Joints beyond their usual scatter count as calibrated, whatever E, rho and t gain.
-    """
-    table, rules = case.table, case.rules
-    if decision.named:
-        return decision
-    if decision.verdict == "nothing missing" and rules.strained and table.null.strained:
-        decision = replace(decision, verdict="calibration only")
-    if decision.verdict == "nothing missing":
-        return replace(decision, deck=CalibratedDeck.WRITTEN)
-    if not rules.prudent:
-        return decision
-    before = table.deck(CalibratedDeck.GIVEN)
-
-    def worse(deck: CalibratedDeck) -> list[bool]:
-        return [q > b for q, b in zip(table.deck(deck), before, strict=True)]
-
-    physical = CalibratedDeck.FOUND, CalibratedDeck.WRITTEN
-    plain = () if table.implausible else (CalibratedDeck.PLAIN,)
-    for deck in physical:
-        if table.deck(deck) and not any(worse(deck)):  # no Q is no worse
-            return replace(decision, deck=deck)
-    for deck in (*plain, *physical):
-        if table.deck(deck) and not all(worse(deck)):
-            return replace(decision, deck=deck)
-    if table.off_the_scales and (best := _best_deck(table)) is not None:
-        return replace(decision, deck=best)
-    verdict = decision.verdict
-    verdict = "nothing missing" if verdict == "calibration only" else verdict
-    return replace(
-        decision, deck=CalibratedDeck.GIVEN, verdict=verdict,
-        steps=steps(decision, Step(Reason.DECK_STAYS)),
-    )  # fmt: skip

@@ -10,12 +10,11 @@ decision returns a request for it by name. The caller computes it, adds it and c
 5. The leader is fitted again and tested on held-out data.
 6. If the leader is refused, its rivals are tested.
 7. Tied effects are listed together; a leader that is not named puts calibration in doubt.
-8. If nothing is named, the numbers of the calibration are chosen.
 """
 
 from dataclasses import replace
 
-from .answer import with_numbers, with_ties
+from .answer import with_ties
 from .decision_rules import DecisionRules
 from .hypothesis_table import NULL, HypothesisTable, Missing, Row, Wanted, fits
 from .judgement import JudgedTable, apply_held_out, tested, untested
@@ -29,7 +28,7 @@ def decide(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | W
     """Return the decision, or the number that is still missing for it."""
     case = JudgedTable(table, rules)
     try:
-        return with_numbers(case, with_ties(case, _named(case)))
+        return with_ties(case, _named(case))
     except Missing as missing:
         return missing.wanted
 

@@ -69,9 +69,6 @@ class DecisionRules:
     strained: bool = _rule(
         True, False, "joints that changed by more than joints scatter are calibrated, or in doubt"
     )
-    prudent: bool = _rule(
-        True, False, "calibrated numbers must not fit worse than those of the deck"
-    )
 
     def without(self, name: str) -> "DecisionRules":
         """A copy with one rule switched off."""

@@ -4,7 +4,7 @@ A number that is not yet computed is None. :func:`~chladni.decision.decide.decid
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from .decision_rules import DecisionRules, gain_due, odds_of_something_else
@@ -20,7 +20,6 @@ class Ask(Enum):
     LEFT = "Q with it as a deck can hold it"
     RENEWAL = "the same fitted again on a model that bears it"
     AFTER = "whether its damping follows what the leader changes"
-    DECK = "Q of a calibration as a deck can hold it"
 
 
 @dataclass(frozen=True)
@@ -186,15 +185,6 @@ class SetRow:
         return f"{self.key}/{k}"
 
 
-class CalibratedDeck(Enum):
-    """The source of the numbers, where calibration is the answer."""
-
-    FOUND = "as the null found them"
-    WRITTEN = "as the null found them, fitted anew without scatter"
-    PLAIN = "of plain calibration"
-    GIVEN = "the deck's own"
-
-
 @dataclass(frozen=True)
 class HypothesisTable:
     """All hypotheses of a diagnosis.
@@ -208,11 +198,6 @@ class HypothesisTable:
     poles : whether natural frequencies are compared
     enough : whether there are data enough to separate explanations as a rule
     contradicted : whether there are more numbers than any effect has unknowns
-    implausible : whether plain calibration has implausible values, or not the weighed mass
-    decks : Q of each calibration, with and without the mesh error; () where there is no such fit;
-        of ``GIVEN`` that of the given deck
-    off_the_scales : whether the given deck has another mass than was weighed, where calibration is
-        all that was asked
     families : number of known families, used where none was tried
     """
 
@@ -223,9 +208,6 @@ class HypothesisTable:
     poles: bool = False
     enough: bool = True
     contradicted: bool = True
-    implausible: bool = False
-    decks: Mapping[CalibratedDeck, tuple[float, ...]] = field(default_factory=dict)
-    off_the_scales: bool = False
     families: int = 1
 
     @property
@@ -249,12 +231,6 @@ class HypothesisTable:
         if known is None or known.p_damping is None:
             raise Missing(Wanted(Ask.AFTER, row.key, leader.key))
         return known.p_damping
-
-    def deck(self, which: CalibratedDeck) -> tuple[float, ...]:
-        """Q of a calibration whose numbers can be written into a deck."""
-        if which not in self.decks:
-            raise Missing(Wanted(Ask.DECK, which.name))
-        return self.decks[which]
 
     def having(self, *rows: Row) -> "HypothesisTable":
         """The table with some rows added or replaced."""

@@ -26,9 +26,11 @@ class JudgedTable:
         return tuple(self.table.rows[k] for k in keys)
 
     def calibrated(self) -> str:
-        """The verdict where nothing is named."""
-        changed = self.table.nominal - self.table.null.neg2_log_evidence > self.rules.changed
-        return "calibration only" if changed else "nothing missing"
+        """The verdict where nothing is named; joints beyond their usual scatter are calibrated."""
+        null = self.table.null
+        changed = self.table.nominal - null.neg2_log_evidence > self.rules.changed
+        strained = self.rules.strained and null.strained
+        return "calibration only" if changed or strained else "nothing missing"
 
     def evidence_suffices(self, gain: float, votes: Votes, due: float, poles: bool = False) -> bool:
         """True if fitted and held-out data support a name whose required gain is ``due``.

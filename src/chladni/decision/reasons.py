@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from .hypothesis_table import CalibratedDeck, Row, SetRow, Votes
+from .hypothesis_table import Row, SetRow, Votes
 
 ALONE = "calibration alone"
 BEYOND = "an effect outside the catalogue"
@@ -40,7 +40,6 @@ class Reason(Enum):
     NEXT = auto()  # explanation after a refused leader
     TIED = auto()  # explains the data equally well
     DOUBT = auto()  # calibration or the leader
-    DECK_STAYS = auto()
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,6 @@ class Decision:
     votes : evidence of the held-out data on the first
     whole : the set that is named
     passed_over : names that were tested before the first, and the refusal of each
-    deck : source of the calibrated numbers
     steps : the steps that led to the decision
     """
 
@@ -95,7 +93,6 @@ class Decision:
     votes: Votes | None = None
     whole: SetRow | None = None
     passed_over: tuple[tuple[str, Reason], ...] = ()
-    deck: CalibratedDeck = CalibratedDeck.PLAIN
     steps: tuple[Step, ...] = ()
 
     @property

@@ -57,10 +57,10 @@ def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
     """Held-out misfit, frequencies and mass, before and after."""
     facts, agreement, mass = [], result.agreement or Agreement(), result.mass
     held = agreement.held_out
-    if held.nominal is not None and held.after is not None:
-        change = percent(held.after, held.nominal)
-        text = f"{number(held.nominal, 3)} → {number(held.after, 3)} ({change})"
-        facts.append(("Held-out misfit Q", text))
+    (one, before), (last, after) = held.last_step(bool(result.effects)).items()
+    if before is not None and after is not None:
+        text = f"{number(before, 3)} → {number(after, 3)} ({percent(after, before)})"
+        facts.append((f"Held-out misfit Q, {one} → {last} deck", text))
     off = [_mean_off(result, key) for key in ("before_hz", "after_hz")]
     if off[0] is not None:
         text = " → ".join(f"{number(100 * x, 2)} %" for x in off if x is not None)
@@ -269,8 +269,11 @@ def _scores(result: DiagnosisResult) -> list[Block]:
         ("nominal deck", "nominal", False),
         ("calibrated deck without an effect", "calibrated", True),
         *((("updated deck", "with_effect", True),) if result.effects else ()),
-        ("deck above, with the fitted mesh error", "with_mesh_error", False),
-        ("without the part that scatter can explain", "with_scatter", False),
+        (
+            "with errors of mesh, joints and scatter, which no deck contains",
+            "with_nuisances",
+            False,
+        ),
         ("floor: the recording's noise alone", "floor", False),
     )
     rows = []

@@ -1,15 +1,12 @@
 """Loop that makes the fits and numbers a decision requests, until the decision is reached."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-
-import numpy as np
 
 from ..decision.decide import RULES, decide
 from ..decision.decision_rules import DecisionRules
 from ..decision.hypothesis_table import (
     Ask,
-    CalibratedDeck,
     HypothesisTable,
     Left,
     Row,
@@ -20,25 +17,22 @@ from ..decision.hypothesis_table import (
     refined,
 )
 from ..decision.reasons import Decision
-from ..effects.effect import Effect
 from ..errors import ModelError
 from ..inference.adequacy import FitTest
 from ..inference.held_out_evidence import held_out_evidence
-from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
+from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.least_data import CONTRADICTED
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_test_along_effect
-from ..inference.map_fit import fit
 from ..inference.pole_data import Poles
 from ..inference.rows_of_fits import row_of
-from ..inference.written_hypothesis import as_found, as_written, of_mesh
-from ..reduced.reduced_model import evaluate
+from ..inference.written_hypothesis import as_written
 from .basis_refinement import Refinement
 from .diagnosis import Diagnosis, fit_test
 from .question import Prepared
 from .search_round import taken
 from .several import Several
-from .verdict_models import given, scores_of
+from .verdict_models import scores_of
 
 Refine = Callable[[HypothesisFit], Refinement]
 
@@ -53,7 +47,6 @@ class Measured:
     fits, tests, refinements : of its rows, by key
     written : rows as a deck can hold them
     sets : several effects, by key
-    decks : of a calibration
     failed : reason why a row could not be fitted again
     whole : True where rows that were decided on keep their models, 10 to 300 MB each on a tailgate
     """
@@ -64,17 +57,12 @@ class Measured:
     sets: Mapping[str, Several] = field(default_factory=dict)
     refinements: Mapping[str, Refinement] = field(default_factory=dict)
     written: Mapping[str, HypothesisFit] = field(default_factory=dict)
-    decks: Mapping[CalibratedDeck, HypothesisFit] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
     whole: bool = False
 
     def row(self, row: Row) -> "Measured":
         """Return a copy with a row added or replaced."""
         return replace(self, table=self.table.having(row))
-
-    def with_Q(self, deck: CalibratedDeck, Q: tuple[float, ...]) -> "Measured":
-        """Return a copy with the Q of a calibration added."""
-        return replace(self, table=replace(self.table, decks={**self.table.decks, deck: Q}))
 
 
 def decided(prepared: Prepared, found: Diagnosis, refine: Refine) -> tuple[Decision, Measured]:
@@ -124,8 +112,6 @@ def measured(
     key, problem = wanted.key, prepared.problem
     if wanted.ask is Ask.RENEWAL:
         return _refined(prepared, found, refine, known, key)
-    if wanted.ask is Ask.DECK:
-        return _calibrated(prepared, found, known, CalibratedDeck[key])
     row = known.table.rows[key]
     if wanted.ask is Ask.VOTES:
         return known.row(replace(row, votes=_votes(prepared, found, known, key)))
@@ -201,63 +187,3 @@ def _after(prepared: Prepared, known: Measured, row: Row, leader: str) -> Measur
     follows = damping_test_along_effect(test, known.fits[leader], left)
     tests = {**known.tests, key: follows}
     return replace(known, tests=tests).row(replace(tested_one, p_damping=follows.p))
-
-
-def _calibrated(
-    prepared: Prepared, found: Diagnosis, known: Measured, deck: CalibratedDeck
-) -> Measured:
-    """Q of a calibration on the fitted data, with the mesh error and without it, as in a deck."""
-    null, problem = found.null, prepared.problem
-    data = prepared.score.rebased(null.model)
-
-    def Q(effects: Sequence[Effect], x: np.ndarray) -> tuple[float, ...]:
-        try:
-            idle = np.where(of_mesh(effects), 0.0, x)
-            each = [evaluate(null.model, effects, at, False) for at in (x, idle)]
-        except ModelError:  # no physical structure: this calibration is no candidate
-            return (np.inf, np.inf)
-        return tuple(data.Q(state, data.use) for state in each)
-
-    if deck is CalibratedDeck.GIVEN:
-        x = given(problem, null)
-        off = not found.hypotheses and _leaves_the_scales(problem, null, x)
-        known = replace(known, table=replace(known.table, off_the_scales=off))
-        return known.with_Q(deck, Q(problem.base, x))
-    try:
-        made = numbers(prepared, found, known, deck)
-    except ModelError:  # without scatter its numbers belong to no physical structure
-        return known.with_Q(deck, ())
-    known = replace(known, decks={**known.decks, deck: made})
-    return known.with_Q(deck, Q(made.fit.effects, made.fit.x))
-
-
-def _leaves_the_scales(problem: UpdatingProblem, null: HypothesisFit, x: np.ndarray) -> bool:
-    """True where the deck's mass is not the weighed one: a calibration alone cannot keep it."""
-    weighed = problem.mass_measurement
-    if weighed is None:
-        return False
-    state = evaluate(null.model, problem.base, x, False)
-    return not weighed.agrees(float(state.weight))
-
-
-def numbers(
-    prepared: Prepared, found: Diagnosis, known: Measured, deck: CalibratedDeck
-) -> HypothesisFit:
-    """The calibration that is reported where no effect is named."""
-    mass = prepared.problem.mass_measurement
-    if deck in known.decks:
-        return known.decks[deck]
-    if deck is CalibratedDeck.FOUND:
-        return as_found(found.null)
-    if deck is CalibratedDeck.WRITTEN:
-        return as_written(found.null, mass)
-    plain = found.plain
-    if deck is CalibratedDeck.PLAIN:
-        return plain
-    x = [
-        np.array([p.nominal for p in e.parameters]) if e.kind == "calibration" else plain.fit.of(e)
-        for e in plain.fit.effects
-    ]
-    begun = np.concatenate([np.zeros(0), *x])
-    own = fit(plain.model, plain.fit.effects, plain.data, mass, begun, max_steps=0)
-    return replace(plain, fit=own)

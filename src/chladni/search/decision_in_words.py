@@ -8,7 +8,7 @@ from ..decision.reasons import ALONE, Decision, Reason, Step
 from ..effects.registry import family
 from ..ema.odds import evidence_in_words
 from ..inference.adequacy import FitTest
-from .deciding import Measured, numbers
+from .deciding import Measured
 from .diagnosis import Diagnosis
 from .question import Prepared
 
@@ -39,7 +39,7 @@ def concluded(
         passed_over=tuple((name, words.refusal(name, why)) for name, why in decision.passed_over),
     )  # fmt: skip
     if not decision.named:
-        return replace(said, plain=numbers(prepared, found, known, decision.deck)), ()
+        return said, ()
     distrust = (r.distrust for k, r in known.refinements.items() if refined(k) == first)
     return replace(said, written=known.written[first]), next(distrust, ())
 
@@ -228,13 +228,6 @@ class DecisionWords:
         )
         return _with_check(note, (name,))
 
-    def _deck_stays(self, step: Step) -> str:
-        note = "the deck keeps its numbers: no plausible calibrated values fit better"
-        test = self.test()
-        if self.decision.one_of or (test is not None and not test.passes):
-            return note
-        return f"{note}; the residual comes from mesh, joints and scatter"
-
 
 _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.TESTED: DecisionWords._tested,
@@ -255,7 +248,6 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.NEXT: DecisionWords._next,
     Reason.TIED: DecisionWords._tied,
     Reason.DOUBT: DecisionWords._doubt,
-    Reason.DECK_STAYS: DecisionWords._deck_stays,
 }
 
 

@@ -29,11 +29,11 @@ from ..inference.hypothesis_fit import (
     UpdatingProblem,
     fitted,
 )
-from ..inference.implausible_values import implausible_values
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_test_along_effect
 from ..inference.pole_data import Poles
 from ..inference.rows_of_fits import row_of, row_of_null
+from ..inference.written_hypothesis import as_written
 from ..progress import within
 from ..reduced.reduced_model import evaluate
 from ..sparse.freed_memory import give_back_freed_memory
@@ -53,16 +53,14 @@ class Diagnosis:
     Attributes
     ----------
     nominal, null : fits without, and with calibration parameters free, scatter allowed in both
-    plain : calibration parameters alone, as any calibration would: what a named effect is compared
-        with; where nothing is named, with the learned error of the model
+    plain : the null in the form of a deck: what a named effect is compared with
     hypotheses : best hypothesis of every family, best first
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     sets : several effects together, each of which pays, in the order in which the sets grew
     table : all of them as the decision reads them
     tests : of the rows that were held against what they predict themselves
-    written : the named effect as a deck can hold it, once data that no fit saw were asked
-    deck : the same with numbers that make the updated deck respond as all that was found does
+    written : the named effect in the form of a deck
     adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, and what would settle it
     gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
@@ -81,7 +79,6 @@ class Diagnosis:
     table: HypothesisTable = field(default_factory=lambda: HypothesisTable({}))
     tests: Mapping[str, FitTest] = field(default_factory=dict)
     written: HypothesisFit | None = None
-    deck: HypothesisFit | None = None
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
     gains: tuple[float, ...] = ()
@@ -104,7 +101,7 @@ class Diagnosis:
     @property
     def as_deck(self) -> HypothesisFit | None:
         """The named effect as the updated deck holds it, if anything is named."""
-        return self.deck or self.written or self.found
+        return self.written or self.found
 
     @property
     def unexplained(self) -> bool:
@@ -122,13 +119,6 @@ class Diagnosis:
         due = threshold(self.null.data, len(self.hypotheses))
         return min(due, RULES.expected_due) if hypothesis.effect.expected else due
 
-    @property
-    def as_the_null(self) -> bool:
-        """True if the calibration keeps the numbers of the null."""
-        plain, null = self.plain.fit, self.null.fit
-        shared = [e for e in plain.effects if e in null.effects]
-        return all(np.array_equal(plain.of(e), null.of(e)) for e in shared)
-
     def two_log_bayes_factor(self, hypothesis: HypothesisFit) -> float:
         """How much better than the null, in -2 ln evidence."""
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence
@@ -139,7 +129,6 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     progress("calibration without new physics", 0.05)
     problem, null = without_effects(problem)
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
-    plain = fit_of_the_deck(problem, null)
     progress("scan of the catalogue", 0.2)
     tried = proposals(problem, null)
     give_back_freed_memory()
@@ -147,6 +136,7 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     notes = (*unasked(problem), *could_not_be_evaluated(tried, hypotheses))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
+    plain = as_written(null, problem.mass_measurement)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=notes)
     found = named_by_fits(problem, found)
     whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
@@ -174,8 +164,6 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         tuple(t.effect.name for t in found.hypotheses),
         nominal=found.nominal.neg2_log_evidence,
         poles=isinstance(found.null.data, Poles),
-        implausible=bool(implausible_values(found.plain.fit))
-        or not _keeps_mass(problem, found.plain),
         families=len(problem.families),
     )
     tests = dict(found.tests)
@@ -185,12 +173,6 @@ def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         table = table.having(chances.of(table.rows[said.key]))
         tests |= {said.key: chances.test} if chances.test else {}
     return replace(found, verdict=said.verdict, table=table, tests=tests)
-
-
-def _keeps_mass(problem: UpdatingProblem, plain: HypothesisFit) -> bool:
-    """True where plain calibration has the weighed mass, or nothing was weighed."""
-    weighed = problem.mass_measurement
-    return weighed is None or weighed.agrees(float(plain.fit.state.weight))
 
 
 def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
@@ -290,17 +272,6 @@ def best_base_fit(
             if not fits and k == len(starts) - 1:
                 raise
     return HypothesisFit(Effect(), min(fits, key=lambda f: f.neg2_log_evidence), model)
-
-
-def fit_of_the_deck(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
-    """Calibration parameters alone, no scatter or modal discrepancy: same starts, and the null."""
-    kept = [e.traits.writable for e in problem.base]
-    chosen = [e for e, k in zip(problem.base, kept, strict=True) if k]
-    inside = np.concatenate(
-        [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]
-    ).astype(bool)
-    problem = problem.exactly()
-    return best_base_fit(problem, chosen, [x[inside] for x in (*_null_starts(problem), null.fit.x)])
 
 
 def nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:

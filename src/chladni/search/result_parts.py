@@ -202,20 +202,18 @@ def agreement(
     )
 
 
-def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
-    """Reason not to trust a calibration that predicts the held-out data worse than the deck.
+def foretells_worse(agreement: Agreement | None, named: bool = False) -> tuple[str, ...]:
+    """Reason not to use a deck that predicts the held-out data worse than the deck before it.
 
     An increase of Q within the noise of the recording may be chance and is accepted.
     """
-    held = None if agreement is None else agreement.held_out
-    if held is None or held.nominal is None or held.calibrated is None:
-        return ()
-    if held.calibrated <= held.nominal + (held.floor or 0.0):
+    held = Scores() if agreement is None else agreement.held_out
+    (one, before), (last, after) = held.last_step(named).items()
+    if before is None or after is None or after <= before + (held.floor or 0.0):
         return ()
     return (
-        "the calibrated deck predicts the held-out data worse than the given deck "
-        f"(Q {held.calibrated:.3g}, {held.nominal:.3g} before); try chladni diagnose, "
-        '[test] gain = "unknown" if the level is uncertain, or position_sd for uncertain places',
+        f"the {last} deck predicts the held-out data worse than the {one} deck "
+        f"(Q {after:.3g}, {before:.3g} before)",
     )
 
 
