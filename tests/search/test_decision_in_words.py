@@ -70,7 +70,7 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
         ),
         (
             table(row("crack", 200.0, votes=Votes(-900.0)), null=row("", 0.0)),
-            ("the held-out data speak against it", f"crack at grid 7{UNEXPLAINED}"),
+            ("the held-out data speak against it", f"what {NULL} leaves"),
         ),
         (
             table(row("crack", 200.0, left=WORSE), row("point-mass", 199.0)),
@@ -121,15 +121,27 @@ def test_a_name_is_never_followed_by_that_nothing_explains_the_recording():
     assert not any(UNEXPLAINED in text for text in words_.sentences())
 
 
-def test_the_absolute_test_is_that_of_the_answer_or_what_refutes_calibration():
+def test_the_absolute_test_is_that_of_the_answer():
     named, _ = words(table(*SINGLES))
     assert named.test().what == "what crack leaves"
-    refuted, found = words(table(row("crack", 200.0, left=WORSE)))
-    assert not refuted.test().passes
-    assert refuted.test().p == found.refuting[1]
-    assert refuted.test().where == "crack at grid 7"
-    quiet, _ = words(table(row("crack", 1.0)))
-    assert quiet.test().what == f"what {NULL} leaves"
+    for gain in (1.0, 200.0):
+        quiet, _ = words(table(row("crack", gain, left=WORSE)))
+        assert quiet.test().what == f"what {NULL} leaves"
+
+
+@pytest.mark.parametrize(
+    ("made", "doubt"),
+    [
+        (table(row("crack", 200.0, left=WORSE)), True),
+        (table(row("crack", 200.0)), False),  # it is named
+        (table(row("crack", 15.0, votes=Votes(0.0))), False),  # too weak to be named
+        (table(row("crack", 200.0, votes=Votes(-190.0))), False),  # all data give it little
+    ],
+)
+def test_a_refused_effect_that_gains_enough_is_a_reason_for_doubt(made, doubt):
+    said = tuple(words(made)[0].doubts())
+    assert len(said) == doubt
+    assert all("all data together give crack 250" in why for why in said)
 
 
 def test_why_another_is_not_named_is_said_of_each():

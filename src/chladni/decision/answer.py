@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from .hypothesis_table import Votes
 from .judgement import JudgedTable
 from .reasons import ALONE, BEYOND, Decision, Reason, Step, names_of, steps
 from .tied import tied
@@ -26,28 +27,30 @@ def _with_confusers(case: JudgedTable, decision: Decision) -> Decision:
 
 
 def _with_doubt(case: JudgedTable, decision: Decision) -> Decision:
-    """Add the effects that are clearly better than calibration, but too weak to be named.
+    """Add the effects that are clearly better than calibration, but are not named.
 
     The statement that no physics is missing needs evidence too. If an effect leads by more than
-    ``rules.tied`` and no held-out data reject it, the answer is calibration or that effect. It is
-    so at any gain if calibration strains a family of joints beyond its scatter and the effect does
-    not. If calibration alone does not fit, the answer is that effect or one outside the catalogue.
+    ``rules.tied`` on all data, the answer is calibration or that effect. It is so at any gain if
+    calibration strains a family of joints beyond its scatter and the effect does not. If
+    calibration alone does not fit, the answer is that effect or one outside the catalogue. A
+    leader that was refused leaves the latter open as well.
     """
     table, rules = case.table, case.rules
     plainly = decision.verdict in ("nothing missing", "calibration only")
-    against = decision.votes is not None and not decision.votes.all_for
-    unfit = not plainly and decision.reason is Reason.TOO_LITTLE
+    unfit = not plainly and decision.reason in (Reason.TOO_LITTLE, Reason.WORSE)
+    votes = Votes() if decision.votes is None else decision.votes
+    against = unfit and any(v < 0 for v in votes.given)
     if not (rules.doubt and decision.order and (plainly or unfit)) or against:
         return decision
     every = case.rows(decision.order)
     lead = every[0]
     relieved = rules.strained and table.null.strained and not lead.strained
     gain, least = table.gain(lead), 0.0 if relieved else rules.tied
-    if gain <= least:
+    if gain + votes.news <= least:
         return decision
     least = max(least, gain - rules.tied)
-    near = (r for r in every if table.gain(r) > least and not (relieved and r.strained))
-    names = names_of(tuple(near))
-    one_of = (*names, BEYOND) if unfit else (ALONE, *names)
+    near = (r for r in every if table.gain(r) >= least and not (relieved and r.strained))
+    open_ = (BEYOND,) if decision.refused else ()
+    one_of = (*(() if unfit else (ALONE,)), *names_of(tuple(near)), *open_)
     step = Step(Reason.DOUBT, lead.key, names=one_of)
     return replace(decision, one_of=one_of, steps=steps(decision, step))

@@ -157,7 +157,7 @@ def _decided_next(
     others = (k for k in refused.order if k != alternative.key)
     led = replace(
         refused, order=(row.key, *others), due=case.due(row), passed_over=over, one_of=(),
-        refuting=None, votes=None,
+        votes=None,
         steps=steps(
             refused, Step(Reason.NEXT, row.key, over[-1][1], names=(over[-1][0],)),
             Step(Reason.RENEWED, alternative.key),

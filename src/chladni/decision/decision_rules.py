@@ -56,9 +56,6 @@ class DecisionRules:
     harm: float = _rule(
         1.0, math.inf, "times the Q of calibration: a deck with an effect must not fit worse"
     )
-    conflict: float = _rule(
-        2.0, math.inf, "times the required gain: fitted data alone refute calibration"
-    )
     alternatives: bool = _rule(
         True, False, "if the leader is refused, the next explanation is tested"
     )

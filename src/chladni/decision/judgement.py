@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import exp
 
 from .decision_rules import DecisionRules
 from .hypothesis_table import NULL, HypothesisTable, Row, Votes, needed
-from .reasons import BEYOND, Decision, Reason, Step, steps
-from .tied import tied
+from .reasons import Decision, Reason, Step, steps
 
 
 @dataclass(frozen=True)
@@ -74,8 +72,8 @@ def apply_held_out(case: JudgedTable, decision: Decision) -> Decision:
     - if the deck with the effect fits worse than the calibrated deck.
 
     Data that are insensitive to the effect are predicted equally well without it and have no vote.
-    All data together, or the fitted data by far, may refute calibration even so. The cause is then
-    outside the catalogue or, if no data are against the leader, the leader with something else.
+    A refused effect refutes nothing: its gain may come from a wrong model of the errors. The test
+    of fit of calibration alone decides then, and the leader is one of several explanations.
     """
     table, rules = case.table, case.rules
     row = table.rows[decision.order[0]]
@@ -92,19 +90,7 @@ def apply_held_out(case: JudgedTable, decision: Decision) -> Decision:
     refused = replace(
         decision, reason=why, named=False, steps=steps(decision, Step(why, row.key)), one_of=()
     )
-    together = gain + votes.news
-    if together > due:
-        by, gain = Reason.ALL_DATA, together
-    elif gain > rules.conflict * due:
-        by = Reason.WHAT_WAS_FITTED
-    else:
-        return untested(case, refused)
-    one_of = (*tied(row, case.rows(decision.order), rules.tied), BEYOND) if voted else ()
-    return replace(
-        refused, verdict="not in catalogue", one_of=one_of, tested=None,
-        refuting=(by, min(1.0, table.families * exp(-gain / 2))),
-        steps=steps(refused, Step(by, row.key, why, names=one_of)),
-    )  # fmt: skip
+    return untested(case, refused)
 
 
 def _worse(row: Row, harm: float) -> bool:

@@ -35,8 +35,6 @@ class Reason(Enum):
     SET_REFUSED = auto()
     PERHAPS_PRESENT = auto()  # an effect that reaches a part of its required gain
     RIVAL_OF_MEMBER = auto()
-    ALL_DATA = auto()  # refute calibration alone
-    WHAT_WAS_FITTED = auto()  # refutes calibration alone
     NEXT = auto()  # explanation after a refused leader
     TIED = auto()  # explains the data equally well
     DOUBT = auto()  # calibration or the leader
@@ -75,7 +73,6 @@ class Decision:
     named : whether the first is named
     one_of : explanations that the data cannot separate
     tested : key of the row whose test of fit is the absolute one
-    refuting : which data refute calibration alone where no row is tested, and their p
     votes : evidence of the held-out data on the first
     whole : the set that is named
     passed_over : names that were tested before the first, and the refusal of each
@@ -89,7 +86,6 @@ class Decision:
     named: bool = False
     one_of: tuple[str, ...] = ()
     tested: str | None = None
-    refuting: tuple[Reason, float] | None = None
     votes: Votes | None = None
     whole: SetRow | None = None
     passed_over: tuple[tuple[str, Reason], ...] = ()

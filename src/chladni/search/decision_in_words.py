@@ -1,6 +1,6 @@
 """Sentences of a decision: the only module that puts its reasons into English."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..decision.hypothesis_table import Row, SetRow, Votes, after, refined
@@ -18,7 +18,6 @@ REFUSED = {
     Reason.TOO_LITTLE: "all data together give too little evidence",
     Reason.WORSE: "the deck with it fits worse than the calibrated deck",
 }
-DATA = {Reason.ALL_DATA: "all data", Reason.WHAT_WAS_FITTED: "the fitted data"}
 
 
 def concluded(
@@ -39,7 +38,7 @@ def concluded(
         passed_over=tuple((name, words.refusal(name, why)) for name, why in decision.passed_over),
     )  # fmt: skip
     if not decision.named:
-        return said, ()
+        return said, tuple(words.doubts())
     distrust = (r.distrust for k, r in known.refinements.items() if refined(k) == first)
     return replace(said, written=known.written[first]), next(distrust, ())
 
@@ -70,11 +69,8 @@ class DecisionWords:
         return next(s for s in self.known.table.sets if s.key == step.key)
 
     def test(self) -> FitTest | None:
-        """The absolute test: that of the tested row, or the evidence that refutes calibration."""
-        if self.decision.refuting is None:
-            return self.known.tests.get(self.decision.tested or "")
-        step = next(s for s in self.decision.steps if s.reason is self.decision.refuting[0])
-        return FitTest(False, self.decision.refuting[1], self._refuting(step), self._text(step.key))
+        """The absolute test of fit, of the row that was tested."""
+        return self.known.tests.get(self.decision.tested or "")
 
     def refusal(self, name: str, why: Reason) -> str:
         """Reason why a hypothesis is not named."""
@@ -90,12 +86,23 @@ class DecisionWords:
             return f"its residual is not explained: {test.what}"
         return REFUSED[why]
 
+    def doubts(self) -> Iterator[str]:
+        """Reason not to trust calibration where a refused effect gains what is required."""
+        decision, table = self.decision, self.known.table
+        lead = self.row(decision.order[0]) if decision.order else None
+        if lead is None or not decision.refused or decision.votes is None:
+            return
+        gain = table.gain(lead) + decision.votes.news
+        if decision.one_of and gain > decision.due:
+            yield (
+                f"all data together give {lead.name} {gain:.0f} in -2 ln evidence over "
+                f"calibration alone, but {REFUSED[decision.reason]}: a cause outside the catalogue "
+                "may imitate it"
+            )
+
     def settled(self) -> str:
         """Measurements that would separate the explanations that these data cannot separate."""
         return settled_by(self.decision.one_of)
-
-    def _text(self, key: str) -> str:
-        return self.known.fits[key].effect.text
 
     def _tested(self, step: Step) -> str:
         test, name = self.known.tests.get(step.key), self.row(step.key).name or ALONE
@@ -143,21 +150,6 @@ class DecisionWords:
             f"{held:.3g} calibrated, {held_with:.3g} with it; fitted Q {seen:.3g} and "
             f"{seen_with:.3g}), so it is not named"
         )
-
-    def _refuting(self, step: Step) -> str:
-        row, gain = self.row(step.key), self.gain(step.key)
-        if step.reason is Reason.ALL_DATA:
-            gain += row.held_out_votes().news
-        assert step.why is not None
-        return (
-            f"{DATA[step.reason]}: {evidence_in_words(gain / 2)} for {row.name} compared with "
-            f"calibration alone; but {REFUSED[step.why]}"
-        )
-
-    def _unexplained(self, step: Step) -> str:
-        open_ = step.names or self.decision.named
-        text = f"{self._refuting(step)}, {self._text(step.key)}"
-        return text if open_ else f"{text}{UNEXPLAINED}"
 
     def _found_together(self, step: Step) -> str:
         s = self.whole(step)
@@ -238,8 +230,6 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.AGAINST: DecisionWords._refused,
     Reason.TOO_LITTLE: DecisionWords._refused,
     Reason.WORSE: DecisionWords._refused,
-    Reason.ALL_DATA: DecisionWords._unexplained,
-    Reason.WHAT_WAS_FITTED: DecisionWords._unexplained,
     Reason.FOUND_TOGETHER: DecisionWords._found_together,
     Reason.HELD_OUT_OF_SET: DecisionWords._held_out_of_set,
     Reason.SET_REFUSED: DecisionWords._set_refused,
