@@ -39,10 +39,14 @@ def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
     if found is None:
         return ()
     gains = diagnosis.gains or (diagnosis.two_log_bayes_factor(found),)
-    return tuple(_named(found, e, g) for e, g in zip(found.effects, gains, strict=True))
+    each = zip(found.effects, gains, strict=True)
+    return tuple(_named(found, e, g, diagnosis.as_deck or found) for e, g in each)
 
 
-def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffect:
+def _named(
+    hypothesis: HypothesisFit, effect: Effect, gain: float, deck: HypothesisFit
+) -> NamedEffect:
+    written = effect.reported(deck.fit.of(effect), deck.fit.sd(effect))
     return NamedEffect(
         effect.name,
         effect.claim,
@@ -50,6 +54,7 @@ def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffec
         _located(hypothesis, effect),
         _reported(hypothesis, effect),
         gain,
+        () if effect.kind == "test" else tuple(row.value for row in written),
     )
 
 
