@@ -17,7 +17,6 @@ from chladni.decision.hypothesis_table import (
     Left,
     Row,
     SetRow,
-    Votes,
 )
 from chladni.errors import FileError
 
@@ -94,11 +93,10 @@ def _table(given: Json) -> HypothesisTable:
 
 
 def _row(given: Json) -> Row:
-    votes, left = given["votes"], given["left"]
+    left = given["left"]
     return Row(
         **{
             **given, "names": tuple(given["names"]),
-            "votes": None if votes is None else Votes(**votes),
             "left": None if left is None else Left(*(tuple(q) for q in left.values())),
         }
     )  # fmt: skip

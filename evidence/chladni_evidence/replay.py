@@ -151,7 +151,7 @@ def rule_lines(cases: Sequence[RecordedCase]) -> list[str]:
 def another_likelihood(case: RecordedCase, likelihood: Likelihood) -> RecordedCase:
     """The case with the evidence of its rows under another likelihood.
 
-    Other numbers of the rows (tests, votes, Q) stay as recorded. A family far behind lost vectors
+    Other numbers of the rows (tests, news, Q) stay as recorded. A family far behind lost vectors
     of its basis before it was kept.  So differences of evidence to calibration alone are taken, in
     which the widths of the data cancel.
     """

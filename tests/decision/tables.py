@@ -9,20 +9,19 @@ from chladni.decision.hypothesis_table import (
     Left,
     Row,
     SetRow,
-    Votes,
     after,
     refined,
 )
 from chladni.decision.reasons import Decision
 
-FOR = Votes(50.0, 50.0, 50.0)
+FOR = 50.0
 SERVES = Left((1.0, 0.1), (1.0, 0.1))
 
 
-def row(name, gain, p=0.5, votes=FOR, left=SERVES, **more):
+def row(name, gain, p=0.5, news=FOR, left=SERVES, **more):
     """A hypothesis that gains so much, and that nothing refuses unless it is said."""
     names = tuple(name.split(" and "))
-    return Row(name, names, -gain, p=p, p_damping=1.0, votes=votes, left=left, **more)
+    return Row(name, names, -gain, p=p, p_damping=1.0, news=news, left=left, **more)
 
 
 def table(*rows, null=None, then=None, sets=(), after_lead=1.0, **more):
@@ -35,9 +34,9 @@ def table(*rows, null=None, then=None, sets=(), after_lead=1.0, **more):
         changed = (then or {}).get(r.key, {})
         held[r.key] = r
         held[refined(r.key)] = replace(r, key=refined(r.key), **changed)
-    for made, votes, _ in sets:
-        for k, v in enumerate(votes):
-            held[made.member(k)] = Row(made.member(k), (made.members[k],), 0.0, votes=v)
+    for made, news, _ in sets:
+        for k, v in enumerate(news):
+            held[made.member(k)] = Row(made.member(k), (made.members[k],), 0.0, news=v)
     for r in rows:
         for lead in (singles[0], refined(singles[0])):
             key = after(refined(r.key), lead)
@@ -46,10 +45,10 @@ def table(*rows, null=None, then=None, sets=(), after_lead=1.0, **more):
     return HypothesisTable(held, singles, tuple(made for made, _, _ in sets), **given)
 
 
-def together(key, gains, due, votes=(FOR, FOR), ahead=1e3, alternatives=((), ()), **more):
-    """A set of two effects: as the decision reads it, votes of its members, its row."""
+def together(key, gains, due, news=(FOR, FOR), ahead=1e3, alternatives=((), ()), **more):
+    """A set of two effects: as the decision reads it, news of its members, its row."""
     made = SetRow(key, ("crack", "point-mass"), gains, due, ahead, alternatives)
-    return made, votes, replace(row("crack and point-mass", 1e3, **more), key=key)
+    return made, news, replace(row("crack and point-mass", 1e3, **more), key=key)
 
 
 def decision(made, rules=RULES):

@@ -8,7 +8,7 @@ import pytest
 from tests.decision.tables import FOR, decision, row, table, together
 
 from chladni.decision.decision_rules import gain_due
-from chladni.decision.hypothesis_table import NULL, AlternativeRow, Left, Votes
+from chladni.decision.hypothesis_table import NULL, AlternativeRow, Left
 from chladni.effects.estimate import Remarks
 from chladni.inference.adequacy import FitTest
 from chladni.search.deciding import Measured
@@ -18,7 +18,7 @@ ONE, DUE = (gain_due(n, 1e-5) for n in (1, 2))
 WORSE = Left((1.0, 0.1), (1.0, 2.0))
 PAIR = together("set 0", (2 * DUE, 0.8 * DUE), DUE)
 PAID = together("set 1", (2 * DUE, 2 * DUE), DUE)
-BAD = together("set 1", (2 * DUE, 2 * DUE), DUE, (FOR, Votes(-2 * DUE)))
+BAD = together("set 1", (2 * DUE, 2 * DUE), DUE, (FOR, -2 * DUE))
 TIES = together(
     "set 1",
     (2 * DUE, 2 * DUE),
@@ -56,9 +56,9 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
 @pytest.mark.parametrize(
     ("made", "said"),
     [
-        (table(*SINGLES), ("crack on held-out data: the data held out +50",)),
+        (table(*SINGLES), ("crack: the held-out data bring +50 in 2 ln predictive density",)),
         (
-            table(row("crack", 0.7 * DUE, votes=FOR)),
+            table(row("crack", 0.7 * DUE, news=FOR)),
             (f"together more than the required {ONE:.0f}",),
         ),
         (
@@ -69,7 +69,7 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
             ),
         ),
         (
-            table(row("crack", 200.0, votes=Votes(-900.0)), null=row("", 0.0)),
+            table(row("crack", 200.0, news=-900.0), null=row("", 0.0)),
             ("the held-out data speak against it", f"what {NULL} leaves"),
         ),
         (
@@ -92,14 +92,14 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
             ),
         ),
         (
-            table(row("crack", 15.0, votes=Votes(0.0))),
+            table(row("crack", 15.0, news=0.0)),
             (f"by 15.0 in -2 ln evidence; {ONE:.0f} are required", "settle it"),
         ),
         (
             table(*SINGLES, sets=[PAIR, PAID]),
             (
                 f"crack {2 * DUE:.0f}, point-mass {2 * DUE:.0f} (required: {DUE:.0f})",
-                "point-mass added to crack, on held-out data",
+                "point-mass added to crack: the held-out data bring",
             ),
         ),
         (table(*SINGLES, sets=[BAD]), ("too little for point-mass added to crack",)),
@@ -134,8 +134,8 @@ def test_the_absolute_test_is_that_of_the_answer():
     [
         (table(row("crack", 200.0, left=WORSE)), True),
         (table(row("crack", 200.0)), False),  # it is named
-        (table(row("crack", 15.0, votes=Votes(0.0))), False),  # too weak to be named
-        (table(row("crack", 200.0, votes=Votes(-190.0))), False),  # all data give it little
+        (table(row("crack", 15.0, news=0.0)), False),  # too weak to be named
+        (table(row("crack", 200.0, news=-190.0)), False),  # all data give it little
     ],
 )
 def test_a_refused_effect_that_gains_enough_is_a_reason_for_doubt(made, doubt):

@@ -124,7 +124,7 @@ def test_data_that_choose_speak_against_a_name(question, answered):
     data = replace(problem.data, values=np.where(at, foretold, problem.data.values))
     spoilt = replace(ready, problem=replace(problem, data=data))
     opposed = _answer(question, spoilt)[1]
-    assert opposed.votes.held_out < 0 < decision.votes.held_out
+    assert opposed.news < 0 < decision.news
 
 
 def _spoilt(data: Responses, at: np.ndarray) -> Responses:

@@ -175,12 +175,10 @@ def test_each_gains_what_the_others_lose_without_it(two, found):
 
 
 def test_each_is_borne_by_lines_that_no_fit_saw(two, found):
-    """Asked beside the other, of what was held out and of folds of what was fitted."""
+    """With the other in place."""
     both = found[1].sets[-1]
     for without in both.without:
-        evidence = held_out_evidence(two, ~two.data.use, without, both.own, both.about)
-        assert min(evidence.votes.values()) > 0
-        assert len(evidence.votes) == 3
+        assert held_out_evidence(two, ~two.data.use, without, both.own, both.about) > 0
 
 
 def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from .hypothesis_table import Votes
 from .judgement import JudgedTable
 from .reasons import ALONE, BEYOND, Decision, Reason, Step, names_of, steps
 from .tied import tied
@@ -38,15 +37,15 @@ def _with_doubt(case: JudgedTable, decision: Decision) -> Decision:
     table, rules = case.table, case.rules
     plainly = decision.verdict in ("nothing missing", "calibration only")
     unfit = not plainly and decision.reason in (Reason.TOO_LITTLE, Reason.WORSE)
-    votes = Votes() if decision.votes is None else decision.votes
-    against = unfit and any(v < 0 for v in votes.given)
-    if not (rules.doubt and decision.order and (plainly or unfit)) or against:
+    news = decision.news or 0.0
+    against = unfit and news < 0
+    if not (decision.order and (plainly or unfit)) or against:
         return decision
     every = case.rows(decision.order)
     lead = every[0]
-    relieved = rules.strained and table.null.strained and not lead.strained
+    relieved = table.null.strained and not lead.strained
     gain, least = table.gain(lead), 0.0 if relieved else rules.tied
-    if gain + votes.news <= least:
+    if gain + news <= least:
         return decision
     least = max(least, gain - rules.tied)
     near = (r for r in every if table.gain(r) >= least and not (relieved and r.strained))

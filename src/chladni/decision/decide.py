@@ -5,7 +5,7 @@ decision returns a request for it by name. The caller computes it, adds it and c
 
 1. The leader is named if it reaches the required gain and fits.
 2. Few data bear a name only if they could contradict it and nothing else is tied with it.
-3. All data together may support a name that the fitted data alone do not.
+3. Fitted and held-out data are one evidence: together they bring the required gain.
 4. A set of effects that all reach the required gain precedes one effect.
 5. The leader is fitted again and tested on held-out data.
 6. If the leader is refused, its rivals are tested.
@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from .answer import with_ties
 from .decision_rules import DecisionRules
-from .hypothesis_table import NULL, HypothesisTable, Missing, Row, Wanted, fits
+from .hypothesis_table import HypothesisTable, Missing, Row, Wanted, fits
 from .judgement import JudgedTable, apply_held_out, tested, untested
 from .named_sets import largest_named
 from .reasons import ALONE, Decision, Reason, Step, steps
@@ -36,7 +36,7 @@ def decide(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | W
 def called(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | Wanted:
     """Return the decision on single effects, before held-out data are used."""
     try:
-        return _first(JudgedTable(table, rules))
+        return _first(JudgedTable(table, rules), fitted_alone=True)
     except Missing as missing:
         return missing.wanted
 
@@ -44,7 +44,7 @@ def called(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | W
 def _named(case: JudgedTable) -> Decision:
     """The name, if any, or what refused it."""
     decision = _decided(case)
-    few = not case.table.enough and case.rules.enough_data
+    few = not case.table.enough
     contradicted = case.table.contradicted and decision.named
     alone = contradicted and len(with_ties(case, decision).one_of) < 2
     return _too_few(case, decision) if few and not alone else decision
@@ -52,29 +52,34 @@ def _named(case: JudgedTable) -> Decision:
 
 def _decided(case: JudgedTable) -> Decision:
     """The name by the odds, if any, or what refused it."""
-    decision = _first(case)
-    alone = _supported_by_all_data(case, decision)
-    sets = case.table.sets if case.rules.sets else ()
-    found, refusals = largest_named(case, alone, [s for s in sets if s.pays])
+    alone = _first(case)
+    found, refusals = largest_named(case, alone, [s for s in case.table.sets if s.pays])
     if found is not None:
         return found
     decision = replace(alone, steps=steps(alone, *refusals))
     if decision.named:
         decision = _with_lead_refined(case, decision)
-    if decision.refused and decision.whole is None and case.rules.alternatives:
+    if decision.refused and decision.whole is None:
         decision = _alternatives_tested(case, decision)
     return decision
 
 
-def _first(case: JudgedTable) -> Decision:
-    """Name the leader if it reaches the required gain; it, or calibration, must fit."""
+def _first(case: JudgedTable, fitted_alone: bool = False) -> Decision:
+    """Name the leader if it reaches the required gain; it, or calibration, must fit.
+
+    A fifth of a dozen natural frequencies is a large part of the information. Held-out sensors and
+    spectral lines may be sensitive to an effect that the fitted band hardly shows. So all data
+    together may bring the gain that the fitted data alone do not.
+    """
     table, order = case.table, case.table.singles
     lead = table.rows[order[0]] if order else None
     due = case.due(lead)
     begun = Decision(case.calibrated(), order, due=due)
     if lead is not None and table.gain(lead) > due:
         return tested(case, begun, lead)
-    return untested(case, begun)
+    if lead is None or fitted_alone or not case.suffices(lead, table.gain(lead), due):
+        return untested(case, begun)
+    return tested(case, replace(begun, steps=(Step(Reason.SUPPORTED_BY_ALL, lead.key),)), lead)
 
 
 def _too_few(case: JudgedTable, decision: Decision) -> Decision:
@@ -87,28 +92,6 @@ def _too_few(case: JudgedTable, decision: Decision) -> Decision:
         decision, verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,
         steps=steps(decision, step),
     )  # fmt: skip
-
-
-def _supported_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
-    """Name the leader if all data together support it, held-out data included.
-
-    A fifth of a dozen natural frequencies is a large part of the information. Held-out sensors and
-    spectral lines may be sensitive to an effect that the fitted band hardly shows. The Bayes factor
-    of all data is that of the fitted data times the predictive ratio of the held-out data. The
-    bound on false alarms holds for it too. Fitted responses must bring ``good_part`` of the gain.
-    """
-    table, poles = case.table, case.table.poles
-    if not decision.order or decision.named or decision.refused:
-        return decision
-    lead = table.rows[decision.order[0]]
-    gain = table.gain(lead)
-    if gain <= (0.0 if poles else case.rules.good_part * decision.due):
-        return decision
-    if not case.evidence_suffices(gain, lead.held_out_votes(), decision.due, poles):
-        return decision
-    done = tuple(s for s in decision.steps if s.key != NULL)  # without the steps on calibration
-    supported = replace(decision, steps=(*done, Step(Reason.SUPPORTED_BY_ALL, lead.key)))
-    return tested(case, supported, lead)
 
 
 def _with_lead_refined(case: JudgedTable, decision: Decision) -> Decision:
@@ -157,7 +140,7 @@ def _decided_next(
     others = (k for k in refused.order if k != alternative.key)
     led = replace(
         refused, order=(row.key, *others), due=case.due(row), passed_over=over, one_of=(),
-        votes=None,
+        news=None,
         steps=steps(
             refused, Step(Reason.NEXT, row.key, over[-1][1], names=(over[-1][0],)),
             Step(Reason.RENEWED, alternative.key),

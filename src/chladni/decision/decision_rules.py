@@ -40,32 +40,13 @@ class DecisionRules:
         0.0,
         "prior odds of a cause outside the catalogue: with p = 0.01 of the test of fit it is even",
     )
-    enough_data: bool = _rule(
-        True, False, "few modes or numbers name an effect only if no other is tied with it"
-    )
     good_part: float = _rule(
         GOOD_PART, 1.0, "part of the required gain that fitted responses bring if other data agree"
     )
-    poles_together: bool = _rule(
-        True, False, "fitted and predicted natural frequencies reach the required gain together"
-    )
-    opposed: float = _rule(
-        1.0, math.inf, "times the required gain: from there on held-out data refuse a name"
-    )
-    sets: bool = _rule(True, False, "several effects may be named together")
     harm: float = _rule(
         1.0, math.inf, "times the Q of calibration: a deck with an effect must not fit worse"
     )
-    alternatives: bool = _rule(
-        True, False, "if the leader is refused, the next explanation is tested"
-    )
     tied: float = _rule(TIED, 0.0, "gap up to which two explanations are one answer")
-    doubt: bool = _rule(
-        True, False, "if the leader gains too little, calibration is one of several answers"
-    )
-    strained: bool = _rule(
-        True, False, "joints that changed by more than joints scatter are calibrated, or in doubt"
-    )
 
     def without(self, name: str) -> "DecisionRules":
         """A copy with one rule switched off."""

@@ -16,7 +16,7 @@ class Ask(Enum):
     """Quantities of one row that a decision may request."""
 
     TEST = "the test of fit"
-    VOTES = "evidence of held-out data for it compared with calibration"
+    NEWS = "evidence of held-out data for it compared with calibration"
     LEFT = "Q with it as a deck can hold it"
     RENEWAL = "the same fitted again on a model that bears it"
     AFTER = "whether its damping follows what the leader changes"
@@ -37,30 +37,6 @@ class Missing(Exception):
     def __init__(self, wanted: Wanted) -> None:
         super().__init__(wanted)
         self.wanted = wanted
-
-
-@dataclass(frozen=True)
-class Votes:
-    """Gains in 2 ln predictive density over calibration; None where there are no such data."""
-
-    held_out: float | None = None
-    sensors: float | None = None
-    lines: float | None = None
-
-    @property
-    def given(self) -> tuple[float, ...]:
-        """The votes that exist."""
-        return tuple(v for v in (self.held_out, self.sensors, self.lines) if v is not None)
-
-    @property
-    def news(self) -> float:
-        """The gain on the held-out data, 0 without any."""
-        return self.held_out or 0.0
-
-    @property
-    def all_for(self) -> bool:
-        """True if every vote is for the effect."""
-        return all(v > 0 for v in self.given)
 
 
 @dataclass(frozen=True)
@@ -87,7 +63,8 @@ class Row:
     strained : whether the factor of a joint family exceeds the usual scatter of joints
     fitted : False where the fit failed
     p, p_damping : of the test of fit, and of damping that follows an elastic change; NaN: no test
-    votes, left : evidence of the held-out data; Q with the effect
+    news : gain over calibration on the held-out data, in 2 ln predictive density; 0 without any
+    left : Q with the effect
     """
 
     key: str
@@ -103,7 +80,7 @@ class Row:
     fitted: bool = True
     p: float | None = None
     p_damping: float | None = None
-    votes: Votes | None = None
+    news: float | None = None
     left: Left | None = None
 
     @property
@@ -125,11 +102,11 @@ class Row:
             raise Missing(Wanted(Ask.TEST, self.key))
         return fits(self.p, rules) and (self.p_damping is None or fits(self.p_damping, rules))
 
-    def held_out_votes(self) -> Votes:
-        """The votes; raise ``Missing`` if they are not known."""
-        if self.votes is None:
-            raise Missing(Wanted(Ask.VOTES, self.key))
-        return self.votes
+    def foretold(self) -> float:
+        """Gain on the held-out data; raise ``Missing`` if it is not known."""
+        if self.news is None:
+            raise Missing(Wanted(Ask.NEWS, self.key))
+        return self.news
 
     def leaves(self) -> Left:
         """Q with the effect; raise ``Missing`` if it is not known."""

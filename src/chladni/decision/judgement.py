@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from .decision_rules import DecisionRules
-from .hypothesis_table import NULL, HypothesisTable, Row, Votes, needed
+from .hypothesis_table import NULL, HypothesisTable, Row, needed
 from .reasons import Decision, Reason, Step, steps
 
 
@@ -27,20 +27,18 @@ class JudgedTable:
         """The verdict where nothing is named; joints beyond their usual scatter are calibrated."""
         null = self.table.null
         changed = self.table.nominal - null.neg2_log_evidence > self.rules.changed
-        strained = self.rules.strained and null.strained
+        strained = null.strained
         return "calibration only" if changed or strained else "nothing missing"
 
-    def evidence_suffices(self, gain: float, votes: Votes, due: float, poles: bool = False) -> bool:
-        """True if fitted and held-out data support a name whose required gain is ``due``.
+    def suffices(self, row: Row, gain: float, due: float) -> bool:
+        """True if fitted and held-out data together bring the required gain ``due``.
 
-        ``poles`` are few: all of them together must reach it. The sum also counts for responses,
-        if all votes are for the name and the fitted data bring ``good_part`` of the gain.
+        P(fitted) P(held out | fitted) = P(both): the evidence of all data is the sum of both gains.
+        Fitted responses must bring ``good_part`` of it. Natural frequencies are few, and any part
+        will do.
         """
-        together = gain + votes.news
-        for_it = gain > self.rules.good_part * due and votes.all_for
-        poles = poles and self.rules.poles_together
-        least = together if poles or for_it else min(gain, together)
-        return least > due and not any(g < -self.rules.opposed * due for g in votes.given)
+        part = 0.0 if self.table.poles else self.rules.good_part
+        return gain > part * due and gain + row.foretold() > due
 
 
 def tested(case: JudgedTable, decision: Decision, row: Row) -> Decision:
@@ -65,28 +63,26 @@ def untested(case: JudgedTable, decision: Decision) -> Decision:
 def apply_held_out(case: JudgedTable, decision: Decision) -> Decision:
     """Decide on the first row with the held-out data.
 
-    The fitted data must still support the name after the second fit. Held-out data refuse it
+    The fitted data must still support the name after the second fit. It is refused
 
-    - if they are against it by the required gain;
     - if all data together bring less than the required gain;
     - if the deck with the effect fits worse than the calibrated deck.
 
-    Data that are insensitive to the effect are predicted equally well without it and have no vote.
+    Data that are insensitive to the effect are predicted equally well without it and bring nothing.
     A refused effect refutes nothing: its gain may come from a wrong model of the errors. The test
     of fit of calibration alone decides then, and the leader is one of several explanations.
     """
     table, rules = case.table, case.rules
     row = table.rows[decision.order[0]]
-    due, gain, votes = decision.due, table.gain(row), row.held_out_votes()
-    decision = replace(decision, votes=votes)
-    voted, worse = case.evidence_suffices(gain, votes, due, table.poles), _worse(row, rules.harm)
-    if voted and not worse:
+    enough = case.suffices(row, table.gain(row), decision.due)
+    decision = replace(decision, news=row.foretold())
+    if enough and not _worse(row, rules.harm):
         return replace(
             decision, verdict=row.verdict, reason=Reason.NAMED, named=True,
             steps=steps(decision, Step(Reason.HELD_OUT, row.key)),
         )  # fmt: skip
-    why = Reason.AGAINST if any(g < 0 for g in votes.given) else Reason.TOO_LITTLE
-    why = Reason.WORSE if voted else why
+    little = Reason.AGAINST if row.foretold() < 0 else Reason.TOO_LITTLE
+    why = Reason.WORSE if enough else little
     refused = replace(
         decision, reason=why, named=False, steps=steps(decision, Step(why, row.key)), one_of=()
     )

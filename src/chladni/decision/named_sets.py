@@ -39,9 +39,7 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
     lost = max(0.0, row.neg2_log_evidence - table.rows[whole.key].neg2_log_evidence)
     done = [Step(Reason.FOUND_TOGETHER, whole.key)]
     for k, gain in enumerate(whole.gains):
-        if not case.evidence_suffices(
-            gain - lost, table.rows[whole.member(k)].held_out_votes(), whole.due
-        ):
+        if not case.suffices(table.rows[whole.member(k)], gain - lost, whole.due):
             return Step(Reason.SET_REFUSED, whole.key, Reason.NOT_SUPPORTED, k)
         done.append(Step(Reason.HELD_OUT_OF_SET, whole.key, member=k))
     begun = replace(

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from .hypothesis_table import Row, SetRow, Votes
+from .hypothesis_table import Row, SetRow
 
 ALONE = "calibration alone"
 BEYOND = "an effect outside the catalogue"
@@ -73,7 +73,7 @@ class Decision:
     named : whether the first is named
     one_of : explanations that the data cannot separate
     tested : key of the row whose test of fit is the absolute one
-    votes : evidence of the held-out data on the first
+    news : gain of the first on the held-out data
     whole : the set that is named
     passed_over : names that were tested before the first, and the refusal of each
     steps : the steps that led to the decision
@@ -86,7 +86,7 @@ class Decision:
     named: bool = False
     one_of: tuple[str, ...] = ()
     tested: str | None = None
-    votes: Votes | None = None
+    news: float | None = None
     whole: SetRow | None = None
     passed_over: tuple[tuple[str, Reason], ...] = ()
     steps: tuple[Step, ...] = ()

@@ -11,7 +11,6 @@ from ..decision.hypothesis_table import (
     Left,
     Row,
     SetRow,
-    Votes,
     Wanted,
     after,
     refined,
@@ -113,8 +112,8 @@ def measured(
     if wanted.ask is Ask.RENEWAL:
         return _refined(prepared, found, refine, known, key)
     row = known.table.rows[key]
-    if wanted.ask is Ask.VOTES:
-        return known.row(replace(row, votes=_votes(prepared, found, known, key)))
+    if wanted.ask is Ask.NEWS:
+        return known.row(replace(row, news=_news(prepared, found, known, key)))
     if wanted.ask is Ask.LEFT:
         written = as_written(known.fits[key], problem.mass_measurement)
         own, plain = known.fits[key], found.plain
@@ -129,16 +128,14 @@ def measured(
     return replace(known, tests=tests).row(chances.of(row))
 
 
-def _votes(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> Votes:
+def _news(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> float:
     """Held-out evidence on a row, or on a member of a set with the other members in place."""
     problem, unseen = prepared.problem, prepared.unseen.choosing
     if key in known.fits:
-        tested_one = held_out_evidence(problem, unseen, found.null, known.fits[key])
-    else:
-        whole, member = key.rsplit("/", 1)
-        s = known.sets[whole]
-        tested_one = held_out_evidence(problem, unseen, s.without[int(member)], s.own, s.about)
-    return Votes(tested_one.held_out, tested_one.sensors, tested_one.lines)
+        return held_out_evidence(problem, unseen, found.null, known.fits[key])
+    whole, member = key.rsplit("/", 1)
+    s = known.sets[whole]
+    return held_out_evidence(problem, unseen, s.without[int(member)], s.own, s.about)
 
 
 def _refined(

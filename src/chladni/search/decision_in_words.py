@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ..decision.hypothesis_table import Row, SetRow, Votes, after, refined
+from ..decision.hypothesis_table import Row, SetRow, after, refined
 from ..decision.reasons import ALONE, Decision, Reason, Step
 from ..effects.registry import family
 from ..ema.odds import evidence_in_words
@@ -90,9 +90,9 @@ class DecisionWords:
         """Reason not to trust calibration where a refused effect gains what is required."""
         decision, table = self.decision, self.known.table
         lead = self.row(decision.order[0]) if decision.order else None
-        if lead is None or not decision.refused or decision.votes is None:
+        if lead is None or not decision.refused or decision.news is None:
             return
-        gain = table.gain(lead) + decision.votes.news
+        gain = table.gain(lead) + decision.news
         if decision.one_of and gain > decision.due:
             yield (
                 f"all data together give {lead.name} {gain:.0f} in -2 ln evidence over "
@@ -132,13 +132,13 @@ class DecisionWords:
         row, data = self.row(step.key), "poles" if self.known.table.poles else "data"
         return (
             f"{row.name} gained {self.gain(step.key):.1f} in -2 ln evidence on the {data} that "
-            f"were fitted, and {row.held_out_votes().news:.1f} on the held-out data: together "
+            f"were fitted, and {row.foretold():.1f} on the held-out data: together "
             f"more than the required {self.decision.due:.0f}"
         )
 
     def _held_out(self, step: Step) -> str:
         row = self.row(step.key)
-        return f"{row.name} on held-out data: {votes_in_words(row.held_out_votes())}"
+        return f"{row.name}: {news_in_words(row)}"
 
     def _refused(self, step: Step) -> str:
         row = self.row(step.key)
@@ -146,7 +146,7 @@ class DecisionWords:
         (seen, seen_with), (held, held_with) = left.fitted, left.held_out
         return (
             f"{row.name} gained {self.gain(step.key):.0f} in -2 ln evidence, but "
-            f"{REFUSED[step.reason]} ({votes_in_words(row.held_out_votes())}; held-out Q "
+            f"{REFUSED[step.reason]} ({news_in_words(row)}; held-out Q "
             f"{held:.3g} calibrated, {held_with:.3g} with it; fitted Q {seen:.3g} and "
             f"{seen_with:.3g}), so it is not named"
         )
@@ -162,8 +162,8 @@ class DecisionWords:
     def _held_out_of_set(self, step: Step) -> str:
         s = self.whole(step)
         others = " and ".join(n for k, n in enumerate(s.members) if k != step.member)
-        said = votes_in_words(self.row(s.member(step.member)).held_out_votes())
-        return f"{s.members[step.member]} added to {others}, on held-out data: {said}"
+        said = news_in_words(self.row(s.member(step.member)))
+        return f"{s.members[step.member]} added to {others}: {said}"
 
     def _set_refused(self, step: Step) -> str:
         assert step.why is not None
@@ -241,15 +241,9 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
 }
 
 
-def votes_in_words(votes: Votes) -> str:
-    """Sentence on the gains of held-out data."""
-    every = {
-        "the data held out": votes.held_out,
-        "sensors predicted from the others": votes.sensors,
-        "lines predicted from the others": votes.lines,
-    }
-    words = [f"{what} {gain:+.0f}" for what, gain in every.items() if gain is not None]
-    return ", ".join(words) + " in 2 ln predictive density" if words else "nothing was held out"
+def news_in_words(row: Row) -> str:
+    """The gain on the held-out data in words."""
+    return f"the held-out data bring {row.foretold():+.0f} in 2 ln predictive density"
 
 
 def needs_impossible(name: str, why: str) -> str:
