@@ -23,7 +23,7 @@ from ..inference.result import (
     Remainder,
     Scores,
 )
-from ..inference.rows_of_fits import row_of
+from ..inference.rows_of_fits import hypothesis_of
 from .diagnosis import Diagnosis
 from .question import Prepared
 from .verdict_models import real_poles
@@ -179,7 +179,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are required "
             "to name an effect"
         )
-    if same(row_of(hypothesis), best.name):
+    if same(hypothesis_of(hypothesis), best.name):
         return f"these data cannot distinguish its fitted form from {best.name}"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..case import Case
-from ..decision.decide import RULES
-from ..decision.decision_rules import odds_of_something_else
+from ..decision.decision_rules import RULES, odds_of_something_else
 from ..dynamics.frf import FRF
 from ..ema.finding import Finding, Screening
 from ..errors import FileError, LabelError, ModelError
@@ -203,8 +202,8 @@ def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
-    decision, known = decided(prepared, made.found, made.refine)
-    found, distrust = concluded(prepared, made.found, decision, known)
+    case, decision = decided(prepared, made.found, made.refine)
+    found, distrust = concluded(prepared, made.found, case, decision)
     null = made.refine(found.null)
     if null.hypothesis is not found.null:
         plain = as_written(null.hypothesis, prepared.problem.mass_measurement)
