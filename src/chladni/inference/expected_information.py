@@ -3,8 +3,8 @@
 Hypothesis j has the probability p_j and predicts the data y of a measurement, in units of the
 noise, as N(μ_j, I + F_j F_jᵀ).  The columns of F_j are what is not known under it: parameters and
 errors of form, as the earlier data left them.  The expected information is the mutual information
-of the data and the hypothesis (Lindley 1956, Ann. Math. Stat. 27, 986-1005; Box and Hill 1967, Technometrics 9,
-57-71 for the choice between models):
+of the data and the hypothesis (Lindley 1956, Ann. Math. Stat. 27, 986-1005; for the choice between
+models Box and Hill 1967, Technometrics 9, 57-71):
 
 I = Σ_j p_j E[ln p(j | y) - ln p_j | j]   [nat].
 
