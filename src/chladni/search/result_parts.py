@@ -216,9 +216,15 @@ def foretells_worse(agreement: Agreement | None, named: bool = False) -> tuple[s
     (one, before), (last, after) = held.last_step(named).items()
     if before is None or after is None or after <= before + (held.floor or 0.0):
         return ()
+    known, why = held.with_nuisances, ""
+    if known is not None and known < before:
+        why = (
+            f"; with errors of mesh, joints and scatter Q is {known:.3g}: the deck lacks these, so "
+            "refine its mesh where it bends most"
+        )
     return (
         f"the {last} deck predicts the held-out data worse than the {one} deck "
-        f"(Q {after:.3g}, {before:.3g} before)",
+        f"(Q {after:.3g}, {before:.3g} before){why}",
     )
 
 

@@ -27,7 +27,6 @@ from ..inference.likelihood import Responses
 from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
 from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
-from ..inference.written_hypothesis import as_written
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -204,13 +203,11 @@ def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
     case, decision = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, case, decision)
-    null = made.refine(found.null)
-    if null.hypothesis is not found.null:
-        plain = as_written(null.hypothesis, prepared.problem.mass_measurement)
-        found = replace(found, plain=plain)
+    plain = refined(made.question, prepared, found.plain, written=True)
+    found = replace(found, plain=plain.hypothesis)
     if found.found is not None:
         return found, distrust
-    return replace(found, notes=(*found.notes, null.note)), null.distrust
+    return replace(found, notes=(*found.notes, plain.note)), (*plain.distrust, *distrust)
 
 
 def _updated(
