@@ -22,7 +22,7 @@ EDGES = 4  # of a seam or a rib, at least
 def seam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A cut through a sheet along a line of the mesh: the points between its tips are doubled."""
     a, length = site.article, float(rng.uniform(0.1, 0.16)) * site.size * size
-    line = _line(site, rng, length)
+    line = _line(site, rng, length, _outline(a))
     inner, n = line[1:-1], point_normals(a.points, a.shells.nodes)
     grown, copies = with_points(a, a.points[inner])
     nodes, middle = a.shells.nodes.copy(), a.points[a.shells.nodes].mean(axis=1)
@@ -38,7 +38,8 @@ def seam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 def rib(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """An upright strip on a sheet along a line of the mesh, as thick as the sheet."""
     a = site.article
-    line = _line(site, rng, float(rng.uniform(0.2, 0.35)) * site.size)
+    length = float(rng.uniform(0.2, 0.35)) * site.size
+    line = _line(site, rng, length, a.supports[:, 0])
     part = int(a.shells.part[(a.shells.nodes == line[0]).any(axis=1)][0])
     t = float(a.thickness()[a.shells.part == part].mean())
     height = float(rng.uniform(2.0, 3.0)) * t * size**0.5
@@ -59,21 +60,30 @@ def rib(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     return Hidden(made, truth)
 
 
-def _line(site: Site, rng: np.random.Generator, length: float) -> np.ndarray:
+def _outline(a: Assembly) -> np.ndarray:
+    """Rows of points at edges of one shell alone."""
+    pairs, count = np.unique(np.sort(_edges(a.shells.nodes), axis=1), axis=0, return_counts=True)
+    return np.unique(pairs[count == 1])
+
+
+def _edges(cells: np.ndarray) -> np.ndarray:
+    """Pairs (4 m, 2) of neighbours round every shell."""
+    return np.concatenate([cells[:, [k, (k + 1) % 4]] for k in range(4)])
+
+
+def _line(site: Site, rng: np.random.Generator, length: float, barred: np.ndarray) -> np.ndarray:
     """Rows of points along edges of one sheet, as straight as the mesh, from end to end."""
     a = site.article
-    held = np.unique(a.supports[:, 0])
     for _ in range(50):
         part = a.part(site.part(rng))
         cells = a.shells.nodes[a.shells.part == part]
-        edges = np.concatenate([cells[:, [k, (k + 1) % 4]] for k in range(4)])
-        edges = np.concatenate([edges, edges[:, ::-1]])
-        row = int(rng.choice(np.setdiff1d(cells, held)))
+        edges = np.concatenate([_edges(cells), _edges(cells)[:, ::-1]])
+        row = int(rng.choice(np.setdiff1d(cells, barred)))
         aside = rng.choice(edges[edges[:, 0] == row, 1])
         one = _walk(a.points, edges, [row, int(aside)], length / 2)
         back = _walk(a.points, edges, [int(aside), row], length / 2 + _length(a, one[:2]))
         line = np.array([*one[:1:-1], *back])
-        if len(line) > EDGES and not np.isin(line, held).any():
+        if len(line) > EDGES and not np.isin(line, barred).any():
             return line
     raise ModelError("the article has no room for a line of that length")
 
@@ -116,8 +126,8 @@ def soft_clamp(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     held = np.unique(a.supports[:, 0])
     if not len(held):
         raise ModelError("the article has no clamp")
-    pairs = np.concatenate([a.shells.nodes[:, [k, (k + 1) % 4]] for k in range(4)])
-    pairs = np.unique(np.sort(pairs[np.isin(pairs, held).all(axis=1)], axis=1), axis=0)
+    pairs = np.sort(_edges(a.shells.nodes), axis=1)
+    pairs = np.unique(pairs[np.isin(pairs, held).all(axis=1)], axis=0)
     share = np.repeat(np.linalg.norm(a.points[pairs[:, 1]] - a.points[pairs[:, 0]], axis=1) / 2, 2)
     width = np.bincount(pairs.ravel(), share, len(a.points))[held]
     away = np.linalg.norm(a.points[held] - a.points[rng.choice(held)], axis=1)

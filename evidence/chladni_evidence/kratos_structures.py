@@ -187,3 +187,8 @@ ARTICLES = {
     "stringer plate": replace(DECKS["stringer plate"], build=partial(stringer_plate, bars=False)),
 }
 FINER = 2.2  # refinement of an article over its deck
+TOLERANCE = {
+    "E": 0.025,
+    "rho": 0.005,
+    "t": 0.03,
+}  # sd of ln of a value, for alloys and rolled sheet

@@ -6,14 +6,21 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Assembly
-from chladni.model.ground_springs import with_ground_bushes
+from chladni.model.ground_springs import with_ground_bushes, with_springs
 from chladni.model.properties import BeamSection, Part
-from chladni_evidence.hidden import with_lumps
-from chladni_evidence.kratos import Stretched, installed, kratos_modes
-from chladni_evidence.kratos_structures import STEEL, half_cylinder
+from chladni_evidence.blind_make import made_of
+from chladni_evidence.evidence_sets import HIDDEN_IN, Order, orders
+from chladni_evidence.hidden import Site, with_lumps
+from chladni_evidence.kratos import Stretched, _shells, _springs, installed, kratos_modes
+from chladni_evidence.kratos_kinds import doubler, rib, seam, soft_clamp, stretched
+from chladni_evidence.kratos_structures import ARTICLES, DECKS, STEEL, half_cylinder
+from chladni_evidence.made_case import SHIFT, _calibration_parameters
+from chladni_evidence.mesh_transfer import Spots
+from chladni_evidence.outcome_row import NULLS
 from chladni_specimens import plate
 
 kratos = pytest.mark.skipif(not installed(), reason="no Python with KratosMultiphysics")
@@ -97,3 +104,118 @@ def test_beams():
     )  # fmt: skip
     due = 1.8751**2 / 0.25 * np.sqrt(STEEL.E * I / (STEEL.rho * np.pi * R**2)) / (2 * np.pi)
     np.testing.assert_allclose(frequencies(a, 5 * due)[:2], due, rtol=0.005)
+
+
+def site_of(name: str) -> Site:
+    """A coarse article of a structure, with two of its points as sensors."""
+    a = ARTICLES[name].made(500, 1.3)
+    parts = tuple(p.name for p in a.parts if p.name != "spots")
+    on = np.unique(a.shells.nodes[a.shells.part == 0])[[40, 90]]
+    spots = Spots(("1", "2"), a.ids[on], a.points[on], np.eye(3)[[2, 2]], parts[:1] * 2)
+    mass = mass_properties(a)[0]
+    return Site(a, spots, a.points[on], spots, mass, 50.0, 400.0, parts, np.eye(3)[0], parts)
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(3)
+
+
+@pytest.mark.parametrize("name", ["cut-out plate", "half cylinder", "curved blade"])
+def test_a_seam_parts_the_sheet_between_its_tips(name):
+    """Edges of shells along it are doubled: two free ones for each, and no other is."""
+    a = site_of(name).article
+    hidden = seam(site_of(name), rng(), 1.0)
+    b, added = hidden.article, len(hidden.article.points) - len(a.points)
+    assert added >= 3
+    assert len(free_edges(b)) - len(free_edges(a)) == 2 * (added + 1)
+    assert mass_properties(b)[0] == pytest.approx(mass_properties(a)[0])
+    steps = np.linalg.norm(np.diff(b.points[-added:], axis=0), axis=1)
+    assert hidden.truth["length_m"] == pytest.approx(steps.mean() * (added + 1), rel=0.35)
+
+
+def free_edges(a: Assembly) -> set[tuple[int, ...]]:
+    """Edges of one shell alone, as sorted pairs of points."""
+    n = a.shells.nodes
+    sides = np.sort(np.concatenate([n[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1)
+    pairs, count = np.unique(sides, axis=0, return_counts=True)
+    return set(map(tuple, pairs[count == 1].tolist()))
+
+
+def test_a_rib_stands_on_the_sheet():
+    """Its mass is rho t h L, and it stands across the sheet by its height."""
+    site = site_of("half cylinder")
+    hidden = rib(site, rng(), 1.0)
+    a, h = hidden.article, hidden.truth["height_m"]
+    new = a.points[len(site.article.points) :]
+    np.testing.assert_allclose(np.hypot(*new[:, 1:].T) - a.points[:5, 1:].max(), h, atol=1e-3)
+    L = np.linalg.norm(np.diff(new, axis=0), axis=1).sum()
+    added = mass_properties(a)[0] - site.mass
+    assert added == pytest.approx(STEEL.rho * float(a.thickness()[-1]) * h * L, rel=0.03)
+
+
+@pytest.mark.parametrize("name", ["held plate", "cantilever", "curved blade"])
+def test_a_soft_clamp_is_one_stiffness_per_length(name):
+    """Springs of the soft points sum up to that of their length; the others stay held."""
+    site = site_of(name)
+    a = (hidden := soft_clamp(site, rng(), 1.0)).article
+    soft = a.bushes.nodes[:, 0]
+    held = np.unique(site.article.supports[:, 0])
+    assert set(soft) | set(a.supports[:, 0]) == set(held)
+    assert not set(soft) & set(a.supports[:, 0])
+    width = a.bushes.stiffness[:, 3] / hidden.truth["rotation N m/rad per m"]
+    of_all = 0.0
+    for edge in free_edges(site.article):
+        if set(edge) <= set(held):
+            of_all += np.linalg.norm(np.diff(a.points[list(edge)], axis=0))
+    share = hidden.truth["share of the line"]
+    assert width.sum() == pytest.approx(share * of_all, rel=0.1)
+
+
+def test_a_doubler_and_a_state_of_stress():
+    site = site_of("held plate")
+    thick = doubler(site, rng(), 1.0)
+    ratio = thick.article.thickness() / site.article.thickness()
+    assert set(np.round(ratio, 6)) == {1.0, round(thick.truth["thicker"], 6)}
+    tight = stretched(site, rng(), 2.0)
+    assert isinstance(tight.article, Stretched)
+    u, x = tight.article.moved, site.article.points
+    strain = np.ptp(u[:, 0]) / np.ptp(x[:, 0])
+    t = float(site.article.thickness()[0])
+    assert abs(tight.truth["value"]) == pytest.approx(STEEL.E * t / 0.7 * strain)
+
+
+def test_what_has_no_counterpart_is_refused(square):
+    with pytest.raises(ModelError, match="plain isotropic sheet"):
+        _shells(square.with_parts((square.parts[0].with_section(bending_ratio=0.5),)), False)
+    with pytest.raises(ModelError, match="springs from points to ground"):
+        _springs(with_springs(square, [1], np.eye(3)[[2]], 1.0))
+
+
+def test_a_report_has_twelve_effects_and_six_nulls():
+    """Every seed does, and seven structures have each a null within two."""
+    for seed in (500, 600):
+        made = orders("kratos", [seed])
+        assert sum(o.kind in NULLS for o in made) == 6
+        assert {o.kind for o in made} - set(NULLS) == set(HIDDEN_IN)
+    nulls = {o.structure for o in orders("kratos", [500, 501]) if o.kind in NULLS}
+    assert nulls == set(DECKS)
+
+
+def test_values_of_stringers_that_the_deck_has_as_bars():
+    """Their weight is that of the bars, and E and rho are those of the article's sheets."""
+    deck, article = (forms["stringer plate"].made(500) for forms in (DECKS, ARTICLES))
+    known = _calibration_parameters(deck, article)
+    bars = mass_properties(deck)[0] - known["part_mass_kg"]["skin"]
+    assert known["part_mass_kg"]["stringers"] == pytest.approx(bars, rel=1e-6)
+    assert set(known["values"]["E"]) == {"skin", "stringers"}
+
+
+@kratos
+def test_a_case_is_kratos_alone(tmp_path):
+    """The largest change of a frequency is 1 to 6 %."""
+    made = made_of(Order("cantilever", "point-mass", 503, "kratos"), tmp_path)
+    assert made.truth["solver"] == "kratos"
+    before = made.truth["frequency_without_hz"]
+    n = (before < made.bench.fit[1]).sum()
+    moved = np.abs(made.truth["frequency_hz"][:n] / before[:n] - 1).max()
+    assert SHIFT[0] * 0.9 < moved < SHIFT[1] * 1.1
