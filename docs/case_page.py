@@ -129,10 +129,10 @@ not freed by themselves.
 
 `global-stiffness` and `part-stiffness` are E, `global-density` is rho, `thickness-scale` is t,
 `adhesive-stiffness` is E of the solid parts named. `orthotropic-material`, `sensor-mass` and
-`suspension` are freed as they are. They take no sd, low and high. So is `weld-patch`: one factor on
-E of the shells about all welds of solids, and the radius of that patch. An effect whose place is
-unknown is found by `diagnose` and cannot be freed here. Every change is written into the updated
-deck.
+`suspension` are freed as they are. They take no sd, low and high. `weld-patch` takes none either:
+it is one factor on E of the shells about all welds of solids, and the radius of that patch. An
+effect whose place is unknown is found by `diagnose` and cannot be freed here. Every change is
+written into the updated deck.
 """
 
 _FILES = """\

@@ -82,10 +82,10 @@ def test_figures_of_the_page_are_named_for_what_they_are(run_folder):
     d = json.loads((run_folder / "diagnosis.json").read_text())
     for q in (d["fit"], d["fit"]["held_out"]):
         assert q["Q_floor"] < 1e-3 * q["Q_with_effect"] or q["Q_floor"] < 1e-6
-        assert q["Q_with_mesh_error"] is not None
+        assert q["Q_with_nuisances"] is not None
     page = (run_folder / "report.html").read_text()
     assert "floor: the recording&#39;s noise alone" in page
-    assert "that scatter can explain" in page
+    assert "which no deck contains" in page
     assert "noise, repeats" not in page
 
 

@@ -121,7 +121,7 @@ class CaseWords(TypedDict, total=False):
     thickness_units: Annotated[str, Key("model", '"mm-t-s"', COMMANDS, "the deck's", "",
         "The unit system of that file.", choices=tuple(UNITS))]
     thickness_place: Annotated[str, Key("model", '"aligned"', COMMANDS, "as it lies", "",
-        "Place of its sheets: on the deck's, brought onto them first, or brought onto them as a "
+        "How its sheets lie on the deck's: as they are, moved onto them first, or moved as a "
         "mirror image.", choices=PLACES)]
     damping: Annotated[float, Key("model", "0.01", _FRF, "0.01", "of critical",
         "Damping of the model for drawn or scored responses.", least=0.0, most=0.5)]
