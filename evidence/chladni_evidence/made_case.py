@@ -1,7 +1,6 @@
 """One case: a measured article with a hidden effect, a folder for the user and a sealed truth."""
 
 import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -317,11 +316,6 @@ def write_case(case: MadeCase, folder: Path, sealed: Path) -> str:
 def seal_hash(sealed: Path) -> str:
     """SHA-256 of a sealed truth."""
     return hashlib.sha256(sealed.read_bytes()).hexdigest()
-
-
-def opened(sealed: Path) -> dict[str, Any]:
-    """The truth of a case."""
-    return dict(json.loads(sealed.read_text(encoding="utf-8")))
 
 
 def _sensors(case: MadeCase) -> str:
