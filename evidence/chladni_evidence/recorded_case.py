@@ -28,24 +28,16 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class RecordedCase:
-    """Record of a case.
+    """Record of a case."""
 
-    Attributes
-    ----------
-    name : of its folder
-    truth : the hidden effects; empty where unknown
-    table : of all hypotheses, with all numbers that any rule may request
-    verdict, names, one_of : of the decision when it was recorded
-    arrays : of the reduced problem, by name
-    """
-
-    name: str
-    truth: Json
-    table: HypothesisTable
+    name: str  # of its folder
+    truth: Json  # the hidden effects; empty where unknown
+    table: HypothesisTable  # of all hypotheses, with all numbers that any rule may request
+    # verdict, names, one_of: of the decision when it was recorded
     verdict: str
     names: tuple[str, ...]
     one_of: tuple[str, ...]
-    arrays: dict[str, np.ndarray] = field(default_factory=dict)
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)  # of the reduced problem, by name
 
 
 def write_case(case: RecordedCase, path: Path) -> None:

@@ -33,22 +33,15 @@ CLASS = "class"
 
 @dataclass(frozen=True, eq=False)
 class RecordedRow:
-    """One hypothesis at its fit.
+    """One hypothesis at its fit."""
 
-    Attributes
-    ----------
-    deviation : (n_f, n_out, n_in) complex        log10 of model over test
-    slopes : (n_p, n_f, n_out, n_in) complex      by the parameters
-    r0, J0 : residuals and slopes of the information on the parameters besides the data
-    constants : of -2 ln evidence
-    data : of calibration alone, whose state gives the errors of form for all rows
-    """
-
-    deviation: np.ndarray
-    slopes: np.ndarray
+    deviation: np.ndarray  # (n_f, n_out, n_in) complex: log10 of model over test
+    slopes: np.ndarray  # (n_p, n_f, n_out, n_in) complex: by the parameters
+    # r0, J0: residuals and slopes of the information on the parameters besides the data
     r0: np.ndarray
     J0: np.ndarray
-    constants: float
+    constants: float  # of -2 ln evidence
+    # of calibration alone, whose state gives the errors of form for all rows
     data: Responses | None = None
 
     def neg2_log_evidence(self, data: Responses) -> float:

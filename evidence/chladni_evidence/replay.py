@@ -23,40 +23,26 @@ RIGHT = ("right", "part", "among")
 
 @dataclass(frozen=True)
 class Replayed:
-    """Result of one decision on a case.
+    """Result of one decision on a case."""
 
-    Attributes
-    ----------
-    said : the name, or the verdict
-    one_of : names that it cannot distinguish
-    outcome : compared with the truth; "" where that is unknown
-    wanted : the request that was not recorded
-    """
-
-    said: str
-    one_of: tuple[str, ...] = ()
-    outcome: str = ""
-    wanted: str = ""
+    said: str  # the name, or the verdict
+    one_of: tuple[str, ...] = ()  # names that it cannot distinguish
+    outcome: str = ""  # compared with the truth; "" where that is unknown
+    wanted: str = ""  # the request that was not recorded
 
 
 @dataclass(frozen=True)
 class RuleWorth:
-    """Effect of a rule, measured by switching it off.
+    """Effect of a rule, measured by switching it off."""
 
-    Attributes
-    ----------
-    name, why : of the rule
-    changed : cases with another verdict without it
-    saves, spoils : cases that are right only with it, and only without it
-    open : cases where the answer without it needs a fit that was not recorded
-    """
-
+    # name, why: of the rule
     name: str
     why: str
-    changed: tuple[str, ...]
+    changed: tuple[str, ...]  # cases with another verdict without it
+    # saves, spoils: cases that are right only with it, and only without it
     saves: tuple[str, ...]
     spoils: tuple[str, ...]
-    open: tuple[str, ...]
+    open: tuple[str, ...]  # cases where the answer without it needs a fit that was not recorded
 
 
 def replayed(case: RecordedCase, decided: Decide = decide) -> Replayed:
