@@ -99,7 +99,7 @@ class ParameterWords(TypedDict, total=False):
         "The free number, one factor for all its parts; or an effect with a known place.",
         choices=FREEABLE, more=True)]
     sd: Annotated[float, Key("parameter", "0.03", _VARIED,
-        "0.06 (E, rho), 0.05 (t, wall), 0.1 (nu), 0.3 (others)", "of the deck's value",
+        "by material", "of the deck's value",
         "Tolerance: standard deviation of the prior of ln(value / deck's value). `study` uses two "
         "of them where `low` or `high` is missing.", least=0.001, most=2.0)]
     low: Annotated[float, Key("parameter", "0.8", _VARIED, "none", "of the deck's value",
