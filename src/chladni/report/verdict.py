@@ -6,7 +6,8 @@ from pathlib import Path
 
 from ..effects.estimate import Estimate, Location
 from ..inference.calibration_result import ParameterKnowledge
-from ..inference.result import Adequacy, Agreement, LeftPlace, NamedEffect
+from ..inference.result import Adequacy, Agreement, LeftPlace, NamedEffect, NextMeasurement
+from ..search.next_measurement import ODDS
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Drawing, Facts, Items, Links, Picture, Section, Table, Text
 from .calibration_blocks import study_sections
@@ -50,6 +51,7 @@ _FILES = {
     "diagnosis": "the result for other programs",
     "calibration": "what could be known, basins, covariance and profiles for other programs",
     "frf": "test and model as arrays",
+    "outlook": "forecasts of further measurements, for chladni next",
 }
 
 
@@ -117,6 +119,7 @@ def sections(
         Section("Reasons for doubt", [Items(result.distrust)] if result.distrust else []),
         *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
+        Section("Next measurement", _advised(result)),
         Section("At a glance", _glance(result)),
         Section("Findings", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),
@@ -135,6 +138,24 @@ def sections(
         Section("Files", _files(result)),
         Section("Run it again", [Code([command])] if command else []),
     ]
+
+
+def _advised(result: DiagnosisResult) -> list[Block]:
+    """Tabulate the next measurements, where explanations are open."""
+    every = result.next_measurements
+    return [next_measurements(every)] if every else []
+
+
+def next_measurements(every: Sequence[NextMeasurement], odds: float = ODDS) -> Table:
+    """Tabulate the measurements that would separate what the data cannot."""
+    rows = [(m.what, number(m.bits, 2), f"{m.settles:.0%}", f"{m.misleads:.0%}") for m in every]
+    heads = ("measure", "bits", f"settles at {odds:.0f} : 1", "misleads")
+    what = (
+        "Each row counts the rows above it. Bits: information expected about which explanation is "
+        "true. Settles: share of cases in which the true explanation gets these odds; misleads: in "
+        "which a wrong one does."
+    )
+    return Table(heads, rows, ("measure",), what)
 
 
 def _mode(name: str) -> int:

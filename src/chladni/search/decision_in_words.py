@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from ..decision.hypotheses import EffectSet, Hypotheses, Hypothesis
+from ..decision.hypotheses import EffectSet, Explanation, Hypotheses
 from ..decision.reasons import ALONE, Decision, Reason, Step
 from ..effects.registry import family
 from ..ema.odds import evidence_in_words
@@ -42,7 +42,7 @@ def concluded(
     return replace(said, written=order[0].written), order[0].distrust
 
 
-def _of(one: Hypothesis | None) -> Evaluated:
+def _of(one: Explanation | None) -> Evaluated:
     """The fit of a hypothesis, with all tests that were made of it."""
     assert one is not None
     return cast(Evaluated, one.numbers)
@@ -66,7 +66,7 @@ class DecisionWords:
         tested = self.decision.tested
         return None if tested is None else _of(tested).chances.test
 
-    def refusal(self, one: Hypothesis, why: Reason) -> str:
+    def refusal(self, one: Explanation, why: Reason) -> str:
         """Reason why a hypothesis is not named."""
         made = _of(one)
         if why is Reason.TOO_FEW:
@@ -237,7 +237,7 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
 }
 
 
-def _one(step: Step) -> Hypothesis:
+def _one(step: Step) -> Explanation:
     """The hypothesis that a step is about."""
     assert step.of is not None
     return step.of
