@@ -23,6 +23,7 @@ from . import (
     orthotropy,
     sheets,
     springs,
+    stiffener,
     welds,
 )
 from .family import Family
@@ -35,11 +36,13 @@ BUILT_IN = (
     springs.SUPPORT,
     springs.SUSPENSION,
     sheets.THICKNESS,
+    sheets.DOUBLER,
     channels.FAMILY,
     masses.RESONATOR,
     sheets.STIFFNESS,
     sheets.MASS,
     crack.FAMILY,
+    stiffener.FAMILY,
     membrane_prestress.FAMILY,
     welds.MISSING,
     welds.COMPLIANCE,
