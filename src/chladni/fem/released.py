@@ -22,18 +22,11 @@ from .sparse_assembly import congruence
 
 @dataclass(frozen=True, eq=False)
 class Clamp:
-    """Supports of points that elements connect, treated as one rigid body.
+    """Supports of points that elements connect, treated as one rigid body."""
 
-    Attributes
-    ----------
-    grids : (k,) int        ids of the points
-    held : (k, 6) bool      components of each that it holds
-    centre : (3,)           mean of the points [m]
-    """
-
-    grids: np.ndarray
-    held: np.ndarray
-    centre: np.ndarray
+    grids: np.ndarray  # (k,) int: ids of the points
+    held: np.ndarray  # (k, 6) bool: components of each that it holds
+    centre: np.ndarray  # (3,) mean of the points [m]
 
 
 def clamps(assembly: Assembly) -> tuple[Clamp, ...]:
