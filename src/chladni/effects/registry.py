@@ -20,6 +20,7 @@ from . import (
     hems,
     masses,
     membrane_prestress,
+    open_joints,
     orthotropy,
     sheets,
     springs,
@@ -51,6 +52,7 @@ BUILT_IN = (
     contacts.FAMILY,
     welds.TIE,
     compliant_support.FAMILY,
+    open_joints.FAMILY,
     springs.SHAKER,
     adhesive.FAMILY,
 )

@@ -193,8 +193,8 @@ def distinct(lines: Iterator[tuple[int, ...]] | list[tuple[int, ...]]) -> list[t
 def candidates(context: SearchContext) -> list[Candidate]:
     """The lines of grids that explain most, next to the lines of shells that want more bending.
 
-    Scores of lines of shells are linearised. Those of lines of grids are exact; the best of them is
-    moved while it explains more.
+    Scores of lines of shells are linearised, scores of lines of grids are exact. The best line of
+    grids is moved while it explains more.
     """
     where = context.where
     assembly = where.groups.structure.assembly

@@ -1,8 +1,8 @@
 """The mass of an accelerometer that is moved from place to place: each output has its own modes.
 
 A small mass m at output o lowers mode r by Δf/f = -½ m φ_or², with φ of unit modal mass (Rayleigh
-1877, The Theory of Sound, 90). The poles of each output alone show this: in every mode they are the
-lower, the larger the residue of the output. With fixed sensors all outputs have the same poles.
+1877, The Theory of Sound, 90). The poles of each output alone show this. In every mode they are the
+lower, the larger the residue of the output is. Fixed sensors have the same poles at all outputs.
 """
 
 from dataclasses import dataclass
