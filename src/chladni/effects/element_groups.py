@@ -282,7 +282,11 @@ class _Elements(NamedTuple):
 
 
 def _shells(assembly: Assembly) -> _Elements:
-    shells = assembly.shells
+    shells, none = assembly.shells, np.zeros((0, 24, 24))
+    if not len(shells):  # nor perhaps any part
+        return _Elements(
+            none, none, none, shells.nodes, np.zeros((0, 3)), none[:, 0, 0], shells.part
+        )
     geo = shell.geometry(assembly.points, shells)
     arrays = section_arrays(assembly, geo)
     linear, cubic = thickness_split(assembly, geo, arrays)
