@@ -17,7 +17,7 @@ from ..inference.calibration_result import (
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.identifiability import calibration_positions, parameter_names
 from ..inference.likelihood import Responses
-from ..inference.map_fit import Fit, fit, linearised, unknowns
+from ..inference.map_fit import Fit, fit, linearised, posterior, unknowns
 from ..inference.posterior_samples import WALKERS, Chains, sampled
 from ..progress import Progress
 from ..reduced.reduced_model import evaluate
@@ -76,7 +76,7 @@ def posterior_sample(
 
     def log_density(x: np.ndarray) -> float:
         try:
-            return -linearised(model, effects, data, mass, x, False)[0].cost / 2
+            return -posterior(model, effects, data, mass, x).cost / 2
         except ModelError:
             return -np.inf
 
