@@ -212,13 +212,15 @@ def bending_slopes(
     for k in range(0, len(sets), AT_ONCE):
         chunk = sets[k : k + AT_ONCE]
 
-        def bent(z: np.ndarray, forces: np.ndarray, chunk: Sequence[np.ndarray] = chunk) -> None:
+        def bent(
+            z: np.ndarray, forces: np.ndarray, first: int, chunk: Sequence[np.ndarray] = chunk
+        ) -> None:
             for force, shells in zip(forces, chunk, strict=True):
                 V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
                 own = groups.cubic[shells] @ (V @ z[:r]).reshape(len(shells), 24, -1)
                 force[:r] += V.T @ own.reshape(len(V), -1)
 
-        dK, dM = MatrixSlopes(len(chunk), [bent]), MatrixSlopes(len(chunk))
+        dK, dM = MatrixSlopes(len(chunk), [(len(chunk) - 1, bent)]), MatrixSlopes(len(chunk))
         J = data.scaled(replace(still, dK=dK, dM=dM), True)[1]
         rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
