@@ -185,15 +185,6 @@ def posterior(
     return Point(cost(data.error, r, r0), sloped)
 
 
-def linearised(
-    model: Reduced, effects: Sequence[Effect], data: Data,
-    mass_measurement: MassMeasurement | None, x: np.ndarray,
-) -> tuple[Squares, LinearPosterior]:  # fmt: skip
-    """:func:`posterior` with its slopes."""
-    squares, there = posterior(model, effects, data, mass_measurement, x).sloped()
-    return squares, there
-
-
 def fit(
     model: Reduced,
     effects: Sequence[Effect],

@@ -1,8 +1,8 @@
 """Best parameters of an effect alone, while the base follows linearly: before any joint fit.
 
-Residuals of data and priors are r(y) + J d, with y the effect's own parameters and d a change of
-the base parameters, whose slopes J are those at one state of the base.  d is eliminated for every
-y (Golub and Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432), so that only slopes by y are computed.
+Residuals of data and priors are r(y) + J d.  y are the effect's own parameters, d is a change of
+the base parameters, and J are the slopes by these at one state of the base.  d is eliminated for
+every y (Golub and Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432): only slopes by y are computed.
 """
 
 from collections.abc import Iterable, Sequence

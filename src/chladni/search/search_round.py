@@ -96,7 +96,7 @@ def _by_name(tried: Sequence[Candidate]) -> dict[str, list[Candidate]]:
 def _fits(
     problem: UpdatingProblem, null: HypothesisFit
 ) -> Callable[[Sequence[Candidate]], list[HypothesisFit]]:
-    """What fits the candidates of a family roughly.
+    """A function that fits the candidates of a family roughly.
 
     Poles are paired anew by every change: each candidate is fitted from its start. With responses
     each candidate's own parameters are optimised first, and the base is linear about the null or
