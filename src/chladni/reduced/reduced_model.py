@@ -278,6 +278,19 @@ class State:
         lost = self.dissipated
         return replace(self, dK=None, dM=None, dissipated=None if lost is None else lost.held)
 
+    def of_last(self, k: int) -> Self:
+        """The state with its slopes by the last k parameters alone."""
+        assert self.dK is not None
+        assert self.dM is not None
+        first, lost = self.dK.count - k, self.dissipated
+        return replace(
+            self, dK=self.dK.of_last(k), dM=self.dM.of_last(k), dweight=self.dweight[first:],
+            doffset=None if self.doffset is None else self.doffset[:, first:],
+            ddrive=None if self.ddrive is None else self.ddrive[first:],
+            dmoved={p - first: moved for p, moved in self.dmoved.items() if p >= first},
+            dissipated=None if lost is None else lost.of_last(k),
+        )  # fmt: skip
+
 
 def evaluate(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, gradient: bool = True

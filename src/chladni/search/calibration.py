@@ -24,8 +24,7 @@ from ..inference.calibration_result import (
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from ..inference.identifiability import calibration_positions, identifiability, parameter_names
 from ..inference.likelihood import Responses
-from ..inference.linear_model import Squares
-from ..inference.map_fit import Fit, MassMeasurement, descend, fit, linearised, unknowns
+from ..inference.map_fit import Fit, MassMeasurement, Point, descend, fit, posterior, unknowns
 from ..inference.pole_data import Poles
 from ..inference.written_hypothesis import as_written
 from ..parallel import in_parallel
@@ -268,11 +267,11 @@ def _held_cost(null: HypothesisFit, mass: MassMeasurement | None, k: int, z: flo
     sd = np.sqrt(found.covariance[k, k])
     held = found.x[k] + z * sd
 
-    def objective(y: np.ndarray, gradient: bool) -> tuple[Squares, None]:
+    def objective(y: np.ndarray) -> Point:
         x = np.empty(len(rest))
         x[rest], x[k] = y, held
-        squares, _ = linearised(model, found.effects, found.data, mass, x, gradient)
-        return squares.of_some(rest) if gradient else squares, None
+        there = posterior(model, found.effects, found.data, mass, x)
+        return Point(there.cost, lambda: (there.sloped()[0].of_some(rest), None))
 
     start = found.x[rest] + z * found.covariance[rest, k] / sd
     limit = np.array([p.step for p in unknowns(found.effects)])[rest]

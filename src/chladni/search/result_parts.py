@@ -10,9 +10,10 @@ from ..decision.tied import same
 from ..effects.effect import Effect
 from ..effects.estimate import Estimate, Location
 from ..ema.odds import evidence_in_words
-from ..inference.hypothesis_fit import HypothesisFit, LocalOptimum
+from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.joint_fit import JointFit
 from ..inference.likelihood import LN10
+from ..inference.own_optimum import LocalOptimum
 from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation
 from ..inference.result import (
