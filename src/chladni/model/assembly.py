@@ -55,7 +55,11 @@ class Shells:
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Solids of one kind: 8 (hexahedron), 6 (wedge) or 4 (tetrahedron) nodes a row."""
+    """Solids of one kind: hexahedra (8 or 20 nodes), wedges (6, 15), pyramids (5, 13), tetrahedra.
+
+    A row holds the corners, then the nodes on the edges (``EDGES`` of geometry.solid_shapes). An
+    element that lacks one of them repeats the first end of that edge.
+    """
 
     ids: np.ndarray
     nodes: np.ndarray

@@ -18,7 +18,7 @@ from .changes import Change
 
 Split = dict[int, int]  # id of a new property: id of the one it is a copy of
 SHEETS = ("CQUAD4", "CTRIA3")
-SOLIDS = ("CHEXA", "CPENTA", "CTETRA")
+SOLIDS = ("CHEXA", "CPENTA", "CPYRAM", "CPYRA", "CTETRA")
 BEAMS = ("CBAR", "CBEAM", "CROD", "CTUBE")
 PROPERTIES = ("PSHELL", "PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PTUBE")
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ....geometry.solid_shapes import CORNERS
 from ....model.assembly import Assembly, Equation, Scalars, picked
 from ....output import write_text
 from ....units import UNITS, Units
@@ -110,10 +111,14 @@ def _shells(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
 
 
 def _solids(assembly: Assembly, ids: Ids) -> Iterator[Card]:
-    names = {8: "CHEXA", 6: "CPENTA", 4: "CTETRA"}
+    """CHEXA, CPENTA, CPYRAM, CTETRA; a mid-side node that is absent stays blank."""
+    names = {8: "CHEXA", 6: "CPENTA", 5: "CPYRAM", 4: "CTETRA"}
     for block, mine in zip(assembly.solids, ids.solids, strict=True):
-        for k, nodes in enumerate(assembly.ids[block.nodes].tolist()):
-            yield [names[len(nodes)], mine[k], ids.part[block.part[k]], *nodes]
+        corners = CORNERS[block.nodes.shape[1]]
+        for k, rows in enumerate(assembly.ids[block.nodes].tolist()):
+            nodes = rows[:corners]
+            middle = [None if id in nodes else id for id in rows[corners:]]
+            yield [names[corners], mine[k], ids.part[block.part[k]], *nodes, *middle]
 
 
 def _beams(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:

@@ -5,9 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ....geometry.solid_faces import least_warp_cosine
-from ....geometry.solid_shapes import jacobians
-from ....model.assembly import Shells, Solids, concatenated
+from ....model.assembly import Shells, concatenated
 from ....model.properties import ShellSection
 from ..text.table import Cards
 from .context import Context
@@ -205,67 +203,3 @@ def filled_thickness(parts: Parts, shells: Shells) -> None:
         if isinstance(part.section, ShellSection) and np.isnan(part.section.thickness):
             mean = float(shells.thickness[shells.part == k].mean())
             parts.made[k] = part.with_section(thickness=mean)
-
-
-_SOLIDS = {"CHEXA": 8, "CPENTA": 6, "CTETRA": 4}
-
-
-def solids(ctx: Context, parts: Parts) -> tuple[Solids, ...]:
-    """Solids by kind; those with nodes on their edges are refused."""
-    out = []
-    for name, count in _SOLIDS.items():
-        for cards in ctx.deck.present(name):
-            more = [cards.words(k) != b"" for k in range(count + 3, cards.width() + 1)]
-            if more and np.any(many := np.any(more, axis=0)):
-                i = int(np.argmax(many))
-                raise cards.refuse(
-                    i, f"has more than {count} nodes; mid-side nodes are not supported"
-                )
-            nodes = ctx.rows(cards, cards.ids(3, count))
-            _check_solid(ctx, cards, nodes)
-            part = parts.of("solid", cards, cards.integers(2))
-            out.append(Solids(cards.integers(1), nodes, part))
-    return tuple(out)
-
-
-def _check_solid(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
-    """Refuse a node named twice, a body without volume, and det J <= 0 at a point of integration.
-
-    Solvers stop there; a body that is merely distorted is computed, see :func:`warped_solids`.
-    """
-    same = (np.diff(np.sort(nodes, axis=1), axis=1) == 0).any(axis=1)
-    if np.any(same):
-        i = int(np.argmax(same))
-        raise cards.refuse(i, f"a node is named twice, grids {ctx.ids[nodes[i]].tolist()}")
-    X = ctx.places[nodes]
-    dV = jacobians(X)
-    size = np.abs(dV).max(axis=1)
-    if np.any(bad := ~(size > _NO_VOLUME * np.ptp(X, axis=1).max(axis=1) ** 3)):
-        i = int(np.argmax(bad))
-        raise cards.refuse(i, f"its volume is zero; grids {ctx.ids[nodes[i]].tolist()}")
-    least = (dV * np.sign(dV.sum(axis=1))[:, None]).min(axis=1)
-    if np.any(bad := ~(least > _NO_VOLUME * size)):
-        i = int(np.argmax(bad))
-        raise cards.refuse(
-            i,
-            "it turns inside out: det J vanishes or changes its sign from one point of integration "
-            f"to another; check the order and place of grids {ctx.ids[nodes[i]].tolist()}",
-        )
-
-
-_NO_VOLUME = 1e-12  # det J over the cube of the size, or over the largest det J: rounding
-_WARPED = 0.707  # HEX_WARP of Nastran's GEOMCHECK, 45 degrees
-
-
-def warped_solids(ctx: Context) -> Iterator[str]:
-    """Solids with a face warped by more than 45 degrees, one sentence a kind of card."""
-    for name in ("CHEXA", "CPENTA"):
-        for cards in ctx.deck.present(name):
-            X = ctx.places[ctx.rows(cards, cards.ids(3, _SOLIDS[name]))]
-            if len(found := np.flatnonzero(least_warp_cosine(X) < _WARPED)):
-                i, more = int(found[0]), len(found) - 1
-                others = f" and {more} others have" if more else " has"
-                yield (
-                    f"{cards.where(i)}: {name} {cards.integers(1)[i]}{others} a face warped by "
-                    "more than 45 degrees; check the order of the grids"
-                )

@@ -77,7 +77,6 @@ REFUSED: Final = _by_name({  # {card: what of the structure it stands for}
     "shells with mid-side nodes": "CQUAD8 CTRIA6 CQUAD",
     "shear panels": "CSHEAR",
     "curved beams": "CBEND CBEAM3",
-    "pyramids": "CPYRAM",
     "axisymmetric structure":
     "CTRIAX CTRIAX6 CQUADX CQUADX4 CQUADX8 CTRAX3 CTRAX6 CCONEAX AXIC RINGAX FORCEAX AXIF AXSLOT",
     "spot welds, fasteners and seams": "CWELD CFAST CSEAM CBUTT CFILLET CSPOT",
