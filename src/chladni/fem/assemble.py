@@ -162,8 +162,10 @@ Matrices = tuple[sp.csr_array, sp.csr_array | None, sp.csr_array, sp.csr_array |
 def _each_family(assembly: Assembly, residual_bending: bool) -> Iterator[Matrices]:
     """(M, V, K, loss) of each family that has members."""
     n = len(assembly.points)
-    if len(assembly.shells):
-        yield _shells(assembly, residual_bending)
+    for which in (~assembly.shells.curved, assembly.shells.curved):
+        if which.any():
+            some = assembly.shells if which.all() else picked(assembly.shells, which)
+            yield _shells(replace(assembly, shells=some), residual_bending)
     for group in assembly.solids:
         if len(group):
             yield _solids(replace(assembly, solids=(group,)))

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import ModelError, named
-from ..geometry.solid_shapes import CORNERS, FAMILIES, SolidFamily, jacobians, with_middles
+from ..geometry.solid_shapes import CORNERS, FAMILIES, ShapeFamily, jacobians, with_middles
 from ..model.assembly import Assembly, Solids
 from ..model.properties import Isotropic, SolidSection
 
@@ -206,7 +206,7 @@ def _shear_part(J0: np.ndarray, C: np.ndarray) -> np.ndarray:
 
 
 def _compatible(
-    family: SolidFamily, X: np.ndarray, xi: np.ndarray
+    family: ShapeFamily, X: np.ndarray, xi: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """B (m, 6, 3k) and det J (m,) at a point."""
     J = family.gradients(xi) @ X

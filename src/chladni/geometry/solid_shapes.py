@@ -8,7 +8,7 @@ J. Num. Meth. Eng. 35 (1992) 95-108 (rational functions of the pyramid); Andelfi
 Num. Meth. Eng. 36 (1993) 1311-1337 (the 21 internal strains of the hexahedron).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -43,8 +43,8 @@ Rule = tuple[np.ndarray, np.ndarray]  # points (g, 3) and weights (g,)
 
 
 @dataclass(frozen=True, eq=False)
-class SolidFamily:
-    """One kind of solid: monomials ξ^a η^b ζ^c / (1 - ζ)^d, nodes and quadrature."""
+class ShapeFamily:
+    """One kind of element: monomials ξ^a η^b ζ^c / (1 - ζ)^d, nodes and quadrature."""
 
     powers: np.ndarray  # (k, 4) a, b, c, d
     nodes: np.ndarray  # (k, 3)
@@ -135,10 +135,13 @@ def _along(plane: Rule, n: int) -> Rule:
     return points, np.outer(w, plane[1]).ravel()
 
 
-def _cube(n: int) -> Rule:
+def _square(n: int) -> Rule:
     a, w = np.polynomial.legendre.leggauss(n)
-    square = np.array(list(product(a, repeat=2))), np.outer(w, w).ravel()
-    return _along(square, n)
+    return np.array(list(product(a, repeat=2))), np.outer(w, w).ravel()
+
+
+def _cube(n: int) -> Rule:
+    return _along(_square(n), n)
 
 
 def _tetra(n: int) -> Rule:
@@ -193,12 +196,12 @@ def _family(
     mass_rule: Rule,
     enhanced: Callable[[np.ndarray], np.ndarray] | None = None,
     shear_rule: Rule | None = None,
-) -> tuple[int, SolidFamily]:
+) -> tuple[int, ShapeFamily]:
     """(number of nodes, family); with a node on each edge where there are monomials enough."""
     middles = corners[np.array(EDGES[len(corners)])].mean(axis=1)
     nodes = np.vstack([corners, middles])[: len(powers)]
     centre = corners.mean(axis=0)
-    return len(nodes), SolidFamily(powers, nodes, rule, mass_rule, centre, enhanced, shear_rule)
+    return len(nodes), ShapeFamily(powers, nodes, rule, mass_rule, centre, enhanced, shear_rule)
 
 
 FAMILIES = dict(
@@ -215,18 +218,37 @@ FAMILIES = dict(
 )
 
 
-def with_middles(X: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+_SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+_FACE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+
+
+def _surface(corners: np.ndarray, powers: np.ndarray, plane: Rule) -> ShapeFamily:
+    """A face with a node on each edge, ζ = 0."""
+    nodes = np.vstack([corners, (corners + np.roll(corners, -1, axis=0)) / 2])
+    rule = np.column_stack([plane[0], np.zeros(len(plane[0]))]), plane[1]
+    return ShapeFamily(powers, nodes, rule, rule, corners.mean(axis=0))
+
+
+SURFACES = {  # of shells with nodes on their edges
+    8: _surface(_SQUARE, _powers(2, lambda a, b, c: c == 0 and a // 2 + b // 2 < 2), _square(3)),
+    6: _surface(_FACE, _powers(2, lambda a, b, c: c == 0 and a + b < 3), _radon()),
+}
+
+
+def with_middles(
+    X: np.ndarray, edges: Sequence[tuple[int, int]] | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
     """Places (m, k, 3) and motions T (m, k, k) of all nodes, those of straight edges between ends.
 
     A mid-side node that an element lacks repeats the first end of its edge. Its motion u = T u is
     the mean of the ends', which takes its quadratic term out of the shape functions. None: no
-    element lacks one.
+    element lacks one. ``edges`` are those of a shell.
     """
     m, k, _ = X.shape
-    n = CORNERS[k]
+    n = CORNERS[k] if edges is None else k - len(edges)
     if k == n:
         return X, None
-    first, second = np.array(EDGES[n]).T
+    first, second = np.array(EDGES[n] if edges is None else edges).T
     of, edge = np.nonzero((X[:, n:] == X[:, first]).all(axis=2))
     if not len(of):
         return X, None

@@ -35,6 +35,7 @@ class Shells:
     thickness : (n, 4)        at the corners [m]
     axis : (n, 3)             direction whose projection is material axis 1
     offset : (n,)             of the mid-surface along the element normal [m]
+    middle : (n, 4) int       rows of the nodes on the edges, from corner 1 to 2 on; -1: none
     """
 
     ids: np.ndarray = field(default_factory=_no_rows)
@@ -43,9 +44,19 @@ class Shells:
     thickness: np.ndarray = field(default_factory=lambda: _none(4))
     axis: np.ndarray = field(default_factory=lambda: _none(3))
     offset: np.ndarray = field(default_factory=_none)
+    middle: np.ndarray = field(default_factory=lambda: _no_rows(4))
+
+    def __post_init__(self) -> None:
+        if len(self.middle) != len(self.nodes):
+            object.__setattr__(self, "middle", np.full(np.shape(self.nodes), -1))
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    @property
+    def curved(self) -> np.ndarray:
+        """(n,) bool, True where the shell has nodes on its edges."""
+        return np.asarray((self.middle >= 0).any(axis=1))
 
     @property
     def triangle(self) -> np.ndarray:

@@ -1,12 +1,16 @@
 """Nodes on the edges of elements: their order on the card, and those that are left out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from chladni.fem import solid
 from chladni.fem.assemble import structure
 from chladni.io.nastran import SetField, assembly, read_deck, write_assembly, write_deck
+from chladni.io.nastran.edit.model_changes import changes
 from chladni.io.vtu import write_vtu
+from chladni.units import UNITS
 
 # edges as the Quick Reference Guide draws them: of the bottom, upright, of the top
 CORNERS = {
@@ -97,3 +101,39 @@ def test_a_mesh_of_vtk_has_their_corners(bulk, tmp_path, name):
     mesh = pv.read(write_vtu(tmp_path / "one.vtu", made))
     assert mesh.n_cells == 1
     assert abs(mesh.compute_cell_sizes()["Volume"][0]) == pytest.approx(VOLUME[name])
+
+
+SHELLS = (
+    "GRID,1,,0.,0.,0.\nGRID,2,,2.,0.,0.\nGRID,3,,2.,2.,0.\nGRID,4,,0.,2.,0.\nGRID,5,,1.,0.,.1\n"
+    "GRID,6,,2.,1.,0.\nGRID,7,,1.,2.,.1\nGRID,9,,4.,1.,0.\nGRID,10,,3.,.5,0.\n"
+    "CQUAD8,11,7,1,2,3,4,5,6,7,,.2,.3,,.4,30.,.05,0\nCTRIA6,12,7,2,9,3,10,,6,30.,-.05,.2,,.3,0\n"
+    "PSHELL,7,5,.1,5,,5\nMAT1,5,2.1+5,,.3,7.85-9\n"
+)
+
+
+def test_fields_of_shells_with_nodes_on_edges(bulk, tmp_path):
+    """Nodes, corner thickness, angle and offset stand where the guide puts them, and come back."""
+    made = assembly(bulk(SHELLS))
+    s = made.shells
+    assert made.ids[s.nodes].tolist() == [[1, 2, 3, 4], [2, 9, 3, 3]]
+    middle = np.where(s.middle < 0, 0, made.ids[s.middle])
+    assert middle.tolist() == [[5, 6, 7, 0], [10, 0, 6, 0]]
+    assert s.thickness.tolist() == [[0.2, 0.3, 0.1, 0.4], [0.2, 0.1, 0.3, 0.3]]
+    assert s.offset.tolist() == [0.05, -0.05]
+    assert s.axis[0] == pytest.approx([np.cos(np.pi / 6), 0.5, 0])
+    assert s.curved.all()
+    again = assembly(read_deck(write_assembly(made, tmp_path / "fresh.bdf"))).shells
+    for name, column in vars(s).items():
+        np.testing.assert_allclose(getattr(again, name), column, atol=1e-9, err_msg=name)
+
+
+def test_thickness_of_shells_with_nodes_on_edges_is_changed_in_their_cards(bulk, tmp_path):
+    """Corner thicknesses that a change gives stand in T1 to T4 of CQUAD8 and CTRIA6."""
+    deck = bulk(SHELLS)
+    before = assembly(deck, "SI")
+    t = before.shells.thickness * np.array([[0.9, 1, 1, 0.8], [0.7, 1, 1, 1]])
+    after = replace(before, shells=replace(before.shells, thickness=t))
+    path = write_deck(deck, tmp_path / "new.bdf", changes(deck, before, after, UNITS["SI"]))
+    found = assembly(read_deck(path), "SI").shells
+    np.testing.assert_allclose(found.thickness, t, rtol=1e-6)
+    assert found.middle.tolist() == before.shells.middle.tolist()

@@ -17,7 +17,7 @@ from ..text.table import Cards
 from .changes import Change
 
 Split = dict[int, int]  # id of a new property: id of the one it is a copy of
-SHEETS = ("CQUAD4", "CTRIA3")
+SHEETS = ("CQUAD4", "CTRIA3", "CQUADR", "CTRIAR", "CQUAD8", "CTRIA6")
 SOLIDS = ("CHEXA", "CPENTA", "CPYRAM", "CPYRA", "CTETRA")
 BEAMS = ("CBAR", "CBEAM", "CROD", "CTUBE")
 PROPERTIES = ("PSHELL", "PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PTUBE")

@@ -16,14 +16,13 @@ from .connected import refuse_loose
 from .context import Context, context, parameter, real_parameter
 from .rigid_elements import ties
 from .sections import Parts
-from .shell_elements import filled_thickness, shells
+from .shell_elements import SHEETS, filled_thickness, shells
 from .solid_elements import SOLIDS, solids
 from .supports import selected, supports
 
-_STIFF = """CQUAD4 CQUADR CQUAD1 CQUAD2 CTRIA3 CTRIAR CTRIA1 CTRIA2 CBAR CBEAM CROD CTUBE CONROD
-    CELAS1 CELAS2 CELAS3 CELAS4 CBUSH""".split()
+_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH".split()
 _ELEMENTS = (  # those of one kind have no id in common
-    (*_STIFF, *SOLIDS),
+    (*SHEETS, *SOLIDS, *_STIFF),
     "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),
     "CMASS1 CMASS2 CMASS3 CMASS4".split(),
     ["CONM1", "CONM2"],

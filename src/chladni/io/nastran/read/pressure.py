@@ -9,7 +9,7 @@ from ..text.table import Cards
 from .context import Context, id_list
 from .solid_elements import SOLIDS
 
-_SHELLS = {"CQUAD4": 4, "CQUADR": 4, "CTRIA3": 3, "CTRIAR": 3}
+_SHELLS = {"CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4, "CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3}
 _CORNERS = {**_SHELLS, **SOLIDS}  # which alone carry a pressure, also where edges have nodes
 
 Nodal = tuple[int, np.ndarray, np.ndarray]  # load set, rows (k,), forces (k, 3) [N]

@@ -8,6 +8,8 @@ _NAMES: Final = {
     "CQUADR": "EID PID G1 G2 G3 G4 THETA ZOFFS - TFLAG T1 T2 T3 T4",
     "CTRIA3": "EID PID G1 G2 G3 THETA ZOFFS - - TFLAG T1 T2 T3",
     "CTRIAR": "EID PID G1 G2 G3 THETA ZOFFS - - TFLAG T1 T2 T3",
+    "CQUAD8": "EID PID G1 G2 G3 G4 G5 G6 G7 G8 T1 T2 T3 T4 THETA ZOFFS TFLAG",
+    "CTRIA6": "EID PID G1 G2 G3 G4 G5 G6 THETA ZOFFS T1 T2 T3 TFLAG",
     "PSHELL": "PID MID1 T MID2 12I/T3 MID3 TS/T NSM Z1 Z2 MID4",
     "PCOMP": "PID Z0 NSM SB FT TREF GE LAM MID1 T1 THETA1 SOUT1",
     "PCOMPG": "PID Z0 NSM SB FT TREF GE LAM GPLYID1 MID1 T1 THETA1 SOUT1",
@@ -104,6 +106,8 @@ _NAMES: Final = {
 }
 
 FIELDS: Final = {name: tuple(text.split()) for name, text in _NAMES.items()}
+
+SHELL_CARDS: Final = ("CQUAD4", "CTRIA3", "CQUAD8", "CTRIA6")  # 1: triangle, 2: nodes on edges
 
 # Cards of the public-domain COSMIC release, read as their present-day kin.
 LEGACY: Final = frozenset(

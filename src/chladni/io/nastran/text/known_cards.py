@@ -74,7 +74,7 @@ SELECTED: Final = _by_name({  # {card: meaning}; harmless where no command of th
     "the mass of a fluid": "MFLUID MLIST",
 })  # fmt: skip
 REFUSED: Final = _by_name({  # {card: what of the structure it stands for}
-    "shells with mid-side nodes": "CQUAD8 CTRIA6 CQUAD",
+    "quadrilaterals of plane strain": "CQUAD",
     "shear panels": "CSHEAR",
     "curved beams": "CBEND CBEAM3",
     "axisymmetric structure":
