@@ -63,7 +63,7 @@ def test_the_result_is_read_back(run_folder, diagnosed):
 
 
 def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_path):
-    """Deck, interval, change; of E, rho and t only E t³ and ρ t are known, so that E is frozen."""
+    """Deck, interval, change; the density of steel is known before the test: it is frozen."""
     result = write_diagnosis(tmp_path, case, calibrated)
     assert {c.where: c.deck_value for c in result.calibrated}
     page = (tmp_path / "report.html").read_text()
@@ -72,7 +72,7 @@ def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_
     t = next(c for c in result.calibrated if c.estimate.name == "t")
     assert t.deck_value == pytest.approx(1e-3)
     assert "210 GPa" in page
-    assert "frozen (186.7 GPa to 236.2 GPa by its prior)" in page
+    assert "frozen (7773 kg/m³ to 7927 kg/m³ by its prior)" in page
     for title in ("Identifiability", "Basins of the fit", "Uncertainty of the values"):
         assert f"<h2>{title}</h2>" in page
     assert t.estimate.low < t.estimate.value < t.estimate.high

@@ -16,6 +16,7 @@ class NamedEffect:
     where : its place
     parameters : its numbers, as they were found
     gain : increase of -2 ln evidence without this one, all others fitted again
+    written : its numbers in the updated deck, which is a fit without nuisances
     """
 
     name: str
@@ -24,6 +25,7 @@ class NamedEffect:
     where: Location = field(default_factory=Location)
     parameters: tuple[Estimate, ...] = ()
     gain: float | None = None
+    written: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

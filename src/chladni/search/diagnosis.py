@@ -11,12 +11,14 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import cast
 
 import numpy as np
 
-from ..decision.decide import RULES, called
-from ..decision.decision_rules import gain_due
-from ..decision.hypothesis_table import NULL, HypothesisTable, Row, Wanted
+from ..decision.decide import called
+from ..decision.decision_rules import RULES, gain_due
+from ..decision.hypotheses import Hypotheses, Numbers
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
@@ -32,7 +34,7 @@ from ..inference.hypothesis_fit import (
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_test_along_effect
 from ..inference.pole_data import Poles
-from ..inference.rows_of_fits import row_of, row_of_null
+from ..inference.rows_of_fits import hypothesis_of
 from ..inference.written_hypothesis import as_written
 from ..progress import within
 from ..reduced.reduced_model import evaluate
@@ -44,6 +46,47 @@ from .several import PAIRED, Several, several
 SHIFTS = np.arange(-14, 15) / 20  # of ln E: 2.5 % of frequency apart
 
 Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class FitChances:
+    """The test of fit of a hypothesis, with p of it and of damping that follows what it changes.
+
+    p is NaN where there is no test, and where damping is no less likely than the rest.
+    """
+
+    test: FitTest | None
+    p: float
+    p_damping: float
+
+
+@dataclass(eq=False)
+class Tested:
+    """A fitted hypothesis with its test of fit, which is made when it is read.
+
+    Attributes
+    ----------
+    known : its test, where it was made before
+    """
+
+    problem: UpdatingProblem
+    fit: HypothesisFit
+    known: FitChances | None = None
+
+    @cached_property
+    def chances(self) -> FitChances:
+        """The test of fit."""
+        return self.known or fit_test(self.problem, self.fit)
+
+    @property
+    def p(self) -> float:
+        """P of the test of fit; NaN: no test."""
+        return self.chances.p
+
+    @property
+    def p_damping(self) -> float:
+        """P of modal damping that follows an elastic change; NaN: no test."""
+        return self.chances.p_damping
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +101,7 @@ class Diagnosis:
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     sets : several effects together, each of which pays, in the order in which the sets grew
-    table : all of them as the decision reads them
-    tests : of the rows that were held against what they predict themselves
+    chances : of the tests of fit that were made, by name
     written : the named effect in the form of a deck
     adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, and what would settle it
@@ -76,8 +118,7 @@ class Diagnosis:
     verdict: str = ""
     notes: tuple[str, ...] = ()
     sets: tuple[Several, ...] = ()
-    table: HypothesisTable = field(default_factory=lambda: HypothesisTable({}))
-    tests: Mapping[str, FitTest] = field(default_factory=dict)
+    chances: Mapping[str, FitChances] = field(default_factory=dict)
     written: HypothesisFit | None = None
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
@@ -91,12 +132,6 @@ class Diagnosis:
         """The named effect, if any."""
         named = self.verdict in ("missing physics", "measurement fault")
         return self.hypotheses[0] if named and self.hypotheses else None
-
-    @property
-    def without_effects(self) -> "Diagnosis":
-        """What calibration alone finds."""
-        table = replace(self.table, singles=(), sets=())
-        return replace(self, hypotheses=(), sets=(), table=table)
 
     @property
     def as_deck(self) -> HypothesisFit | None:
@@ -157,22 +192,34 @@ def could_not_be_evaluated(found: Proposals, hypotheses: Sequence[HypothesisFit]
             yield f"the hypothesis {name} could not be evaluated: {why}"
 
 
+def hypotheses_of(
+    problem: UpdatingProblem, found: Diagnosis, numbers: Callable[[HypothesisFit, bool], Numbers]
+) -> Hypotheses:
+    """All single effects as a decision reads them.
+
+    Parameters
+    ----------
+    numbers : of a fit, and whether it is behind the leader
+    """
+    singles = tuple(hypothesis_of(t, numbers(t, k > 0)) for k, t in enumerate(found.hypotheses))
+    return Hypotheses(
+        hypothesis_of(found.null, numbers(found.null, False)), singles,
+        nominal=found.nominal.neg2_log_evidence, poles=isinstance(found.null.data, Poles),
+        families=len(problem.families),
+    )  # fmt: skip
+
+
 def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
     """The diagnosis by what was fitted alone: the leader, or calibration, is named and tested."""
-    table = HypothesisTable(
-        {NULL: row_of_null(found.null), **{t.effect.name: row_of(t) for t in found.hypotheses}},
-        tuple(t.effect.name for t in found.hypotheses),
-        nominal=found.nominal.neg2_log_evidence,
-        poles=isinstance(found.null.data, Poles),
-        families=len(problem.families),
-    )
-    tests = dict(found.tests)
-    while isinstance(said := called(table), Wanted):
-        tested = found.null if said.key == NULL else found.hypotheses[0]
-        chances = fit_test(problem, tested)
-        table = table.having(chances.of(table.rows[said.key]))
-        tests |= {said.key: chances.test} if chances.test else {}
-    return replace(found, verdict=said.verdict, table=table, tests=tests)
+    every: list[Tested] = []
+
+    def numbers(fit: HypothesisFit, _: bool) -> Numbers:
+        every.append(Tested(problem, fit, found.chances.get(fit.name)))
+        return cast(Numbers, every[-1])  # the test of fit is all that is read
+
+    said = called(hypotheses_of(problem, found, numbers))
+    made = {t.fit.name: t.chances for t in every if "chances" in vars(t)}
+    return replace(found, verdict=said.verdict, chances={**found.chances, **made})
 
 
 def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
@@ -196,22 +243,6 @@ def _with_sets_of_effects(
     search = several(problem, alone.hypotheses, due, unfit, progress)
     notes = (*alone.notes, search.note) if search.note else alone.notes
     return replace(alone, sets=search.sets, notes=notes)
-
-
-@dataclass(frozen=True)
-class FitChances:
-    """The test of fit of a hypothesis, with p of it and of damping that follows what it changes.
-
-    p is NaN where there is no test, and where damping is no less likely than the rest.
-    """
-
-    test: FitTest | None
-    p: float
-    p_damping: float
-
-    def of(self, row: Row) -> Row:
-        """A row with these."""
-        return replace(row, p=self.p, p_damping=self.p_damping)
 
 
 def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:

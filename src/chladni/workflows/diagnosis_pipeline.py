@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..case import Case
-from ..decision.decide import RULES
-from ..decision.decision_rules import odds_of_something_else
+from ..decision.decision_rules import RULES, odds_of_something_else
 from ..dynamics.frf import FRF
 from ..ema.finding import Finding, Screening
 from ..errors import FileError, LabelError, ModelError
@@ -28,7 +27,6 @@ from ..inference.likelihood import Responses
 from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
 from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
-from ..inference.written_hypothesis import as_written
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -203,15 +201,13 @@ def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
-    decision, known = decided(prepared, made.found, made.refine)
-    found, distrust = concluded(prepared, made.found, decision, known)
-    null = made.refine(found.null)
-    if null.hypothesis is not found.null:
-        plain = as_written(null.hypothesis, prepared.problem.mass_measurement)
-        found = replace(found, plain=plain)
+    case, decision = decided(prepared, made.found, made.refine)
+    found, distrust = concluded(prepared, made.found, case, decision)
+    plain = refined(made.question, prepared, found.plain, written=True)
+    found = replace(found, plain=plain.hypothesis)
     if found.found is not None:
         return found, distrust
-    return replace(found, notes=(*found.notes, null.note)), null.distrust
+    return replace(found, notes=(*found.notes, plain.note)), (*plain.distrust, *distrust)
 
 
 def _updated(

@@ -95,7 +95,7 @@ _NONE = np.zeros(0, np.int64)
 
 
 def _weld(ctx: Context, cards: Cards, i: int, made: Assembly) -> Ends:
-    """CWELD: EWID PWID GS TYPE GA GB, then patches as the type has them."""
+    """CWELD of a PWELD: EID PID GS TYPE GA GB, then patches as the type has them."""
     kind, at, given = cards.word(i, 4), cards.integer(i, 3, 0), _given(ctx, cards, i, 5)
     if kind == "ALIGN":
         if min(given) < 0:
