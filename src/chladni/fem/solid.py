@@ -131,8 +131,9 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     stiffness in some direction (G = 0), they follow as if it had ``LEAST`` of its trace.
     Hexahedra and wedges with mid-side nodes have no internal strains. Their energy of shear is
     integrated by 2 x 2 x 2 and 3 x 2 points, the rest by 3 x 3 x 3 and 7 x 3 (reduced shear, PSOLID
-    of the MSC Nastran Quick Reference Guide); plain integrates all by the latter. Tetrahedra have 4
-    points, pyramids the Gauss points of their collapsed hexahedron.
+    of the MSC Nastran Quick Reference Guide); plain integrates all by the latter. Tetrahedra have 5
+    points, with which MSC Nastran's displacements of two curved ones come out to the printed
+    digits. Pyramids have the Gauss points of their collapsed hexahedron.
     """
     modes = np.broadcast_to(np.asarray(modes), len(X))
     K = np.empty((len(X), 3 * X.shape[1], 3 * X.shape[1]))

@@ -178,6 +178,10 @@ _FOUR = (5 + 3 * np.sqrt(5)) / 20 * np.eye(4)[:, 1:] + (5 - np.sqrt(5)) / 20 * (
     1 - np.eye(4)[:, 1:]
 )
 _TETRA_4 = _FOUR, np.full(4, 1 / 24)
+_TETRA_5 = (  # exact to degree 3, as curved edges need; it is Nastran's
+    np.vstack([np.full(3, 1 / 4), 1 / 6 + np.vstack([np.zeros(3), np.eye(3)]) / 3]),
+    np.array([-2 / 15, *[3 / 40] * 4]),
+)
 _TETRA_1 = np.full((1, 3), 0.25), np.array([1 / 6])
 _TRILINEAR = _powers(1, lambda a, b, c: True)
 _SERENDIPITY = _powers(2, lambda a, b, c: a // 2 + b // 2 + c // 2 < 2)
@@ -211,7 +215,7 @@ FAMILIES = dict(
         _family(_PRISM, _BILINEAR, _PRISM_6, _PRISM_6, _wedge_enhanced),
         _family(_PRISM, _BIQUADRATIC, _PRISM_21, _PRISM_21, None, _PRISM_6),
         _family(_TETRA, _LINEAR, _TETRA_1, _TETRA_4),
-        _family(_TETRA, _QUADRATIC, _TETRA_4, _tetra(3)),
+        _family(_TETRA, _QUADRATIC, _TETRA_5, _tetra(3)),
         _family(_PYRAMID, _RATIONAL_5, _pyramid(2), _pyramid(2)),
         _family(_PYRAMID, _RATIONAL_13, _pyramid(3), _pyramid(3)),
     )
