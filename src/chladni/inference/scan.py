@@ -204,7 +204,7 @@ def bending_slopes(
 ) -> np.ndarray:
     """∂r/∂a of a·B added to K, with B the bending stiffness of each set of shells (n, n_sets)."""
     groups, r = model.groups, model.vectors.shape[1]
-    dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), 24)
+    dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), -1)
     # stiffness changes no load of a base, and no shapes except those of the modes
     lost = None if base.state.dissipated is None else base.state.dissipated.held
     still = replace(base.state, doffset=None, ddrive=None, dmoved={}, dissipated=lost)
@@ -217,7 +217,7 @@ def bending_slopes(
         ) -> None:
             for force, shells in zip(forces, chunk, strict=True):
                 V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
-                own = groups.cubic[shells] @ (V @ z[:r]).reshape(len(shells), 24, -1)
+                own = groups.cubic[shells] @ (V @ z[:r]).reshape(len(shells), dofs.shape[1], -1)
                 force[:r] += V.T @ own.reshape(len(V), -1)
 
         dK, dM = MatrixSlopes(len(chunk), [(len(chunk) - 1, bent)]), MatrixSlopes(len(chunk))
