@@ -7,6 +7,7 @@ A rule returns the number that it measured, in words, or raises
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -37,18 +38,12 @@ SYSTEM = UNITS["mm-t-s"]
 
 @dataclass(frozen=True, eq=False)
 class TriedFamily:
-    """A family on a structure, with its candidates.
-
-    Attributes
-    ----------
-    candidates : of a search with FRFs
-    acting : each of them, off every symmetry near its start
-    """
+    """A family on a structure, with its candidates."""
 
     family: Family
     ground: EffectGround
-    candidates: Sequence[Candidate]
-    acting: Sequence[ActingEffect]
+    candidates: Sequence[Candidate]  # of a search with FRFs
+    acting: Sequence[ActingEffect]  # each of them, off every symmetry near its start
 
 
 def tried(family: Family, ground: EffectGround) -> TriedFamily:
@@ -326,7 +321,12 @@ def _change(kind: str, at: slice, before: Article, after: Article) -> str:
 
 def frequencies(made: Assembly, at: slice) -> np.ndarray:
     """Natural frequencies of a structure at some positions [Hz]."""
-    return normal_modes(structure(made).system, at.stop).frequency[at]
+    return _lowest(made, at.stop)[at]
+
+
+@lru_cache(maxsize=4)  # rules ask for those of the deck and of the article again and again
+def _lowest(made: Assembly, count: int) -> np.ndarray:
+    return normal_modes(structure(made).system, count).frequency
 
 
 def touched_cards(before: Path, after: Path) -> set[str]:

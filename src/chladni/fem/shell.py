@@ -35,18 +35,12 @@ Rows = np.ndarray | slice
 
 @dataclass(frozen=True, eq=False)
 class Strains:
-    """Generalised strains (ε κ γ ω-rz) of m shells of one shape at g points, from nodal motions.
+    """Generalised strains (ε κ γ ω-rz) of m shells of one shape at g points, from nodal motions."""
 
-    Attributes
-    ----------
-    B : (m, g, 9, 24)     ε [-], κ [1/m], γ [-], ω - rz [-] (see damped) in the element frame
-    weight : (m, g)       dA [m²]
-    N : (g, 4)            shape functions, for values given at corners
-    """
-
+    # (m, g, 9, 24) ε [-], κ [1/m], γ [-], ω - rz [-] (see damped) in the element frame
     B: np.ndarray
-    weight: np.ndarray
-    N: np.ndarray
+    weight: np.ndarray  # (m, g) dA [m²]
+    N: np.ndarray  # (g, 4) shape functions, for values given at corners
 
 
 def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
@@ -218,16 +212,6 @@ def mass_by_thickness(
         rotary = areal * (t[rows] @ N.T) ** 2 / 4 * coupled
         M[rows] = _mass(part, N, areal, rotary, coupled)
     return M
-
-
-def areal_mass(geo: ShellGeometry, t: np.ndarray, rho: np.ndarray, nsm: np.ndarray) -> np.ndarray:
-    """m_k = ∫ (ρt + nsm) N_k dA (m, 4) [kg], the share of each corner."""
-    share = np.zeros((len(geo), 4))
-    for rows in _chunks(geo):
-        weight, N = _quadrature(geo[rows])
-        areal = rho[rows, None] * (t[rows] @ N.T) + nsm[rows, None]
-        share[rows] = (areal * weight) @ N
-    return share
 
 
 def turned(Q: np.ndarray, turn: np.ndarray) -> np.ndarray:

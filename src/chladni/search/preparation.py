@@ -23,6 +23,7 @@ from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
 from ..ema.level_words import level_notes
 from ..ema.recording_noise import equalised_noise, sample_noise
+from ..ema.recording_screening import strong_modes
 from ..ema.response_variance import noise_source
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -32,11 +33,13 @@ from ..inference.damping_scatter import modal_damping
 from ..inference.hypothesis_fit import UpdatingProblem
 from ..inference.least_data import numbers, too_little
 from ..inference.likelihood import Responses, rms_over_lines
+from ..inference.map_fit import APART, unknowns
 from ..inference.pole_data import Poles
 from ..inference.sensor_errors import sensor_errors
 from ..model.free_parameter import FreeParameter
 from ..progress import Progress, silent, within
 from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
+from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
 from .held_out_data import HeldOutChoice, held_out_sensors, of_poles, upper_part
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
@@ -44,6 +47,7 @@ from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .question import Prepared, Question
 from .silent_dofs import refuse_silent
+from .suspension_range import suspended_below, suspension_note
 
 ZETA = 0.08  # equalised damping for comparing hypotheses: it widens the basins of convergence
 ZETA_Q = 0.02  # equalised damping for the reported Q
@@ -106,6 +110,9 @@ def _by_responses(
     progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
+    above = suspended_below(question, nominal, strong_modes(found).frequency, fit_max)
+    question = replace(question, exclude=(*question.exclude, (0.0, above)))
+    lines, low = [f[f > above] for f in lines], max(low, above)
     refuse_silent(nominal, question.outputs, question.inputs)
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
@@ -158,7 +165,7 @@ def _by_responses(
     if unseen.choosing.any():
         notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
     notes.append(_sensor_note(question))
-    notes += _mass_note(question)
+    notes += [*_mass_note(question, problem), *suspension_note(above)]
     known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
     setup = replace(problem.setup, damping=known)
     problem = replace(problem, damping=known, coupling=coupling, setup=setup)
@@ -172,7 +179,7 @@ def _by_responses(
     size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
         problem, data[1], held, unseen, what, tuple(notes), nominal, floor, found,
-        too_little(*size), numbers(*size), others=tuple(others), levels=studied,
+        too_little(*size), numbers(*size), others=tuple(others), levels=studied, above=above,
     )  # fmt: skip
 
 
@@ -206,6 +213,8 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     f_max = float(frequency[-1]) * 1.15
     highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
     nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))
+    above = suspended_below(question, nominal, frequency, float(frequency[-1]))
+    frequency, sd, strength = (v[frequency > above] for v in (frequency, sd, strength))
     if question.frf is not None:
         refuse_silent(nominal, question.outputs, question.inputs)
     built, mesh = nominal.structure, mesh_hidden(nominal, f_max) if fitted else []
@@ -219,6 +228,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     rows_o = question.outputs.around(built) if len(question.outputs.labels) else None
     rows_i = question.driven_around(built) if len(question.inputs.labels) else None
     band = question.band if question.frf is None else band_of(question, question.frf)
+    band = max(band[0], above), band[1]
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
         spurious=SPURIOUS_LISTED if question.frf is None else share_spurious(strength),
@@ -228,7 +238,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     left_out = of_poles(held)
     n = int(left_out.reporting.sum())
     what = f"{n} of {len(held)} frequencies" if n else "nothing"
-    notes = (*notes, *_unscored(question), *_mass_note(question))
+    notes = (*notes, *_unscored(question), *_mass_note(question, problem), *suspension_note(above))
     few = too_little(len(frequency), 0), numbers(len(frequency), 0)
     return Prepared(
         problem, data, left_out, left_out, what, notes, nominal, None, found, *few, ~held
@@ -344,8 +354,33 @@ NOT_WEIGHED = (
 )
 
 
-def _mass_note(question: Question) -> list[str]:
-    if question.mass_measurement is None:
-        return [NOT_WEIGHED]
+ANOTHER_MASS = "check that the article is the one of the deck, without trim and sensors"
+
+
+def _mass_note(question: Question, problem: UpdatingProblem) -> list[str]:
     w = question.mass_measurement
-    return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is fitted with the other data"]
+    if w is None:
+        return [NOT_WEIGHED]
+    said = f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is fitted with the other data"
+    off = off_the_scales(problem)
+    return [said, f"{off}: {ANOTHER_MASS}"] if off else [said]
+
+
+def off_the_scales(problem: UpdatingProblem) -> str:
+    """Sentence where deck and weighed mass differ by more than both allow; "" elsewhere.
+
+    The deck's mass has the variance Σ (∂m/∂x_k σ_k)² of the calibration parameters.
+    """
+    weighed = problem.mass_measurement
+    if weighed is None:
+        return ""
+    state = evaluate(problem.reduced.model, problem.base, problem.mean())
+    sd = np.array([p.sd for p in unknowns(problem.base)])
+    known = float(np.linalg.norm(state.dweight * sd))
+    off = weighed.mass - state.weight
+    if abs(off) <= APART * np.hypot(known, weighed.sd):
+        return ""
+    return (
+        f"the article weighs {abs(off):.2g} kg {'more' if off > 0 else 'less'} than the deck, "
+        f"whose densities and thicknesses allow {APART * known:.2g} kg"
+    )
