@@ -54,10 +54,19 @@ def _with_doubt(case: JudgedTable, decision: Decision) -> Decision:
     return replace(decision, one_of=one_of, steps=steps(decision, step))
 
 
+def _physical(table: HypothesisTable) -> tuple[CalibratedDeck, ...]:
+    """The numbers of the null: as found, unless natural frequencies are compared, and as fitted.
+
+    A deck on its own mesh must have the frequencies itself, so its numbers are always fitted.
+    """
+    fitted = (CalibratedDeck.WRITTEN,)
+    return fitted if table.poles else (CalibratedDeck.FOUND, *fitted)
+
+
 def _best_deck(table: HypothesisTable) -> CalibratedDeck | None:
     """The calibration that fits best as it is written, where the given deck leaves the scales."""
     plain = () if table.implausible else (CalibratedDeck.PLAIN,)
-    tried = (CalibratedDeck.FOUND, CalibratedDeck.WRITTEN, *plain)
+    tried = (*_physical(table), *plain)
     Q = {deck: table.deck(deck)[-1] for deck in tried if table.deck(deck)}
     return min(Q, key=Q.__getitem__, default=None)
 
@@ -87,7 +96,7 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
     def worse(deck: CalibratedDeck) -> list[bool]:
         return [q > b for q, b in zip(table.deck(deck), before, strict=True)]
 
-    physical = CalibratedDeck.FOUND, CalibratedDeck.WRITTEN
+    physical = _physical(table)
     plain = () if table.implausible else (CalibratedDeck.PLAIN,)
     for deck in physical:
         if table.deck(deck) and not any(worse(deck)):  # no Q is no worse

@@ -9,10 +9,11 @@ from ..effects.effect import Effect
 from ..effects.joint_stiffness import calibrated_family
 from ..effects.model_errors import MeshError
 from ..reduced.reduced_model import evaluate
-from .hypothesis_fit import HypothesisFit
+from .hypothesis_fit import HypothesisFit, fitted
 from .implausible_values import is_strained
-from .likelihood import Responses
+from .likelihood import Data, Responses
 from .map_fit import MassMeasurement, fit
+from .pole_data import Poles
 
 HELD = 1e-4  # sd of a parameter that a fit must not move
 LEFT = 0.1  # sd of a deck's error [decades]: less moves numbers to their priors' ends for little
@@ -30,7 +31,9 @@ def as_written(
     """
     effects, start, (effect, *others) = _kept(hypothesis)
     model = hypothesis.model
-    found = fit(model, effects, hypothesis.data, mass_measurement, start).kept()
+    data = hypothesis.data
+    made = fitted if isinstance(data, Poles) else fit  # their spread is that of the deck
+    found = made(model, effects, data, mass_measurement, start).kept()
     return HypothesisFit(effect, found, model, tuple(others))
 
 
@@ -82,11 +85,21 @@ def of_mesh(effects: Sequence[Effect]) -> np.ndarray:
     return np.concatenate([np.zeros(0, bool), *each])
 
 
+def in_deck(effect: Effect, data: Data) -> bool:
+    """True for what the fit of a deck keeps: parameters, and the mesh error of responses.
+
+    Natural frequencies are compared with the deck as it is written, on its own mesh.
+    """
+    return effect.traits.writable and not (
+        isinstance(data, Poles) and isinstance(effect, MeshError)
+    )
+
+
 def _kept(hypothesis: HypothesisFit) -> tuple[list[Effect], np.ndarray, tuple[Effect, ...]]:
     """Effects that a deck can hold, their values, and the named effects, held at theirs."""
     found = hypothesis.fit
     held = {id(e): _held(e, found.of(e)) if e.parameters else e for e in hypothesis.effects}
-    kept = [e for e in found.effects if e.traits.writable]
+    kept = [e for e in found.effects if in_deck(e, found.data)]
     x = np.concatenate([np.zeros(0), *(found.of(e) for e in kept)])
     return [held.get(id(e), e) for e in kept], x, tuple(held.values())
 

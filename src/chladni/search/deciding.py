@@ -32,7 +32,7 @@ from ..inference.map_fit import fit
 from ..inference.pole_data import Poles
 from ..inference.rows_of_fits import row_of
 from ..inference.written_hypothesis import as_found, as_written, of_mesh
-from ..reduced.reduced_model import evaluate
+from ..reduced.reduced_model import Reduced, evaluate
 from .basis_refinement import Refinement
 from .diagnosis import Diagnosis, fit_test
 from .question import Prepared
@@ -208,12 +208,13 @@ def _calibrated(
 ) -> Measured:
     """Q of a calibration on the fitted data, with the mesh error and without it, as in a deck."""
     null, problem = found.null, prepared.problem
-    data = prepared.score.rebased(null.model)
 
-    def Q(effects: Sequence[Effect], x: np.ndarray) -> tuple[float, ...]:
+    def Q(model: Reduced, effects: Sequence[Effect], x: np.ndarray) -> tuple[float, ...]:
+        data = prepared.score.rebased(model)
         try:
             idle = np.where(of_mesh(effects), 0.0, x)
-            each = [evaluate(null.model, effects, at, False) for at in (x, idle)]
+            ways = (idle,) if isinstance(data, Poles) else (x, idle)
+            each = [evaluate(model, effects, at, False) for at in ways]
         except ModelError:  # no physical structure: this calibration is no candidate
             return (np.inf, np.inf)
         return tuple(data.Q(state, data.use) for state in each)
@@ -222,13 +223,13 @@ def _calibrated(
         x = given(problem, null)
         off = not found.hypotheses and _leaves_the_scales(problem, null, x)
         known = replace(known, table=replace(known.table, off_the_scales=off))
-        return known.with_Q(deck, Q(problem.base, x))
+        return known.with_Q(deck, Q(null.model, problem.base, x))
     try:
         made = numbers(prepared, found, known, deck)
     except ModelError:  # without scatter its numbers belong to no physical structure
         return known.with_Q(deck, ())
     known = replace(known, decks={**known.decks, deck: made})
-    return known.with_Q(deck, Q(made.fit.effects, made.fit.x))
+    return known.with_Q(deck, Q(made.model, made.fit.effects, made.fit.x))
 
 
 def _leaves_the_scales(problem: UpdatingProblem, null: HypothesisFit, x: np.ndarray) -> bool:
@@ -249,11 +250,12 @@ def numbers(
         return known.decks[deck]
     if deck is CalibratedDeck.FOUND:
         return as_found(found.null)
+    plain = found.plain
+    fits_itself = deck is CalibratedDeck.WRITTEN and isinstance(plain.data, Poles)
+    if deck is CalibratedDeck.PLAIN or fits_itself:
+        return plain
     if deck is CalibratedDeck.WRITTEN:
         return as_written(found.null, mass)
-    plain = found.plain
-    if deck is CalibratedDeck.PLAIN:
-        return plain
     x = [
         np.array([p.nominal for p in e.parameters]) if e.kind == "calibration" else plain.fit.of(e)
         for e in plain.fit.effects

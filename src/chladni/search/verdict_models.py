@@ -54,10 +54,13 @@ def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
 
 @dataclass(frozen=True, eq=False)
 class FittedScores:
-    """Q of the fits: all include mesh error and an unknown gain, the last also scatter."""
+    """Q of the fits: all include mesh error and an unknown gain, the last also scatter.
 
-    calibrated: float
-    effect: float
+    The deck of natural frequencies is fitted without a mesh error: it has only the last.
+    """
+
+    calibrated: float | None
+    effect: float | None
     scatter: float
 
 
@@ -65,7 +68,10 @@ def fitted_scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[FittedScore
     """Q on the fitted data and on the held-out data."""
     winner = diagnosis.found or diagnosis.null
     stages, reported = _states(prepared.problem, diagnosis, winner), prepared.held.reporting
-    first, second = (FittedScores(*Q) for Q in scores_of(prepared, winner, stages, reported))
+    both = [FittedScores(*Q) for Q in scores_of(prepared, winner, stages, reported)]
+    if isinstance(prepared.score, Poles):
+        both = [replace(Q, calibrated=None, effect=None) for Q in both]
+    first, second = both
     return first, second
 
 
