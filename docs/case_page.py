@@ -98,6 +98,19 @@ Each section below ends with an example of every word; no case needs them all.
 """
 
 _TAIL = """\
+Without `sd` the class of the material decides, recognised from the deck's E and rho:
+
+| material | E | rho | t | wall |
+|---|---|---|---|---|
+| steel (185 to 220 GPa, 7600 to 8100 kg/m³) | 0.03 | 0.005 | 0.04 | 0.05 |
+| aluminium alloys (65 to 76 GPa, 2600 to 2900 kg/m³) | 0.03 | 0.005 | 0.04 | 0.05 |
+| others, solids, and bars that have no wall | 0.06 | 0.06 | 0.05 | 0.05 |
+
+It is 0.1 for nu, 0.2 for nu12 and 0.3 for all else. Sources: JCSS (2001), Probabilistic Model Code,
+parts 2.1 and 3.2; ASM (1990), Metals Handbook; EN 10131 and EN 485-4, whose limits count as two
+standard deviations. A sheet with paint or sealant on it weighs more than its steel: give rho an
+`sd` that covers it.
+
 Without any `[[parameter]]` these are free: E of every part of shells and beams, t of shells, the
 wall of tubes, and rho of every material. In a deck with neither shells nor beams E and rho of every
 material of solids are free. Bars between two spiders hold sheets together: they are joints, and are
@@ -116,10 +129,10 @@ not freed by themselves.
 
 `global-stiffness` and `part-stiffness` are E, `global-density` is rho, `thickness-scale` is t,
 `adhesive-stiffness` is E of the solid parts named. `orthotropic-material`, `sensor-mass` and
-`suspension` are freed as they are. They take no sd, low and high. So is `weld-patch`: one factor on
-E of the shells about all welds of solids, and the radius of that patch. An effect whose place is
-unknown is found by `diagnose` and cannot be freed here. Every change is written into the updated
-deck.
+`suspension` are freed as they are. They take no sd, low and high. `weld-patch` takes none either:
+it is one factor on E of the shells about all welds of solids, and the radius of that patch. An
+effect whose place is unknown is found by `diagnose` and cannot be freed here. Every change is
+written into the updated deck.
 """
 
 _FILES = """\

@@ -599,7 +599,7 @@ def decision_rules() -> str:
     from chladni.decision.decision_rules import DecisionRules
 
     rows = [
-        (f"`{f.name}`", f"`{f.default}`", f"`{f.metadata['off']}`", f.metadata["why"])
+        (f"`{f.name}`", f"`{f.default}`", f.metadata["why"])
         for f in dataclasses.fields(DecisionRules)
     ]
     return "\n".join(
@@ -608,7 +608,7 @@ def decision_rules() -> str:
             BY.format("`chladni.decision.decision_rules`"),
             "Gains are in -2 ln evidence. *Due* is the gain that a name needs. "
             "[Decision](../theory/decision.md) explains the road.\n",
-            table(("rule", "value", "switched off", "purpose"), rows),
+            table(("rule", "value", "purpose"), rows),
         ]
     )
 

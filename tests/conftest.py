@@ -1,6 +1,7 @@
 """What all tests share: the recordings beside the checkout, counted work in place of seconds."""
 
 import gc
+import os
 import sys
 from pathlib import Path
 
@@ -16,6 +17,8 @@ settings.load_profile("unhurried")
 def shared(tmp_path_factory) -> Path:
     """The folder of what all processes of this run share."""
     RUN[:] = [folder_of_run(tmp_path_factory)]
+    if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):  # its children compile the modules once
+        os.environ["PYTHONPYCACHEPREFIX"] = str(RUN[0] / "bytecode")
     return RUN[0]
 
 

@@ -19,10 +19,7 @@ from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
 from .interval_evidence import interval_evidence
-from .record import record
-from .recorded_case import read_case
 from .recovery import recovery
-from .replay import case_lines, likelihood_lines, narrower, rule_lines
 from .screening_evidence import TIMES
 from .screening_faults import FAULTS, tally
 from .thesis import SIZE, regenerate
@@ -83,23 +80,6 @@ def _thesis(options: argparse.Namespace) -> int:
     return 0
 
 
-def _recorded(options: argparse.Namespace) -> int:
-    """Diagnose cases once, and keep the rows of their decisions."""
-    record(options.case, options.out, _say)
-    return 0
-
-
-def _replayed(options: argparse.Namespace) -> int:
-    """Decide recorded cases again, with all rules and without each of them."""
-    cases = [read_case(path) for path in options.file]
-    lines = [*case_lines(cases), "", *rule_lines(cases)]
-    if options.noise != 1.0 or options.floor is not None:
-        lines = likelihood_lines(cases, narrower(options.noise, options.floor))
-    for text in lines:
-        _say(text)
-    return 0
-
-
 def _recovered(asked: argparse.Namespace) -> int:
     """Calibrate articles of known values; print the coverage of the intervals."""
     asked.out.mkdir(parents=True, exist_ok=True)
@@ -115,7 +95,6 @@ def _covered(options: argparse.Namespace) -> int:
 
 COMMANDS = {
     "run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
-    "record": _recorded, "replay": _replayed,
     "recovery": _recovered, "intervals": _covered,
 }  # fmt: skip
 
@@ -163,15 +142,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     covered.add_argument("--seeds", required=True, help="first and last, as 600-607")
     covered.add_argument("--out", type=Path, required=True)
-    kept = commands.add_parser(
-        "record", help="diagnose cases once, and keep the data of their decisions"
-    )
-    kept.add_argument("case", type=Path, nargs="+", help="a case folder")
-    kept.add_argument("--out", type=Path, required=True, help="a folder for one file a case")
-    again = commands.add_parser("replay", help="decide recorded cases again, and without each rule")
-    again.add_argument("--noise", type=float, default=1.0, help="times the noise of the responses")
-    again.add_argument("--floor", type=float, help="unexplained standard deviation [decades]")
-    again.add_argument("file", type=Path, nargs="+", help="files written by record")
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

@@ -1,5 +1,6 @@
-"""Modes of an article at selected points, by our elements or by CalculiX."""
+"""Modes of an article at selected points, by our elements, by CalculiX or by Kratos."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
@@ -11,13 +12,14 @@ from chladni.arrays import fingerprint
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.modes import rigid_modes
 from chladni.dynamics.reduction import attachments, orthonormal, shifted
-from chladni.fem.assemble import Structure, structure
+from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly
 from chladni.output import write_npz
 
 from .calculix import calculix_modes
+from .kratos import kratos_modes
 
-Solver = Literal["chladni", "calculix"]
+Solver = Literal["chladni", "calculix", "kratos"]
 ABOVE = 1.6  # our modes reach up to this many times the highest recorded frequency
 BY_CALCULIX = 70  # number of modes that CalculiX computes
 _KEPT = "rigid at 0 Hz"  # form of the cached modes; change the text with the form
@@ -62,25 +64,29 @@ def article_modes(
     rows : points whose motion is needed
     loaded : points that forces act on: our modes are exact for static loads there
     f_max : highest frequency recorded [Hz]
-    residual_bending : of our shells; False is another formulation
+    residual_bending : of our shells; False is another formulation, and triangles of Kratos
     """
     rows = np.unique(np.concatenate([rows.ravel(), loaded.ravel()]))
-    ours = _kept((assembly, rows, loaded, f_max, residual_bending), cache)
+    job = (assembly, rows, loaded, f_max, residual_bending)
+    if solver == "kratos":
+        return _kept(job, cache, _by_kratos)
+    ours = _kept(job, cache, _by_us)
     if solver == "chladni":
         return ours
     return _completed(*calculix_modes(assembly, BY_CALCULIX, rows, cache), ours, f_max)
 
 
-def _kept(
-    job: tuple[Assembly, np.ndarray, np.ndarray, float, bool], cache: Path | None
-) -> ArticleModes:
-    """Modes by our elements, from the cache if it holds them."""
-    kept = None if cache is None else cache / f"{fingerprint((job, _KEPT))}.npz"
+Job = tuple[Assembly, np.ndarray, np.ndarray, float, bool]
+
+
+def _kept(job: Job, cache: Path | None, solve: Callable[..., ArticleModes]) -> ArticleModes:
+    """Modes, from the cache if it holds them."""
+    mark = _KEPT if solve is _by_us else f"{_KEPT}, {solve.__name__}"
+    kept = None if cache is None else cache / f"{fingerprint((job, mark))}.npz"
     if kept is not None and kept.exists():
         with np.load(kept, allow_pickle=False) as held:
             return ArticleModes(*(held[f.name] for f in fields(ArticleModes)))
-    assembly, rows, loaded, f_max, bending = job
-    found = _ours(structure(assembly, residual_bending=bending), rows, loaded, f_max)
+    found = solve(*job)
     if kept is not None:
         write_npz(kept, **{f.name: getattr(found, f.name) for f in fields(ArticleModes)})
     return found
@@ -100,8 +106,19 @@ def _completed(
     return ArticleModes(f, ours.rows, both, np.zeros((len(f), len(f))))
 
 
-def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, f_max: float) -> ArticleModes:
+def _by_kratos(
+    assembly: Assembly, rows: np.ndarray, loaded: np.ndarray, f_max: float, quads: bool
+) -> ArticleModes:
+    """Modes and static responses by Kratos' elements alone."""
+    f, shapes = kratos_modes(assembly, rows, loaded, ABOVE * f_max, not quads)
+    return ArticleModes(f, rows, shapes, np.zeros((len(f), len(f))))
+
+
+def _by_us(
+    assembly: Assembly, rows: np.ndarray, loaded: np.ndarray, f_max: float, bending: bool
+) -> ArticleModes:
     """Normal modes and static responses to forces at the loaded points, by Rayleigh and Ritz."""
+    built = structure(assembly, residual_bending=bending)
     system = built.system
     modes = normal_modes(system, band=ABOVE * f_max)
     translations = (6 * np.unique(loaded)[:, None] + np.arange(3)).ravel()

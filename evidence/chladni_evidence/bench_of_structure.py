@@ -18,6 +18,8 @@ from chladni_bench import TABLE_3, stage_lines
 from chladni_planning import PlanSettings, even_lines, plan_test
 from chladni_specimens import FORMS, TailgateDesign, folded_panel, holed_plate, plate, tailgate
 
+from .kratos_structures import ARTICLES, DECKS
+from .kratos_structures import FINER as FINER_BY_KRATOS
 from .mesh_transfer import Spots
 
 ZETA = 0.007  # median damping ratio of an article
@@ -113,23 +115,32 @@ class Bench:
 
 def form_bench(name: str, seed: int) -> Bench:
     """Bench of a form, by seed: 8 to 30 sensors, a band of 10 to 15 elastic modes and four more."""
-    form = FORMS[name]
+    meshes: dict[str, Callable[[], Assembly]]
+    if name in FORMS:
+        form = FORMS[name]
+        meshes = {k: partial(form.made, seed, finer) for k, finer in FINER.items()}
+    else:
+        form = DECKS[name]
+        meshes = {"kratos": partial(ARTICLES[name].made, seed, FINER_BY_KRATOS)}
     deck, rng = form.made(seed), np.random.default_rng([seed, 2, *name.encode()])
     built = structure(deck)
-    modes = normal_modes(built.system, 27)
-    f = modes.frequency[6:]
+    held = deck.ids[deck.supports[:, 0]]
+    rigid = 0 if len(held) else 6
+    modes = normal_modes(built.system, 21 + rigid)
+    f = modes.frequency[rigid:]
     n = int(rng.integers(10, 16))
     ends = (0.75 * f[0], (f[n - 1] + f[n]) / 2, (f[n + 3] + f[n + 4]) / 2)
-    moving = (built.T @ modes.shapes[:, 6 : 6 + n]).reshape(len(deck.points), 6, -1)[:, :3]
+    moving = (built.T @ modes.shapes[:, rigid : rigid + n]).reshape(len(deck.points), 6, -1)[:, :3]
     every = glue_candidates(deck)
+    every = every.only(np.flatnonzero(~np.isin(every.grids, held)))
     spots = every.only(_spread(every, int(rng.integers(8, 31)), rng))
     return Bench(
         name=name,
         deck=deck,
-        meshes={k: partial(form.made, seed, finer) for k, finer in FINER.items()},
+        meshes=meshes,
         outputs=spots,
         drive=every.only(_driven(deck, every, moving, rng)),
-        hangers=_hung(every),
+        hangers=() if len(held) else _hung(every),
         lines=even_lines(0.6 * f[0], 1.03 * ends[2], ZETA, 3.0),
         fit=(float(ends[0]), float(ends[1])),
         held=(float(ends[1]), float(ends[2])),

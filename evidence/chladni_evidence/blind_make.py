@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,12 @@ from chladni.errors import FileError, LabelError
 from chladni.output import locked, make_folder, own_version, write_json, write_text
 from chladni.own_folder import own_folder
 from chladni.parallel import one_blas_thread
+from chladni_bench import scattered_parts
 
 from .blind_folder import BlindFolder, Seals, hash_of, hash_of_case, published, read_json
 from .evidence_sets import MEANT, Order, Purpose, purpose
+from .interval_evidence import of_prior
+from .kratos_structures import TOLERANCE
 from .leash import leash_to_parent
 from .made_case import MadeCase, made_case, write_case
 
@@ -121,10 +125,12 @@ def _made(name: str, order: Order, place: BlindFolder) -> bool:
 
 def made_of(order: Order, cache: Path | None = None) -> MadeCase:
     """The case of an order, made on one thread so that it is the same on every machine."""
+    draw = partial(of_prior, spread=TOLERANCE) if order.mesh == "kratos" else scattered_parts
     with one_blas_thread():
         return made_case(
-            order.bench(), order.kind, order.seed, order.mesh, cache, order.recorder, order.times
-        )
+            order.bench(), order.kind, order.seed, order.mesh, cache, order.recorder, order.times,
+            draw,
+        )  # fmt: skip
 
 
 def _why_not(place: BlindFolder, name: str) -> Path:

@@ -22,7 +22,18 @@ from .made_case import KINDS, UNSIZED
 from .package_kinds import package_kinds
 from .pair_kinds import HEMS, PAIRS
 
-SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints", "pairs", "hems", "clamps")
+SETS = (
+    "tailgate",
+    "panels",
+    "forms",
+    "frames",
+    "outside",
+    "joints",
+    "pairs",
+    "hems",
+    "clamps",
+    "kratos",
+)
 Purpose = Literal["tune", "report"]
 PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
 REPORTING = 600  # seeds below tune scales and code; seeds from here on report
@@ -48,6 +59,24 @@ JOINED = {  # structures of the set joints, by the hidden effect
     "hem-contact": ("tailgate",),
     "hem-stretch": ("tailgate",),
     "viscoelastic-joint": ("bonded plates",),
+}
+FREE = ("half cylinder", "stringer plate", "cut-out plate", "covered trough")
+IN_CLAMPS = ("held plate", "cantilever", "curved blade")
+HIDDEN_IN = {  # structures of the set kratos, by the hidden effect
+    "point-mass": FREE + IN_CLAMPS,
+    "extra-support": IN_CLAMPS + FREE,
+    "sensor-mass": ("held plate", "half cylinder", "cantilever", "cut-out plate"),
+    "suspension": FREE,
+    "thickness-distribution": ("cut-out plate", "curved blade", "half cylinder", "held plate"),
+    "doubler": ("cantilever", "half cylinder", "stringer plate", "curved blade"),
+    "stiffness-patch": ("half cylinder", "cantilever", "cut-out plate", "covered trough"),
+    "mass-patch": ("stringer plate", "held plate", "covered trough", "curved blade"),
+    "seam": ("cut-out plate", "curved blade", "half cylinder", "cantilever"),
+    "rib": ("stringer plate", "cut-out plate", "half cylinder", "held plate"),
+    "soft-clamp": IN_CLAMPS,
+    "weld-missing": ("covered trough",),
+    "stretched-sheet": ("held plate",),
+    "shaker-restraint": ("cut-out plate", "half cylinder", "cantilever"),
 }
 IN_CLAMP = ("nothing", "compliant-support", "shaker-restraint", "extra-support", "point-mass")
 
@@ -87,6 +116,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     hems: a tailgate whose hem cannot slide, all round or along a stretch, with a thinner sheet and
     sensors with mass; our mesh.
     clamps: nothing, a compliant clamp and similar effects, on a plate in a clamp; our mesh.
+    kratos: structures unlike our specimens, by Kratos: six nulls and every kind of ``HIDDEN_IN``.
     """
     made = {
         "tailgate": _tailgate,
@@ -98,6 +128,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
         "pairs": _pairs,
         "hems": _hems,
         "clamps": _clamps,
+        "kratos": _kratos,
     }
     if name not in made:
         raise LabelError(f"no set {name!r}; there are {', '.join(SETS)}")
@@ -125,7 +156,7 @@ def chosen(
     """
     whole = orders(name, seeds)
     hidden = tuple(dict.fromkeys([*KINDS, *(o.kind for o in whole)]))
-    every = ("tailgate", *SPECIMENS, *CLAMPED, *FORMS)
+    every = ("tailgate", *SPECIMENS, *CLAMPED, *FORMS, *FREE, *IN_CLAMPS)
     for what, chosen_words, known in (("kind", kinds, hidden), ("structure", structures, every)):
         for word in chosen_words:
             if word not in known:
@@ -191,6 +222,15 @@ def _hems(seed: int) -> Iterator[Order]:
 def _clamps(seed: int) -> Iterator[Order]:
     for structure in CLAMPED:
         yield from (Order(structure, kind, seed, "fine") for kind in IN_CLAMP)
+
+
+def _kratos(seed: int) -> Iterator[Order]:
+    every = FREE + IN_CLAMPS
+    for k in range(6):
+        kind = "nothing" if k < 4 else "calibration"
+        yield Order(every[(seed + k) % len(every)], kind, seed, "kratos")
+    for kind, homes in HIDDEN_IN.items():
+        yield Order(homes[seed % len(homes)], kind, seed, "kratos")
 
 
 def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:

@@ -106,13 +106,13 @@ def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     shear = float(np.exp(rng.uniform(-0.15, 0.15) * min(size, 2.0)))
     parts = list(a.parts)
     for p in rolled:
-        m = _sheet(a, p)
+        m = sheet_of(a, p)
         G = m.shear_modulus * shear
         E1, E2 = m.E * np.exp(ratio / 2), m.E * np.exp(-ratio / 2)
         Gz, nu12 = m.shear_modulus, m.nu * np.sqrt(E1 / E2)
         orthotropic = Orthotropic(E1, E2, nu12, G, Gz, Gz, m.rho)
         parts[p] = parts[p].with_section(membrane=orthotropic, bending=orthotropic)
-    first = _sheet(a, rolled[0])
+    first = sheet_of(a, rolled[0])
     truth = {
         "E1": first.E * np.exp(ratio / 2),
         "E2": first.E * np.exp(-ratio / 2),
@@ -126,7 +126,8 @@ def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     return Hidden(replace(a.with_parts(tuple(parts)), shells=shells), truth)
 
 
-def _sheet(a: Assembly, p: int) -> Isotropic:
+def sheet_of(a: Assembly, p: int) -> Isotropic:
+    """Isotropic material of a part that is a sheet."""
     section = a.parts[p].section
     assert isinstance(section, ShellSection)
     assert isinstance(section.membrane, Isotropic)
@@ -165,7 +166,7 @@ def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden
 
 def stiffness_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A disc of a sheet with E times e^-(0.5 to 0.8) and unchanged mass."""
-    mine, truth = _disc(site, rng)
+    mine, truth = disc(site, rng)
     factor = float(np.exp(-rng.uniform(0.5, 0.8) * min(size, 2.5)))
     article = _with_disc(site.article, mine, "E", factor)
     return Hidden(article, {**truth, "value": factor})
@@ -173,14 +174,14 @@ def stiffness_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden
 
 def mass_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """An added mass of 2 to 4 %, spread evenly over a disc of a sheet."""
-    mine, truth = _disc(site, rng)
+    mine, truth = disc(site, rng)
     a, m = site.article, float(rng.uniform(0.02, 0.04)) * site.mass * size
     area, rho = cell_areas(a.points, a.shells.nodes), value(a.parts[a.part(truth["part"])], "rho")
     bare = rho * float((area * a.thickness())[mine].sum())
     return Hidden(_with_disc(a, mine, "rho", 1 + m / bare), {**truth, "value": m})
 
 
-def _disc(site: Site, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, Any]]:
+def disc(site: Site, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, Any]]:
     """Shells (m,) bool of one part round a point of it, ``FEWEST`` at least, and the place."""
     a, part = site.article, site.part(rng)
     of_part = a.shells.part == a.part(part)

@@ -8,7 +8,7 @@ too often.
 """
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from itertools import product
 from pathlib import Path
@@ -69,14 +69,21 @@ class CalibratedArticle:
     residual: float = float("nan")  # rms over the median of what right models leave
 
 
-def of_prior(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
-    """An article with E and t of every sheet and rho of its material from the priors; factors."""
+def of_prior(
+    assembly: Assembly, rng: np.random.Generator, spread: Mapping[str, float] = SPREAD
+) -> tuple[Assembly, Scales]:
+    """An article with E and t of every sheet and rho of its material drawn; the factors.
+
+    Parameters
+    ----------
+    spread : standard deviations of ln E, rho and t; those of the priors unless given
+    """
     scales: Scales = {}
     rho: dict[int, float] = {}
     for k, part in enumerate(assembly.parts):
         if thickness_of(part) != "t":
             continue
-        drawn = {q: float(np.exp(SPREAD[q] * rng.normal())) for q in ("E", "rho", "t")}
+        drawn = {q: float(np.exp(spread[q] * rng.normal())) for q in ("E", "rho", "t")}
         drawn["rho"] = rho.setdefault(getattr(material_of(part), "id", 0), drawn["rho"])
         scales[part.name] = drawn
         for quantity, factor in drawn.items():

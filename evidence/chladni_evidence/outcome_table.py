@@ -76,6 +76,10 @@ def _names(rows: Sequence[Row]) -> Iterator[str]:
     right = _right(known)
     family = _of([r["kin"] for r in known])
     yield f"right name: {len(right)}/{len(known)}; right family: {family}"
+    count = Counter(r["outcome"] for r in known)
+    yield "effects of the catalogue: " + ", ".join(f"{count[o]} {o}" for o in OUTCOMES)
+    better = [r["gain_share"] > 0 for r in rows if r["gain_share"] is not None]
+    yield f"decks with an effect better than the calibrated one on held-out data: {_of(better)}"
     placed = [r["near"] for r in right if r["near"] is not None]
     yield f"right place, of the right names that have one: {_of(placed)}"
     nulls = [r for r in rows if r["effect"] in NULLS]

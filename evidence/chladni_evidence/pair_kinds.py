@@ -28,7 +28,11 @@ HEMS = (
     "hem-stretch + thickness-distribution + sensor-mass",
 )
 # kinds that are a form of an effect of the catalogue
-CALLED = {"hem-stretch": "hem-contact", "weld-run": "weld-missing"}
+CALLED = {
+    "hem-stretch": "hem-contact", "weld-run": "weld-missing", "seam": "crack",
+    "doubler": "thickness-distribution", "soft-clamp": "compliant-support",
+    "stretched-sheet": "membrane-prestress",
+}  # fmt: skip
 
 HIDDEN = {**CATALOGUED, **JOINTS}
 Sized = Callable[[str, list[int]], tuple[Hidden, float, float]]

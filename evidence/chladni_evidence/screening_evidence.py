@@ -4,7 +4,6 @@ Noise is 0.5 to 3 % of every line, damping 0.2 to 3 %. Each structure has anothe
 mesh, and the model is the deck as given. Seeds below 600 tune, seeds from 600 on report.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -62,9 +61,6 @@ class Sound:
     def accelerance(self, phi_out: np.ndarray) -> np.ndarray:
         """Accelerance of the article at places of other shapes (k, r)."""
         return accelerance(self.modes, phi_out, self.phi_in, self.zeta, self.frf.frequency)
-
-
-Fault = Callable[[Sound, np.random.Generator], tuple[FRF, tuple[str, ...]]]
 
 
 def sound(structure: str, seed: int, long: bool = False) -> Sound:

@@ -25,7 +25,6 @@ from .thesis_modes import BAND, CORDS
 
 UNITS = "mm-t-s"
 DECK, FORMED, SENSORS = "tailgate.bdf", "formed_thickness.k", "sensors.csv"
-WEIGHED_SD = 0.001  # of the mass, relative
 HUNG = (0.485, 0.940)  # |y|, s of the upper bolt holes, from which the thesis hung it (figure 17)
 
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.dynamics.frf import FRF, transfer
-from chladni.dynamics.modes import ModalModel
+from chladni.dynamics.frf import FRF
 
 
 @dataclass(frozen=True)
@@ -18,28 +17,6 @@ class MeasurementChain:
 
     noise: float = 0.01
     floor: float = 0.001
-
-
-def measured(
-    modal: ModalModel,
-    phi_out: np.ndarray,
-    phi_in: np.ndarray,
-    frequency: np.ndarray,
-    chain: MeasurementChain,
-    rng: np.random.Generator,
-    outputs: tuple[str, ...],
-    inputs: tuple[str, ...],
-) -> FRF:
-    """Accelerance H = Σ_r -ω² φ_o φ_i / (ω_r² - ω² + 2iζ_r ω_r ω), with noise and its variance.
-
-    Parameters
-    ----------
-    phi_out, phi_in : (n_out, r), (n_in, r)   mode shapes at the sensors and shakers
-    frequency : (n_f,) Hz
-    """
-    s = 2j * np.pi * frequency
-    H = transfer(modal, phi_out, phi_in, s) * s[:, None, None] ** 2
-    return recorded(H, frequency, chain, rng, outputs, inputs)
 
 
 def recorded(

@@ -7,6 +7,7 @@ A rule returns the number that it measured, in words, or raises
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -326,7 +327,12 @@ def _change(kind: str, at: slice, before: Article, after: Article) -> str:
 
 def frequencies(made: Assembly, at: slice) -> np.ndarray:
     """Natural frequencies of a structure at some positions [Hz]."""
-    return normal_modes(structure(made).system, at.stop).frequency[at]
+    return _lowest(made, at.stop)[at]
+
+
+@lru_cache(maxsize=4)  # rules ask for those of the deck and of the article again and again
+def _lowest(made: Assembly, count: int) -> np.ndarray:
+    return normal_modes(structure(made).system, count).frequency
 
 
 def touched_cards(before: Path, after: Path) -> set[str]:

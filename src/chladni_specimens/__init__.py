@@ -3,6 +3,7 @@
 from .formed_panel import formed_panel as formed_panel
 from .forms import FORMS as FORMS
 from .forms import DrawnForm as DrawnForm
+from .forms.mesh_pieces import Piece as Piece
 from .forms.mesh_pieces import of_pieces as of_pieces
 from .forms.mesh_pieces import rectangle as rectangle
 from .forms.mesh_pieces import stops as stops
@@ -30,6 +31,7 @@ __all__ = [
     "STEEL",
     "DrawnForm",
     "FormedSpecimen",
+    "Piece",
     "Skin",
     "TailgateDesign",
     "adhesive_bead",

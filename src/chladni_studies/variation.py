@@ -10,9 +10,8 @@ from chladni.case.request import Stated
 from chladni.case.schema import FIELDS, PARAMETER, ParameterWords
 from chladni.effects.user_parameters import (
     FARTHEST,
-    SD,
-    SD_OTHERS,
     UNITS,
+    sd_of,
     values_of,
     why_implausible,
     with_factor,
@@ -69,7 +68,7 @@ def of_case(
                 f'(--vary "{free.field}=LOW:HIGH" varies an effect with one number).'
             )
             continue
-        sd = SD.get(free.field, SD_OTHERS) if free.sd is None else free.sd
+        sd = sd_of(assembly.parts, free)
         low = float(np.exp(-_SDS * sd)) if free.low is None else free.low
         high = float(np.exp(_SDS * sd)) if free.high is None else free.high
         nominal, unit = _nominal(assembly, free, True)

@@ -12,10 +12,10 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.builders.elements import CUBE, row_of_bars
 from tests.builders.published import benchmarks
+from tests.builders.statics import static
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
-from chladni.fem.solve import static
 from chladni.model.assembly import Assembly, Masses, RigidBody, Solids
 from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.builders.statics import motion_at, subcase_statics
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
-from chladni.fem.solve import motion_at, subcase_statics
 from chladni.io.nastran.read.analysis_requests import analysis
 from chladni.io.nastran.read.assembly_from_deck import assembly
 from chladni.io.nastran.text.deck import read_deck

@@ -21,6 +21,13 @@ def line_frequency(n, r, k=1e5, m=1.0):
     return 2 * np.sqrt(k / m) * np.sin(np.asarray(r) * np.pi / (2 * n)) / (2 * np.pi)
 
 
+def inverted(system, rows_out, rows_in, frequency, structural=0.0):
+    """Receptance (K (1 + i g) - ω² M + i ω V)⁻¹, line by line (n_f, n_out, n_in)."""
+    M, V, K = (A.toarray() for A in (system.M, system.V, system.K * (1 + 1j * structural)))
+    omega = 2 * np.pi * np.asarray(frequency)[:, None, None]
+    return np.linalg.inv(K - omega**2 * M + 1j * omega * V)[:, rows_out][:, :, rows_in]
+
+
 @pytest.fixture
 def chain():
     return line(10, free=False)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from tests.builders.refusals import says
 
-from chladni.dynamics.damping import DampingTable, modal_damping, with_table
+from chladni.dynamics.damping import DampingTable, with_table
 from chladni.dynamics.eigen import normal_modes
 from chladni.errors import ShapeError
 
@@ -38,15 +38,6 @@ def test_one_point_is_a_constant():
 def test_table_lands_on_the_modes(chain):
     modal = with_table(normal_modes(chain), table([0, 100], [0, 0.1]))
     np.testing.assert_allclose(modal.damping, modal.frequency / 100 * 0.05)
-
-
-def test_modal_damping_damps_each_mode_by_its_own(chain):
-    """Φᵀ V Φ = diag(2 ζ ω), the state matrix has the poles -ζω ± iω√(1-ζ²)."""
-    modal = normal_modes(chain).with_damping(np.linspace(0.01, 0.1, 10))
-    U, d = modal_damping(chain, modal)
-    V = (U * d) @ U.T
-    due = np.diag(4 * np.pi * modal.damping * modal.frequency)
-    np.testing.assert_allclose(modal.shapes.T @ V @ modal.shapes, due, atol=1e-10)
 
 
 def test_bad_tables_are_refused():

@@ -81,5 +81,5 @@ def test_concealed_it_is_named_and_written(example_family, tmp_path, monkeypatch
     sd = (size["high"] - size["low"]) / (2 * 1.96)
     assert abs(size["value"] - case.truth["value"]) < 3 * sd
     held = d["fit"]["held_out"]
-    assert held["Q_with_mesh_error"] < held["Q_calibrated_with_mesh_error"]
+    assert held["Q_with_effect"] < held["Q_calibrated"]
     assert (out / "updated.bdf").exists()

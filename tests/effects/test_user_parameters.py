@@ -7,14 +7,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.user_parameters import defaults_of_solids, user_parameter
+from chladni.effects.calibration_parameters import OF_ALLOYS, SPREAD, prior_sd
+from chladni.effects.user_parameters import defaults_of_solids, sd_of, user_parameter
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Beams, Bushes, Solids
 from chladni.model.free_parameter import FreeParameter
 from chladni.model.ground_springs import with_springs
 from chladni.model.point_masses import with_masses
-from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
+from chladni.model.properties import (
+    BeamSection,
+    Isotropic,
+    Orthotropic,
+    Part,
+    ShellSection,
+    SolidSection,
+)
 from chladni.reduced.accuracy import products
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
@@ -135,3 +143,32 @@ def test_pickles(reduced):
 def test_of_solids_their_materials_are_free():
     found = defaults_of_solids(jointed())
     assert [(p.field, p.positions) for p in found] == [("E", (1,)), ("rho", (1,))]
+
+
+SHEET_OF = {
+    "steel": Isotropic(210e9, 0.3, 7850.0),
+    "aluminium": Isotropic(70e9, 0.33, 2700.0),
+    "glass": Isotropic(70e9, 0.22, 2500.0),
+    "titanium": Isotropic(112e9, 0.34, 4430.0),
+    "steel in other units": Isotropic(210e3, 0.3, 7.85e-9),
+    "laminate": Orthotropic(210e9, 210e9, 0.3, 80e9, rho=7850.0),
+}
+
+
+@pytest.mark.parametrize("name", SHEET_OF)
+def test_a_class_of_alloys_is_known_by_its_modulus_and_density(name):
+    part = Part(1, name, ShellSection(1e-3, SHEET_OF[name], SHEET_OF[name]))
+    due = OF_ALLOYS if name in ("steel", "aluminium") else SPREAD
+    for quantity in ("E", "rho", "t"):
+        assert prior_sd([part], quantity, [0]) == due[quantity]
+        free = FreeParameter(quantity, quantity, positions=(0,))
+        assert sd_of([part], free) == due[quantity]
+        assert sd_of([part], replace(free, sd=0.02)) == 0.02
+
+
+def test_numbers_of_a_solid_bar_also_stand_for_its_section():
+    """A density that it shares with a sheet is that of the material."""
+    sheet = Part(1, "skin", ShellSection(1e-3, STEEL, STEEL))
+    bar = Part(2, "bar", BeamSection(STEEL, 4e-5, 1e-9, 1e-11, 0.0, 5e-11))
+    assert prior_sd([sheet, bar], "rho", [1]) == SPREAD["rho"]
+    assert prior_sd([sheet, bar], "rho", [0, 1]) == OF_ALLOYS["rho"]

@@ -21,7 +21,7 @@ from chladni.ema.ring_down import ring_downs
 from chladni.ema.time_record import TimeRecord
 from chladni_evidence.identification_evidence import recording, structure
 
-F = np.arange(37.5, 46, 0.05)
+F = np.arange(37.5, 46, 0.1)
 OUT, DRIVE = ("1:+Z", "2:+Z", "3:+Z"), ("1:+Z",)
 PHI = np.array([[1.0, 0.9], [0.6, -0.7], [-0.4, 0.8]])  # of the modes at the outputs [1/√kg]
 HZ, ZETA = np.array([40.0, 44.0]), 0.004
@@ -296,8 +296,9 @@ def test_a_neighbour_that_is_rung_into_is_no_sign():
 
 @pytest.mark.parametrize(
     ("control", "kind"),
-    [("force", "share"), ("response", "floor"), ("force", "share, unsaid")],
-)
+    [("force", "share"), *(pytest.param(*one, marks=pytest.mark.slow)
+                           for one in (("response", "floor"), ("force", "share, unsaid")))],
+)  # fmt: skip
 def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control, kind):
     """95 of 100 of the table's rows, three standard deviations of such a share granted.
 

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import calibration_parameter, defaults
+from chladni.effects.calibration_parameters import SPREAD, calibration_parameter, defaults
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.user_parameters import user_parameter
 from chladni.inference.hypothesis_fit import UpdatingProblem
 from chladni.inference.identifiability import collinearity, identifiability
-from chladni.inference.map_fit import MassMeasurement
+from chladni.inference.map_fit import APART, MassMeasurement
 from chladni.inference.pole_data import Poles
 from chladni.model.free_parameter import FreeParameter
 from chladni.model.ground_springs import with_springs
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni.search.preparation import carrying
+from chladni.search.preparation import carrying, off_the_scales
 from chladni_specimens.plates import plate
 
 TOP = 200.0
@@ -45,7 +45,7 @@ def rows(found):
 
 
 def sheet(reduced, quantities):
-    return [calibration_parameter(reduced.groups, q, [0]) for q in quantities]
+    return [calibration_parameter(reduced.groups, q, [0], SPREAD[q]) for q in quantities]
 
 
 def test_frequencies_of_a_thin_plate_tell_e_times_t_squared_and_no_more(bare):
@@ -73,11 +73,24 @@ def test_the_weighed_mass_settles_e_and_t(bare):
 
 def test_weighing_leaves_e_rho_and_t_one_direction(bare):
     """E t³ and ρ t are known, so that 1 % of E is undone by 1/3 % of ρ and -1/3 % of t."""
-    found = identifiability(problem(bare, defaults(bare.groups), weighed=True))
+    found = identifiability(problem(bare, sheet(bare, ("E", "rho", "t")), weighed=True))
     (direction,) = (dict(d) for d in found.directions)
     assert_allclose([direction[k] for k in (E, RHO, T)], [1, 1 / 3, -1 / 3], atol=0.01)
     assert found.frozen == (E,)
     assert "weighing" not in rows(found)[E].why
+
+
+@pytest.mark.parametrize(("off", "said"), [(0.03, ""), (0.2, "more than the deck")])
+def test_a_weight_beyond_what_density_and_thickness_allow_is_said(bare, off, said):
+    """Their variances add, (0.06² + 0.05²) m²."""
+    weighed = problem(bare, sheet(bare, ("E", "rho", "t")), weighed=True)
+    mass = weighed.mass_measurement
+    given = replace(weighed, mass_measurement=replace(mass, mass=(1 + off) * mass.mass))
+    text = off_the_scales(given)
+    assert said in text
+    assert bool(text) == bool(said)
+    allowed = APART * np.hypot(0.06, 0.05) * mass.mass
+    assert not said or text.endswith(f"allow {allowed:.2g} kg")
 
 
 def test_a_spring_that_no_mode_strains_is_unknown(bare):

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.calibration_parameters import calibration_parameter, random_field
+from chladni.effects.calibration_parameters import (
+    SHEET,
+    SPREAD,
+    calibration_parameter,
+    random_field,
+)
 from chladni.effects.channels import channel_gain, sensor_fault
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.masses import PointMass
@@ -162,7 +167,7 @@ def test_one_more_pole_is_foretold_by_a_density(reduced, poles):
 def test_poles_keep_the_spread_of_their_own_fit(seed, off):
     """The wide spread at which pairs are found is not the one that the fit leaves."""
     reduced = reduced_problem(plate(0.4, 0.3, 8, 6, 1.5e-3), 400.0)
-    base = [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho", "t")]
+    base = [calibration_parameter(reduced.groups, q, [0], SPREAD[q]) for q in SHEET]
     base.append(random_field(reduced.groups, "t", 0.01))
     x = np.zeros(sum(len(e.parameters) for e in base))
     x[:3] = np.random.default_rng(seed).normal(scale=off, size=3)

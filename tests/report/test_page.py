@@ -170,11 +170,11 @@ def test_what_is_missing_is_left_out(tmp_path, d):
 
 
 @pytest.mark.parametrize(("written", "told"), [(0.5, True), (0.0151, False)])
-def test_a_mesh_too_coarse_is_told_where_the_deck_as_written_is_worse(written, told):
+def test_a_mesh_too_coarse_is_told_where_the_updated_deck_is_worse(written, told):
     """Named it may be for all that: the error of the mesh is in both models then."""
-    held = {**DIAGNOSIS["fit"]["held_out"], "Q_with_effect": written, "Q_with_mesh_error": 0.009}
+    held = {**DIAGNOSIS["fit"]["held_out"], "Q_with_effect": written, "Q_with_nuisances": 0.009}
     d = {**DIAGNOSIS, "fit": {**DIAGNOSIS["fit"], "held_out": held}}
-    assert ("and to 0.009 with the mesh error" in sentence(from_json(d))) == told
+    assert ("and to 0.009 with errors of mesh" in sentence(from_json(d))) == told
 
 
 def test_a_missing_picture_is_a_sentence_and_no_page(tmp_path):

@@ -5,11 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect import Effect, Traits
 from chladni.errors import ModelError
 from chladni.inference.hypothesis_fit import HypothesisFit
-from chladni.inference.map_fit import fit
 from chladni.reduced.accuracy import Accuracy
 from chladni.search import basis_refinement
 
@@ -34,6 +32,7 @@ def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effec
 
 PREPARED = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
 FIT = SimpleNamespace(effects=(), x=np.zeros(0), data=SimpleNamespace(rebased=lambda model: model))
+FIT.kept = lambda: FIT
 NARROW = HypothesisFit(Effect(), FIT, "narrow")
 
 
@@ -65,32 +64,13 @@ def test_is_fitted_again_only_beyond_the_limit(errors, error, model):
     assert bool(done.distrust) == (model == "wide")
 
 
-def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(errors, monkeypatch, reduced):
-    """They are not fitted again; their state is that of the wider model."""
-    fits = errors(2e-3, 2e-4)
-    E = calibration_parameter(reduced.groups, "E", [0])
-    own = fit(reduced.model, [E], Still(), None, np.array([0.1]), max_steps=0)
-    wide = reduced.model.with_components()
-    monkeypatch.setattr(Accuracy, "refined", lambda self, narrow: wide)
-    begun = HypothesisFit(Effect(), own, reduced.model)
-    done = basis_refinement.refined(None, PREPARED, begun, held=True).hypothesis
-    assert fits == []
-    assert done.model is wide
-    assert done.fit.x == pytest.approx([0.1])
-    assert done.fit.state is not own.state
-    assert done.fit.state.lam[6:] == pytest.approx(own.state.lam[6:])
-
-
-class Still:
-    """Data that say nothing."""
-
-    error = None
-
-    def rebased(self, model):
-        return self
-
-    def scaled(self, state, gradient):
-        return np.zeros(1), np.zeros((1, 1))
+@pytest.mark.parametrize("written", [True, False])
+def test_the_form_of_a_deck_keeps_the_learned_error(errors, monkeypatch, written):
+    """It is fitted as it was written; any other form learns the error of the model again."""
+    fits, kept = errors(2e-3, 2e-4), []
+    monkeypatch.setattr(basis_refinement, "fit", lambda *given: kept.append(given) or FIT)
+    basis_refinement.refined(None, PREPARED, NARROW, written)
+    assert (len(kept), len(fits)) == ((1, 0) if written else (0, 1))
 
 
 def test_is_widened_until_it_serves(errors):

@@ -13,7 +13,6 @@ from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.inference.map_fit import Fit, MassMeasurement, Status, fit
 from chladni.inference.result import Agreement, MassComparison, Scores
 from chladni.progress import silent
-from chladni.reduced.reduced_model import evaluate
 from chladni.search.calibration import (
     PROFILED,
     _basins,
@@ -23,7 +22,6 @@ from chladni.search.calibration import (
     profiles_of_the_best,
 )
 from chladni.search.compensation import compensating
-from chladni.search.deciding import _leaves_the_scales
 from chladni.search.posterior import bands, gaussian_draws, posterior_sample, with_frozen
 
 NOISE = 0.1
@@ -204,17 +202,6 @@ def test_bands_are_as_wide_as_the_posterior_and_show_held_out_channels_first(
     else:
         assert 0.5 * sd < width.max() < 50 * sd
         assert (np.array(every[0].low) <= np.array(every[0].measured) * 1.001).mean() > 0.9
-
-
-@pytest.mark.parametrize(("off", "leaves"), [(0.0, False), (0.005, False), (0.02, True)])
-def test_a_calibration_does_not_keep_a_deck_that_leaves_the_scales(reduced, off, leaves):
-    effect = calibration_parameter(reduced.groups, "rho", [0])
-    weight = evaluate(reduced.model, [effect], np.zeros(1)).weight
-    mass = MassMeasurement(weight + off, 0.004)
-    given = UpdatingProblem(reduced, Offsets(np.zeros(0)), mass, (effect,), (), None)
-    null = SimpleNamespace(model=reduced.model)
-    assert _leaves_the_scales(given, null, np.zeros(1)) is leaves
-    assert not _leaves_the_scales(replace(given, mass_measurement=None), null, np.zeros(1))
 
 
 def test_draws_of_a_linear_problem_have_the_covariance_of_the_whole(reduced, columns):

@@ -10,10 +10,9 @@ from chladni.effects.element_groups import element_groups
 from chladni.effects.orthotropy import orthotropic
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
-from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.pole_data import Poles
 from chladni.model.properties import Isotropic
-from chladni.search.diagnosis import Diagnosis, _keeps_mass, threshold
+from chladni.search.diagnosis import Diagnosis, threshold
 from chladni_specimens.plates import plate
 
 DATA = object.__new__(Poles), object.__new__(Responses)
@@ -49,12 +48,3 @@ def test_what_is_told_of_another_is_what_it_needs(data):
     found = Diagnosis(null, null, null, (wood, other), "calibration only")
     assert found.due == found.due_of(wood) == TIED
     assert found.due_of(other) == threshold(data, 2)
-
-
-@pytest.mark.parametrize(("weight", "kept"), [(1.0019, True), (0.9981, True), (1.0021, False)])
-def test_plain_calibration_may_not_leave_the_scales(weight, kept):
-    """Within 1.96 standard deviations of a weighing of 1 kg by 1 g."""
-    plain = SimpleNamespace(fit=SimpleNamespace(state=SimpleNamespace(weight=weight)))
-    weighed = SimpleNamespace(mass_measurement=MassMeasurement(1.0, 1e-3))
-    assert _keeps_mass(weighed, plain) == kept
-    assert _keeps_mass(SimpleNamespace(mass_measurement=None), plain)

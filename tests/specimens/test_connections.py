@@ -11,7 +11,7 @@ from chladni.geometry.mesh_quality import check_mesh
 from chladni.geometry.nearest import ShellSurface, barycentric_foot
 from chladni.model.assembly import Assembly
 from chladni.model.properties import Isotropic, Part, ShellSection
-from chladni_specimens.joints.bolts import accelerometers, grip, hem, screw, tied_hole
+from chladni_specimens.joints.bolts import accelerometers, grip, screw, tied_hole
 from chladni_specimens.joints.builders import adhesive_bead, spot_welds
 from chladni_specimens.mesher.flat_regions import grid
 from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
@@ -147,15 +147,6 @@ def test_grip_holds_sliding_only():
     assert rigid_count(assembly) == 12 - 1
     joined, _ = spot_welds(assembly, WELDS, ("a", "b"))
     assert rigid_count(joined) == 6
-
-
-def test_hem_runs_inboard_of_its_edge():
-    edge = np.column_stack([np.linspace(0, 0.2, 21), np.zeros(21), np.zeros(21)])
-    assembly, report = hem(pair(), edge, ("a", "b"), grip_stiffness=1e9)
-    places = np.array([j.place for j in report if j.kind == "hem"])
-    np.testing.assert_allclose(places[:, 1], 0.0075, atol=1e-6)
-    assert sum(j.kind == "grip" for j in report) == 21
-    assert rigid_count(assembly) == 6
 
 
 def test_accelerometers_weigh():

@@ -57,6 +57,7 @@ def agrees(out, straight):
         np.testing.assert_allclose(table[name], straight.column(name), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_worker_killed_costs_no_other_sample(deck, straight, tmp_path):
     """Of two local workers one is killed; the rows are those of a study nobody disturbed."""
     study = started(deck, tmp_path / "out", "--workers", "2")
@@ -215,8 +216,11 @@ def test_a_sample_that_ends_every_worker_has_failed_and_costs_no_other():
     assert all("no number" in why for why in found.values())
 
 
-def test_a_fault_of_the_program_ends_the_study(capfd):
-    study = SimpleNamespace(assembly=call)
+def test_a_sample_is_tried_again_and_a_fault_of_the_program_ends_the_study(capfd, tmp_path):
+    """The first try ends its worker, as a kill does; the second is a fault of the program."""
+    study, mark = SimpleNamespace(assembly=call), tmp_path / "tried"
+    code = f"import os, pathlib; mark = pathlib.Path({str(mark)!r}); tried = mark.exists()\n"
+    code += "int(None) if tried else (mark.touch(), os._exit(1))"
     with pytest.raises(FileError, match=r"could not run a sample \(TypeError"):
-        list(results(study, [partial(int, None)] * 3, range(3), 2))
+        list(results(study, [partial(exec, code)], range(1), 2))
     assert "Traceback" not in capfd.readouterr().err

@@ -1,6 +1,7 @@
 """Several articles of one design: common mean, spread of units, values of each."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from numpy.testing import assert_allclose
 from tests.builders.plate_recordings import T, a_case, record
 
 import chladni
+from chladni.effects.calibration_parameters import SHEET, SPREAD
+from chladni.model.free_parameter import FreeParameter
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.report.diagnosis_json import read_diagnosis
 
@@ -16,11 +19,16 @@ THICKER = {"A": 0.0, "B": 0.006, "C": -0.008}
 
 @pytest.fixture(scope="module")
 def three(tmp_path_factory):
-    """Plates 1.5 % thicker than their deck, and by other amounts; E and rho as in the deck."""
+    """Plates 1.5 % thicker than their deck, and by other amounts; E and rho as in the deck.
+
+    Their material is little known, so that the values are, too.
+    """
     folder = tmp_path_factory.mktemp("articles")
     mass = [record(folder / f"{name}.npz", t=T * np.exp(away), seed=k)
             for k, (name, away) in enumerate(THICKER.items())]  # fmt: skip
     case = a_case(folder, mass[0], *({"file": f"{n}.npz", "article": n} for n in THICKER))
+    free = (FreeParameter(q, q, ("plate",), SPREAD[q], positions=(0,)) for q in SHEET)
+    case = replace(case, parameters=tuple(free))
     return case, chladni.calibrate(case)
 
 
@@ -44,9 +52,10 @@ def test_the_mean_is_that_of_the_articles(three):
         assert_allclose(a.value, t.mean * np.exp(a.away), rtol=1e-6)
 
 
-def test_one_article_is_what_it_was(three, calibrated):
+def test_one_article_is_what_it_was(three):
     """No further article adds anything, and further ones change nothing of the first's fit."""
-    found = three[1]
+    case, found = three
+    calibrated = chladni.calibrate(replace(case, recordings=case.recordings[:1]))
     assert calibrated.study.articles == ()
     assert found.study.names == calibrated.study.names
     values = {c.where: c.estimate.value for c in found.calibrated}

@@ -86,7 +86,7 @@ def test_json_of_a_calibration_is_the_result_of_its_function(calibrated, folder,
     """E, rho and t stand for a mass here and foretell worse, so that the exit code is 3."""
     found = written("calibrate", "diagnosis.json", folder, tmp_path / "out", code=3)
     assert "predicts the held-out data worse" in calibrated.distrust[0]
-    assert "the calibration is compensating" in calibrated.distrust[1]
+    assert any("the calibration is compensating" in said for said in calibrated.distrust)
     files = found.pop("files")
     assert (files["deck"], files["calibration"]) == ("calibrated.bdf", "calibration.json")
     due = plain(to_json(calibrated))

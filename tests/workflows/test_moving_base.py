@@ -75,8 +75,7 @@ def test_a_concealed_mass_is_named(heavy, diagnosed):
     (mass,) = [p for p in found.parameters if p.name == "M"]
     assert mass.low < 0.02 < mass.high
     held = diagnosed.agreement.held_out
-    assert held.with_effect < held.calibrated
-    assert held.with_mesh_error < 0.5 * held.calibrated_with_mesh_error
+    assert held.with_effect < 0.5 * held.calibrated
     assert diagnosed.adequate.passes
     assert any("motion of the base" in note for note in diagnosed.notes)
 
@@ -88,11 +87,17 @@ def test_a_normal_is_an_output_of_a_moving_base():
 
 
 def test_a_null_stays_quiet(tmp_path):
-    """The same plate 3 % thicker: that is calibrated, and nothing is named."""
+    """The same plate 3 % thicker: that is calibrated, and nothing is named.
+
+    The mesh is coarse, and the thin deck was right on the held-out band by chance: the calibrated
+    deck is not recommended.
+    """
     found = chladni.diagnose(a_case(tmp_path / "null", clamped(1.236e-3, 2), 3))
     assert found.verdict in ("nothing missing", "calibration only")
     assert not found.effects
-    assert not found.distrust
+    (doubt,) = found.distrust
+    assert "the calibrated deck predicts the held-out data worse than the given deck" in doubt
+    assert "refine its mesh" in doubt
     t = next(p.estimate for p in found.calibrated if p.estimate.name == "t")
     assert t.low < 1.236e-3 < t.high
     assert found.agreement.fitted.calibrated < found.agreement.fitted.nominal

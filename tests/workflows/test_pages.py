@@ -63,7 +63,7 @@ def test_the_result_is_read_back(run_folder, diagnosed):
 
 
 def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_path):
-    """Deck, interval, change; of E, rho and t only E t³ and ρ t are known, so that E is frozen."""
+    """Deck, interval, change; the density of steel is known before the test: it is frozen."""
     result = write_diagnosis(tmp_path, case, calibrated)
     assert {c.where: c.deck_value for c in result.calibrated}
     page = (tmp_path / "report.html").read_text()
@@ -72,7 +72,7 @@ def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_
     t = next(c for c in result.calibrated if c.estimate.name == "t")
     assert t.deck_value == pytest.approx(1e-3)
     assert "210 GPa" in page
-    assert "frozen (186.7 GPa to 236.2 GPa by its prior)" in page
+    assert "frozen (7773 kg/m³ to 7927 kg/m³ by its prior)" in page
     for title in ("Identifiability", "Basins of the fit", "Uncertainty of the values"):
         assert f"<h2>{title}</h2>" in page
     assert t.estimate.low < t.estimate.value < t.estimate.high
@@ -82,10 +82,10 @@ def test_figures_of_the_page_are_named_for_what_they_are(run_folder):
     d = json.loads((run_folder / "diagnosis.json").read_text())
     for q in (d["fit"], d["fit"]["held_out"]):
         assert q["Q_floor"] < 1e-3 * q["Q_with_effect"] or q["Q_floor"] < 1e-6
-        assert q["Q_with_mesh_error"] is not None
+        assert q["Q_with_nuisances"] is not None
     page = (run_folder / "report.html").read_text()
     assert "floor: the recording&#39;s noise alone" in page
-    assert "that scatter can explain" in page
+    assert "which no deck contains" in page
     assert "noise, repeats" not in page
 
 

@@ -99,7 +99,7 @@ class ParameterWords(TypedDict, total=False):
         "The free number, one factor for all its parts; or an effect with a known place.",
         choices=FREEABLE, more=True)]
     sd: Annotated[float, Key("parameter", "0.03", _VARIED,
-        "0.06 (E, rho), 0.05 (t, wall), 0.1 (nu), 0.3 (others)", "of the deck's value",
+        "by material", "of the deck's value",
         "Tolerance: standard deviation of the prior of ln(value / deck's value). `study` uses two "
         "of them where `low` or `high` is missing.", least=0.001, most=2.0)]
     low: Annotated[float, Key("parameter", "0.8", _VARIED, "none", "of the deck's value",
@@ -121,7 +121,7 @@ class CaseWords(TypedDict, total=False):
     thickness_units: Annotated[str, Key("model", '"mm-t-s"', COMMANDS, "the deck's", "",
         "The unit system of that file.", choices=tuple(UNITS))]
     thickness_place: Annotated[str, Key("model", '"aligned"', COMMANDS, "as it lies", "",
-        "Place of its sheets: on the deck's, brought onto them first, or brought onto them as a "
+        "How its sheets lie on the deck's: as they are, moved onto them first, or moved as a "
         "mirror image.", choices=PLACES)]
     damping: Annotated[float, Key("model", "0.01", _FRF, "0.01", "of critical",
         "Damping of the model for drawn or scored responses.", least=0.0, most=0.5)]

@@ -1,133 +1,99 @@
-"""One decision: from rows of numbers to a verdict, or to the one fit that is still missing.
+"""One decision: from hypotheses to a verdict.
 
-The module computes nothing about a structure and writes no text. If the table lacks a number, the
-decision returns a request for it by name. The caller computes it, adds it and calls again.
+The module computes nothing about a structure and writes no text. Numbers that cost a fit are
+computed when they are read, so that only the fits that decide are made.
 
 1. The leader is named if it reaches the required gain and fits.
 2. Few data bear a name only if they could contradict it and nothing else is tied with it.
-3. All data together may support a name that the fitted data alone do not.
+3. Fitted and held-out data are one evidence: together they bring the required gain.
 4. A set of effects that all reach the required gain precedes one effect.
 5. The leader is fitted again and tested on held-out data.
 6. If the leader is refused, its rivals are tested.
 7. Tied effects are listed together; a leader that is not named puts calibration in doubt.
-8. If nothing is named, the numbers of the calibration are chosen.
 """
 
-from dataclasses import replace
-
-from .answer import with_numbers, with_ties
-from .decision_rules import DecisionRules
-from .hypothesis_table import NULL, HypothesisTable, Missing, Row, Wanted, fits
-from .judgement import JudgedTable, apply_held_out, tested, untested
+from .answer import with_ties
+from .decision_rules import RULES
+from .hypotheses import Hypotheses, Hypothesis, fits
+from .judgement import apply_held_out, tested, untested
 from .named_sets import largest_named
-from .reasons import ALONE, Decision, Reason, Step, steps
+from .reasons import ALONE, Decision, Reason, Step
 
-RULES = DecisionRules()
-
-
-def decide(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | Wanted:
-    """Return the decision, or the number that is still missing for it."""
-    case = JudgedTable(table, rules)
-    try:
-        return with_numbers(case, with_ties(case, _named(case)))
-    except Missing as missing:
-        return missing.wanted
+Passed = tuple[tuple[Hypothesis, Reason], ...]
 
 
-def called(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | Wanted:
-    """Return the decision on single effects, before held-out data are used."""
-    try:
-        return _first(JudgedTable(table, rules))
-    except Missing as missing:
-        return missing.wanted
-
-
-def _named(case: JudgedTable) -> Decision:
-    """The name, if any, or what refused it."""
+def decide(case: Hypotheses) -> Decision:
+    """Return the decision."""
     decision = _decided(case)
-    few = not case.table.enough and case.rules.enough_data
-    contradicted = case.table.contradicted and decision.named
-    alone = contradicted and len(with_ties(case, decision).one_of) < 2
-    return _too_few(case, decision) if few and not alone else decision
+    if case.enough:
+        return with_ties(case, decision)
+    answer = with_ties(case, decision)
+    alone = case.contradicted and decision.named and len(answer.one_of) < 2
+    return answer if alone else _too_few(case, decision)
 
 
-def _decided(case: JudgedTable) -> Decision:
+def called(case: Hypotheses) -> Decision:
+    """Return the decision on single effects, before held-out data are used."""
+    return _first(case, fitted_alone=True)
+
+
+def _decided(case: Hypotheses) -> Decision:
     """The name by the odds, if any, or what refused it."""
-    decision = _first(case)
-    alone = _supported_by_all_data(case, decision)
-    sets = case.table.sets if case.rules.sets else ()
-    found, refusals = largest_named(case, alone, [s for s in sets if s.pays])
+    alone = _first(case)
+    found, refusals = largest_named(case, alone)
     if found is not None:
         return found
-    decision = replace(alone, steps=steps(alone, *refusals))
+    decision = alone.then(*refusals)
     if decision.named:
         decision = _with_lead_refined(case, decision)
-    if decision.refused and decision.whole is None and case.rules.alternatives:
-        decision = _alternatives_tested(case, decision)
-    return decision
+    return _alternatives_tested(case, decision) if decision.refused else decision
 
 
-def _first(case: JudgedTable) -> Decision:
-    """Name the leader if it reaches the required gain; it, or calibration, must fit."""
-    table, order = case.table, case.table.singles
-    lead = table.rows[order[0]] if order else None
+def _first(case: Hypotheses, fitted_alone: bool = False) -> Decision:
+    """Name the leader if it reaches the required gain; it, or calibration, must fit.
+
+    A fifth of a dozen natural frequencies is a large part of the information. Held-out sensors and
+    spectral lines may be sensitive to an effect that the fitted band hardly shows. So all data
+    together may bring the gain that the fitted data alone do not.
+    """
+    lead = case.singles[0] if case.singles else None
     due = case.due(lead)
-    begun = Decision(case.calibrated(), order, due=due)
-    if lead is not None and table.gain(lead) > due:
-        return tested(case, begun, lead)
-    return untested(case, begun)
+    begun = Decision(case.calibrated, case.singles, due=due)
+    if lead is None:
+        return untested(case, begun)
+    if case.gain(lead) > due:
+        return tested(begun, lead)
+    if fitted_alone or not case.suffices(case.gain(lead), due, lambda: lead.numbers.news):
+        return untested(case, begun)
+    return tested(begun.then(Step(Reason.SUPPORTED_BY_ALL, lead)), lead)
 
 
-def _too_few(case: JudgedTable, decision: Decision) -> Decision:
-    """Name nothing; list the explanations within ``rules.tied`` of the best, with calibration."""
-    gains = {ALONE: 0.0} | {r.name: case.table.gain(r) for r in case.rows(decision.order)}
-    least = max(gains.values()) - case.rules.tied
+def _too_few(case: Hypotheses, decision: Decision) -> Decision:
+    """Name nothing; list the explanations within ``RULES.tied`` of the best, with calibration."""
+    gains = {ALONE: 0.0} | {h.name: case.gain(h) for h in decision.order}
+    least = max(gains.values()) - RULES.tied
     one_of = tuple(name for name, gain in gains.items() if gain >= least)
-    step = Step(Reason.TOO_FEW, names=one_of)
-    return replace(
-        decision, verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,
-        steps=steps(decision, step),
+    return decision.then(
+        Step(Reason.TOO_FEW, names=one_of),
+        verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,
     )  # fmt: skip
 
 
-def _supported_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
-    """Name the leader if all data together support it, held-out data included.
-
-    A fifth of a dozen natural frequencies is a large part of the information. Held-out sensors and
-    spectral lines may be sensitive to an effect that the fitted band hardly shows. The Bayes factor
-    of all data is that of the fitted data times the predictive ratio of the held-out data. The
-    bound on false alarms holds for it too. Fitted responses must bring ``good_part`` of the gain.
-    """
-    table, poles = case.table, case.table.poles
-    if not decision.order or decision.named or decision.refused:
-        return decision
-    lead = table.rows[decision.order[0]]
-    gain = table.gain(lead)
-    if gain <= (0.0 if poles else case.rules.good_part * decision.due):
-        return decision
-    if not case.evidence_suffices(gain, lead.held_out_votes(), decision.due, poles):
-        return decision
-    done = tuple(s for s in decision.steps if s.key != NULL)  # without the steps on calibration
-    supported = replace(decision, steps=(*done, Step(Reason.SUPPORTED_BY_ALL, lead.key)))
-    return tested(case, supported, lead)
-
-
-def _with_lead_refined(case: JudgedTable, decision: Decision) -> Decision:
+def _with_lead_refined(case: Hypotheses, decision: Decision) -> Decision:
     """Decide on the leader, fitted again on a refined basis, with all data."""
-    key, *behind = decision.order
-    lead, step = case.table.refinement(key), Step(Reason.RENEWED, key)
-    if not lead.fitted:
-        return replace(
-            decision, verdict="not in catalogue", reason=Reason.NOT_FITTED, named=False,
-            steps=steps(decision, step),
+    lead, *behind = decision.order
+    made = lead.numbers.refined
+    if not made.fitted:
+        return decision.then(
+            Step(Reason.RENEWED, made),
+            order=(made, *behind), verdict="not in catalogue", reason=Reason.NOT_FITTED,
+            named=False,
         )  # fmt: skip
-    named = replace(
-        decision, order=(lead.key, *behind), due=case.due(lead), steps=steps(decision, step)
-    )
+    named = decision.then(Step(Reason.RENEWED, made), order=(made, *behind), due=case.due(made))
     return apply_held_out(case, named)
 
 
-def _alternatives_tested(case: JudgedTable, refused: Decision) -> Decision:
+def _alternatives_tested(case: Hypotheses, refused: Decision) -> Decision:
     """Name the first rival that passes every test, after the leader was refused.
 
     The evidence of the fitted data orders the explanations. Held-out data, the residual and the
@@ -135,46 +101,40 @@ def _alternatives_tested(case: JudgedTable, refused: Decision) -> Decision:
     the true cause, while the leader imitates it and fits slightly better for a wrong reason. A
     leader that is ahead by the required gain refutes the others, as it refutes calibration alone.
     """
-    table, (lead, *alternatives) = case.table, case.rows(refused.order)
-    ahead = table.gain(lead)
-    over: tuple[tuple[str, Reason], ...] = ((lead.name, refused.reason),)
+    lead, *alternatives = refused.order
+    over: Passed = ((lead, refused.reason),)
     for alternative in alternatives:
-        gain = table.gain(alternative)
-        if gain <= refused.due or ahead - gain > refused.due:
+        gain = case.gain(alternative)
+        if gain <= refused.due or case.gain(lead) - gain > refused.due:
             break
         following = _decided_next(case, refused, alternative, over)
-        why = _against(case, refused, following) if following.named else following.reason
+        why = _against(lead, following) if following.named else following.reason
         if why is None:
             return following
-        over = (*over, (alternative.name, why))
-    return replace(refused, passed_over=over)
+        over = (*over, (following.order[0], why))
+    return refused.then(passed_over=over)
 
 
 def _decided_next(
-    case: JudgedTable, refused: Decision, alternative: Row, over: tuple[tuple[str, Reason], ...]
+    case: Hypotheses, refused: Decision, alternative: Hypothesis, over: Passed
 ) -> Decision:
     """Test a rival, placed in front of the explanations that were passed over."""
-    row = case.table.refinement(alternative.key)
-    others = (k for k in refused.order if k != alternative.key)
-    led = replace(
-        refused, order=(row.key, *others), due=case.due(row), passed_over=over, one_of=(),
-        refuting=None, votes=None,
-        steps=steps(
-            refused, Step(Reason.NEXT, row.key, over[-1][1], names=(over[-1][0],)),
-            Step(Reason.RENEWED, alternative.key),
-        ),
+    made = alternative.numbers.refined
+    others = (h for h in refused.order if h is not alternative)
+    before, why = over[-1]
+    led = refused.then(
+        Step(Reason.NEXT, made, why, names=(before.name,)), Step(Reason.RENEWED, made),
+        order=(made, *others), due=case.due(made), passed_over=over, one_of=(), news=None,
     )  # fmt: skip
-    if not row.fitted:
-        return replace(led, reason=Reason.NOT_FITTED, named=False)
-    led = tested(case, led, row)
+    if not made.fitted:
+        return led.then(reason=Reason.NOT_FITTED, named=False)
+    led = tested(led, made)
     return apply_held_out(case, led) if led.named else led
 
 
-def _against(case: JudgedTable, refused: Decision, following: Decision) -> Reason | None:
+def _against(lead: Hypothesis, following: Decision) -> Reason | None:
     """Return the reason that refutes a rival which passed its own tests, or None.
 
     Modal damping that follows the leader's change refutes a lossless rival.
     """
-    (lead, *_), (alternative, *_) = case.rows(refused.order), case.rows(following.order)
-    follows = not fits(case.table.after(alternative, lead), case.rules)
-    return Reason.DAMPING if follows else None
+    return None if fits(following.order[0].numbers.p_after(lead)) else Reason.DAMPING

@@ -1,10 +1,7 @@
-"""Every rule between the last fit and the verdict: a number, and its value with the rule off.
-
-``replay`` switches them off one at a time. The numbers are those of ``docs/method.md``.
-"""
+"""Every rule between the last fit and the verdict; the numbers are those of ``docs/method.md``."""
 
 import math
-from dataclasses import Field, dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 TIED = 10.0  # in -2 ln evidence (odds of e^5): explanations within this gap are tied
@@ -13,9 +10,9 @@ GOOD_PART = (
 )
 
 
-def _rule(value: Any, off: Any, why: str) -> Any:
-    """A number, the value that switches its rule off, and the purpose of the rule."""
-    return field(default=value, metadata={"off": off, "why": why})
+def _rule(value: float, why: str) -> Any:
+    """A number and the purpose of its rule."""
+    return field(default=value, metadata={"why": why})
 
 
 @dataclass(frozen=True)
@@ -24,63 +21,25 @@ class DecisionRules:
 
     chance_of_responses: float = _rule(
         1e-5,
-        1.0,
         "chance of a false alarm from responses: null cases gained up to 24, a chance of 1e-3 "
         "requires 18",
     )
-    chance_of_poles: float = _rule(1e-3, 1.0, "chance of a false alarm from natural frequencies")
+    chance_of_poles: float = _rule(1e-3, "chance of a false alarm from natural frequencies")
     expected_due: float = _rule(
-        TIED, math.inf, "gain required of a property that the material usually has (grain of wood)"
+        TIED, "gain required of a property that the material usually has (grain of wood)"
     )
-    changed: float = _rule(
-        6.0, 0.0, "gain of E, rho and t from which the deck counts as calibrated"
-    )
+    changed: float = _rule(6.0, "gain of E, rho and t from which the deck counts as calibrated")
     something_else: float = _rule(
         1 / 8,
-        0.0,
         "prior odds of a cause outside the catalogue: with p = 0.01 of the test of fit it is even",
     )
-    enough_data: bool = _rule(
-        True, False, "few modes or numbers name an effect only if no other is tied with it"
-    )
     good_part: float = _rule(
-        GOOD_PART, 1.0, "part of the required gain that fitted responses bring if other data agree"
+        GOOD_PART, "part of the required gain that fitted responses bring if other data agree"
     )
-    poles_together: bool = _rule(
-        True, False, "fitted and predicted natural frequencies reach the required gain together"
-    )
-    opposed: float = _rule(
-        1.0, math.inf, "times the required gain: from there on held-out data refuse a name"
-    )
-    sets: bool = _rule(True, False, "several effects may be named together")
-    harm: float = _rule(
-        1.0, math.inf, "times the Q of calibration: a deck with an effect must not fit worse"
-    )
-    conflict: float = _rule(
-        2.0, math.inf, "times the required gain: fitted data alone refute calibration"
-    )
-    alternatives: bool = _rule(
-        True, False, "if the leader is refused, the next explanation is tested"
-    )
-    tied: float = _rule(TIED, 0.0, "gap up to which two explanations are one answer")
-    doubt: bool = _rule(
-        True, False, "if the leader gains too little, calibration is one of several answers"
-    )
-    strained: bool = _rule(
-        True, False, "joints that changed by more than joints scatter are calibrated, or in doubt"
-    )
-    prudent: bool = _rule(
-        True, False, "calibrated numbers must not fit worse than those of the deck"
-    )
-
-    def without(self, name: str) -> "DecisionRules":
-        """A copy with one rule switched off."""
-        return replace(self, **{name: rule(name).metadata["off"]})
+    tied: float = _rule(TIED, "gap up to which two explanations are one answer")
 
 
-def rule(name: str) -> Field[Any]:
-    """The field of a rule, with its purpose."""
-    return next(f for f in fields(DecisionRules) if f.name == name)
+RULES = DecisionRules()
 
 
 def odds_of_something_else(p: float, prior: float) -> float:

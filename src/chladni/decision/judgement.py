@@ -1,116 +1,44 @@
-"""Apply the rules to a row: the test of fit and the support by held-out data."""
+"""Judge one hypothesis: the test of fit, the held-out data, and its deck."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import exp
-
-from .decision_rules import DecisionRules
-from .hypothesis_table import NULL, HypothesisTable, Row, Votes, needed
-from .reasons import BEYOND, Decision, Reason, Step, steps
-from .tied import tied
+from .hypotheses import Hypotheses, Hypothesis
+from .reasons import Decision, Reason, Step
 
 
-@dataclass(frozen=True)
-class JudgedTable:
-    """A table and the rules that apply to it."""
-
-    table: HypothesisTable
-    rules: DecisionRules
-
-    def due(self, row: Row | None, more: int = 0) -> float:
-        """Gain required to name a row; ``more`` sets count in addition to the families tried."""
-        return needed(self.table, row, len(self.table.singles) + more, self.rules)
-
-    def rows(self, keys: Sequence[str]) -> tuple[Row, ...]:
-        """The rows of some keys."""
-        return tuple(self.table.rows[k] for k in keys)
-
-    def calibrated(self) -> str:
-        """The verdict where nothing is named."""
-        changed = self.table.nominal - self.table.null.neg2_log_evidence > self.rules.changed
-        return "calibration only" if changed else "nothing missing"
-
-    def evidence_suffices(self, gain: float, votes: Votes, due: float, poles: bool = False) -> bool:
-        """True if fitted and held-out data support a name whose required gain is ``due``.
-
-        ``poles`` are few: all of them together must reach it. The sum also counts for responses,
-        if all votes are for the name and the fitted data bring ``good_part`` of the gain.
-        """
-        together = gain + votes.news
-        for_it = gain > self.rules.good_part * due and votes.all_for
-        poles = poles and self.rules.poles_together
-        least = together if poles or for_it else min(gain, together)
-        return least > due and not any(g < -self.rules.opposed * due for g in votes.given)
+def tested(decision: Decision, one: Hypothesis) -> Decision:
+    """Name a hypothesis if it fits, and refuse it otherwise."""
+    decision = decision.then(Step(Reason.TESTED, one), tested=one)
+    if one.fits:
+        return decision.then(verdict=one.verdict, reason=Reason.NAMED, named=True)
+    return decision.then(verdict="not in catalogue", reason=Reason.UNFIT, named=False)
 
 
-def tested(case: JudgedTable, decision: Decision, row: Row) -> Decision:
-    """Name the row if it fits, and refuse it otherwise."""
-    decision = replace(
-        decision, tested=row.key, steps=steps(decision, Step(Reason.TESTED, row.key))
-    )
-    if row.fits(case.rules):
-        return replace(decision, verdict=row.verdict, reason=Reason.NAMED, named=True)
-    return replace(decision, verdict="not in catalogue", reason=Reason.UNFIT, named=False)
-
-
-def untested(case: JudgedTable, decision: Decision) -> Decision:
+def untested(case: Hypotheses, decision: Decision) -> Decision:
     """Name nothing; calibration alone fits, or nothing in the catalogue explains the data."""
-    fits = case.table.null.fits(case.rules)
-    return replace(
-        decision, verdict=case.calibrated() if fits else "not in catalogue", tested=NULL,
-        named=False, steps=steps(decision, Step(Reason.TESTED, NULL)),
-    )  # fmt: skip
+    verdict = case.calibrated if case.null.fits else "not in catalogue"
+    return decision.then(
+        Step(Reason.TESTED, case.null), verdict=verdict, tested=case.null, named=False
+    )
 
 
-def apply_held_out(case: JudgedTable, decision: Decision) -> Decision:
-    """Decide on the first row with the held-out data.
+def apply_held_out(case: Hypotheses, decision: Decision) -> Decision:
+    """Decide on the first hypothesis with the held-out data.
 
-    The fitted data must still support the name after the second fit. Held-out data refuse it
+    The fitted data must still support the name after the second fit. It is refused
 
-    - if they are against it by the required gain;
     - if all data together bring less than the required gain;
     - if the deck with the effect fits worse than the calibrated deck.
 
-    Data that are insensitive to the effect are predicted equally well without it and have no vote.
-    All data together, or the fitted data by far, may refute calibration even so. The cause is then
-    outside the catalogue or, if no data are against the leader, the leader with something else.
+    Data that are insensitive to the effect are predicted equally well without it and bring nothing.
+    A refused effect refutes nothing: its gain may come from a wrong model of the errors. The test
+    of fit of calibration alone decides then, and the leader is one of several explanations.
     """
-    table, rules = case.table, case.rules
-    row = table.rows[decision.order[0]]
-    due, gain, votes = decision.due, table.gain(row), row.held_out_votes()
-    decision = replace(decision, votes=votes)
-    voted, worse = case.evidence_suffices(gain, votes, due, table.poles), _worse(row, rules.harm)
-    if voted and not worse:
-        return replace(
-            decision, verdict=row.verdict, reason=Reason.NAMED, named=True,
-            steps=steps(decision, Step(Reason.HELD_OUT, row.key)),
-        )  # fmt: skip
-    why = Reason.AGAINST if any(g < 0 for g in votes.given) else Reason.TOO_LITTLE
-    why = Reason.WORSE if voted else why
-    refused = replace(
-        decision, reason=why, named=False, steps=steps(decision, Step(why, row.key)), one_of=()
-    )
-    together = gain + votes.news
-    if together > due:
-        by, gain = Reason.ALL_DATA, together
-    elif gain > rules.conflict * due:
-        by = Reason.WHAT_WAS_FITTED
-    else:
-        return untested(case, refused)
-    one_of = (*tied(row, case.rows(decision.order), rules.tied), BEYOND) if voted else ()
-    return replace(
-        refused, verdict="not in catalogue", one_of=one_of, tested=None,
-        refuting=(by, min(1.0, table.families * exp(-gain / 2))),
-        steps=steps(refused, Step(by, row.key, why, names=one_of)),
-    )  # fmt: skip
-
-
-def _worse(row: Row, harm: float) -> bool:
-    """True if the deck with an effect has a larger Q than the calibrated deck.
-
-    Physics must not worsen the fitted data either. A fault of a few channels is compared on the
-    held-out data of these channels.
-    """
-    left = row.leaves()
-    compared = (left.fitted, left.held_out) if row.physics else (left.held_out,)
-    return any(with_it > harm * calibrated for calibrated, with_it in compared)
+    one = decision.order[0]
+    enough = case.suffices(case.gain(one), decision.due, lambda: one.numbers.news)
+    decision = decision.then(news=one.numbers.news)
+    if enough and not one.worse:
+        return decision.then(
+            Step(Reason.HELD_OUT, one), verdict=one.verdict, reason=Reason.NAMED, named=True
+        )
+    little = Reason.AGAINST if one.numbers.news < 0 else Reason.TOO_LITTLE
+    why = Reason.WORSE if enough else little
+    return untested(case, decision.then(Step(why, one), reason=why, named=False, one_of=()))

@@ -1,9 +1,10 @@
 """The reasons of a diagnosis: every step of a decision, as an enum and numbers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
+from typing import Any
 
-from .hypothesis_table import CalibratedDeck, Row, SetRow, Votes
+from .hypotheses import EffectSet, Hypothesis
 
 ALONE = "calibration alone"
 BEYOND = "an effect outside the catalogue"
@@ -35,67 +36,61 @@ class Reason(Enum):
     SET_REFUSED = auto()
     PERHAPS_PRESENT = auto()  # an effect that reaches a part of its required gain
     RIVAL_OF_MEMBER = auto()
-    ALL_DATA = auto()  # refute calibration alone
-    WHAT_WAS_FITTED = auto()  # refutes calibration alone
     NEXT = auto()  # explanation after a refused leader
     TIED = auto()  # explains the data equally well
     DOUBT = auto()  # calibration or the leader
-    DECK_STAYS = auto()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a decision.
 
     Attributes
     ----------
     reason : kind of step
-    key : of the row
+    of : the hypothesis
     why : reason of a refusal
-    member : index of the effect in a set
+    whole, member : the set of effects, and index of the effect in it
     names : of the explanations it is compared with
     """
 
     reason: Reason
-    key: str = ""
+    of: Hypothesis | None = None
     why: Reason | None = None
+    whole: EffectSet | None = None
     member: int = 0
     names: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Decision:
     """The outcome of a diagnosis, with its reasons.
 
     Attributes
     ----------
     verdict : one of the public verdicts
-    order : keys of the rows; the named one, or the best candidate, is first
+    order : the named hypothesis, or the best candidate, is first
     reason : why the decision ended
     due : gain required to name the first
     named : whether the first is named
     one_of : explanations that the data cannot separate
-    tested : key of the row whose test of fit is the absolute one
-    refuting : which data refute calibration alone where no row is tested, and their p
-    votes : evidence of the held-out data on the first
+    tested : the hypothesis whose test of fit is the absolute one
+    news : gain of the first on the held-out data
     whole : the set that is named
-    passed_over : names that were tested before the first, and the refusal of each
-    deck : source of the calibrated numbers
+    passed_over : hypotheses that were tested before the first, and the refusal of each
     steps : the steps that led to the decision
     """
 
     verdict: str
-    order: tuple[str, ...] = ()
+    order: tuple[Hypothesis, ...] = ()
     reason: Reason = Reason.NOTHING_DUE
     due: float = 0.0
     named: bool = False
     one_of: tuple[str, ...] = ()
-    tested: str | None = None
-    refuting: tuple[Reason, float] | None = None
-    votes: Votes | None = None
-    whole: SetRow | None = None
-    passed_over: tuple[tuple[str, Reason], ...] = ()
-    deck: CalibratedDeck = CalibratedDeck.PLAIN
+    tested: Hypothesis | None = None
+    news: float | None = None
+    whole: EffectSet | None = None
+    passed_over: tuple[tuple[Hypothesis, Reason], ...] = ()
     steps: tuple[Step, ...] = ()
 
     @property
@@ -103,12 +98,6 @@ class Decision:
         """True if a leader reached the required gain but is not named."""
         return not self.named and self.reason is not Reason.NOTHING_DUE
 
-
-def steps(decision: Decision, *more: Step) -> tuple[Step, ...]:
-    """The steps of a decision, followed by some more."""
-    return (*decision.steps, *more)
-
-
-def names_of(rows: tuple[Row, ...]) -> tuple[str, ...]:
-    """The names of the rows."""
-    return tuple(r.name for r in rows)
+    def then(self, *more: Step, **changes: Any) -> "Decision":
+        """A copy with further steps and changed fields."""
+        return replace(self, steps=(*self.steps, *more), **changes)

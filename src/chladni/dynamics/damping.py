@@ -1,14 +1,12 @@
 """Sources of damping ratios, and damping matrices."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..errors import ShapeError
 from .modes import ModalModel
-from .system import System
 
 Kind = Literal["g", "crit", "q"]
 
@@ -60,16 +58,3 @@ def _piecewise(x: np.ndarray, knots: np.ndarray, value: np.ndarray) -> np.ndarra
 def with_table(modal: ModalModel, table: DampingTable) -> ModalModel:
     """Set damping ratios of modes from a table at their frequencies."""
     return modal.with_damping(table.ratio(modal.frequency))
-
-
-def hysteretic(system: System, g: float) -> System:
-    """K (1 + i g): structural damping of the whole structure (PARAM,G)."""
-    return replace(system, K=sp.csr_array(system.K * (1 + 1j * g)))
-
-
-def modal_damping(system: System, modal: ModalModel) -> tuple[np.ndarray, np.ndarray]:
-    """V = U diag(d) Uᵀ with U = M Φ (n, r) and d = 2 ζ_r ω_r: damps only mode r by ζ_r.
-
-    With unit modal masses this is M X diag(2 ζ ω m) Xᵀ M (Abrahamsson and Kammer 2015, 26.14).
-    """
-    return system.M @ modal.shapes, 2 * modal.damping * 2 * np.pi * modal.frequency

@@ -8,11 +8,8 @@ import numpy as np
 
 from ..arguments import checked
 from ..arrays import readonly
-from ..dofs import label as text_of
 from ..dofs import positions
 from ..errors import LabelError, ShapeError, named
-from ..sparse.elimination_fronts import analyse, pattern
-from ..sparse.factor import factorise
 from .massless import static_solver
 from .modes import ModalModel
 from .system import System
@@ -263,40 +260,3 @@ def residual_flexibility(
 def residual_shift(modal: ModalModel, f_max: float) -> float:
     """σ = -λ/100 [rad²/s²], λ the highest kept, at least (2π f_max)²."""
     return -1e-2 * (2 * np.pi * max(float(modal.frequency.max(initial=0.0)), f_max)) ** 2
-
-
-def unit_columns(n: int, rows: np.ndarray) -> np.ndarray:
-    """Columns e_k of the identity (n, len(rows))."""
-    E = np.zeros((n, len(rows)))
-    E[rows, np.arange(len(rows))] = 1.0
-    return E
-
-
-def direct_frf(
-    system: System,
-    rows_out: np.ndarray,
-    rows_in: np.ndarray,
-    frequency: np.ndarray,
-    *,
-    structural: float = 0.0,
-) -> FRF:
-    """Receptance without modes, H(ω) = (K (1 + i g) - ω² M + i ω V)⁻¹: a slow, exact reference.
-
-    Parameters
-    ----------
-    rows_out, rows_in : int  rows of the system
-    structural : float       loss factor g of the whole structure [-]
-    """
-    frequency = np.asarray(frequency, dtype=float)
-    load = unit_columns(len(system.dofs), rows_in)
-    K = system.K * (1 + 1j * structural)
-    order = analyse(pattern(K, system.M, system.V), system.dofs[:, 0])
-    H = np.empty((len(frequency), len(rows_out), len(rows_in)), dtype=complex)
-    for k, omega in enumerate(2 * np.pi * frequency):
-        Z = K - omega**2 * system.M + 1j * omega * system.V
-        factor = factorise(Z, definite=False, fronts=order)
-        H[k] = factor.solve(load.astype(complex))[rows_out]
-    outputs, inputs = (
-        tuple(text_of(*system.dofs[r]) for r in rows) for rows in (rows_out, rows_in)
-    )
-    return FRF(H, frequency, outputs, inputs)

@@ -7,12 +7,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ..arrays import readonly
-from ..dofs import parse
-from ..errors import AccuracyError, LabelError, ShapeError, named
+from ..errors import LabelError, ShapeError
 from .frf import FRF, Quantity
 from .modes import ModalModel
-
-_ORDER = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,56 +80,6 @@ def state_space(
         raise LabelError(f"no state space of {quantity!r}; use receptance, mobility, accelerance")
     D = phi_out @ phi_in.T if quantity == "accelerance" else np.zeros((len(phi_out), len(phi_in)))
     return StateSpace(A, B, C(), D, tuple(outputs), tuple(inputs), quantity)
-
-
-def modal_model(system: StateSpace) -> ModalModel:
-    """Normal modes of a state space, φ_o φ_iᵀ = Re 2 i ω_d R_r with R_r the receptance's residue.
-
-    Shapes are given at the outputs, then at the inputs that are not outputs; a point that is both
-    fixes their scale. Real poles give no mode; the imaginary part of complex shapes is dropped.
-
-    Raises
-    ------
-    LabelError
-        If no label is both output and input.
-    AccuracyError
-        If a mode has no positive real residue at such a point: the structure is not passive.
-    """
-    drive = [text for text in system.outputs if text in system.inputs]
-    if not drive:
-        raise LabelError(
-            f"no label is both output and input, so the shapes' scale is unknown; outputs are "
-            f"{named(system.outputs)}, inputs {named(system.inputs)}"
-        )
-    p, X = np.linalg.eig(system.A)
-    left, right = system.C @ X, np.linalg.solve(X, system.B.astype(complex))
-    modes = [r for r in np.argsort(np.abs(p), kind="stable") if p[r].imag > 1e-9 * abs(p[r])]
-    order = _ORDER[system.quantity]
-    shapes = [
-        _shape(system, 2j * p[r].imag * np.outer(left[:, r], right[r]) / p[r] ** order, drive)
-        for r in modes
-    ]
-    also = [text for text in system.inputs if text not in system.outputs]
-    dofs = np.array([parse(text) for text in (*system.outputs, *also)])
-    return ModalModel(
-        np.abs(p[modes]) / (2 * np.pi),
-        -p[modes].real / np.abs(p[modes]),
-        dofs[:, 2:] * np.array(shapes).T.reshape(len(dofs), len(modes)),
-        dofs[:, :2],
-    )
-
-
-def _shape(system: StateSpace, product: np.ndarray, drive: list[str]) -> np.ndarray:
-    """φ at outputs and further inputs from its product φ_o φ_iᵀ (best rank one, real)."""
-    U, sigma, Vt = np.linalg.svd(product.real)
-    o, i = np.sqrt(sigma[0]) * U[:, 0], np.sqrt(sigma[0]) * Vt[0]
-    at = [(system.outputs.index(text), system.inputs.index(text)) for text in drive]
-    k, j = max(at, key=lambda pair: abs(o[pair[0]] * i[pair[1]]))
-    if o[k] * i[j] <= 0:
-        raise AccuracyError(f"a mode supplies energy at {system.outputs[k]}: not passive")
-    scale = np.sqrt(i[j] / o[k])
-    further = [n for n, text in enumerate(system.inputs) if text not in system.outputs]
-    return np.r_[o * scale, i[further] / scale]
 
 
 def _interleaved(a: np.ndarray, b: np.ndarray) -> np.ndarray:

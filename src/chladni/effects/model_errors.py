@@ -46,6 +46,7 @@ class MeshError(Effect):
     name = "mesh-error"
     claim = "the mesh is not infinitely fine"
     kind = "nuisance"
+    traits = Traits(writable=False)
 
     # (k, n) coordinates of the modes of the deck
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))

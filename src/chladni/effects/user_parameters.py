@@ -22,11 +22,11 @@ from ..model.properties import Part, SolidSection
 from .calibration_parameters import (
     OF_FIELDS,
     SHEET,
-    SPREAD,
     TUBE,
     LinearScale,
     calibration_parameter,
     linear_scale,
+    prior_sd,
     value,
     with_scaled,
 )
@@ -41,7 +41,7 @@ UNITS = {
     **dict.fromkeys(("E1", "E2", "G12"), "Pa"),
     **{"nu": "-", "nu12": "-", "K": "N/m", "M": "kg"},
 }
-SD = {**SPREAD, "nu": 0.1, "nu12": 0.2}  # prior sd of ln(value / deck's value); others SD_OTHERS
+SD = {"nu": 0.1, "nu12": 0.2}  # prior sd of ln(value / deck's value); others SD_OTHERS
 SD_OTHERS = 0.3  # joints and directional moduli are less certain
 NEAR_BOUND = 0.9  # of the way to a bound: the value counts as on the bound
 SAME = 1e-9
@@ -125,7 +125,7 @@ def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
     values = values_of(built.assembly, free)
     alike = len(values) > 0 and np.ptp(values) <= SAME * abs(values[0])
     scale, unit = (values[0], UNITS[free.field]) if alike else (1.0, "of the deck's")
-    sd = SD.get(free.field, SD_OTHERS) if free.sd is None else free.sd
+    sd = sd_of(parts, free)
     names = tuple(parts[k].name for k in free.positions)
     text = f"{free.field} of {', '.join(free.parts or names) or 'all'}"
     unknown = (Parameter(free.field, unit, 0.0, sd, float(scale), step=min(0.3, 2 * sd)),)
@@ -134,6 +134,15 @@ def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
         unknown, text, names, members=tuple(members), low=low, high=high, called=free.name,
         replaces=tuple(_whole_families(built.assembly, free)),
     )  # fmt: skip
+
+
+def sd_of(parts: Sequence[Part], free: FreeParameter) -> float:
+    """Standard deviation of ln(value / deck's value): the user's, or else that of the field."""
+    if free.sd is not None:
+        return free.sd
+    if free.field in OF_FIELDS:
+        return prior_sd(parts, free.field, free.positions)
+    return SD.get(free.field, SD_OTHERS)
 
 
 def _whole_families(assembly: Assembly, free: FreeParameter) -> Iterator[str]:

@@ -16,22 +16,6 @@ from ..errors import LabelError, ShapeError
 Estimator = Literal["H1", "H2", "Hv"]
 
 
-def blocks(x: np.ndarray, n: int, overlap: float = 0.5) -> np.ndarray:
-    """Stretches of n samples of a continuous record, (channels, N) -> (blocks, channels, n).
-
-    >>> blocks(np.arange(6.0)[None], 4, 0.5)[:, 0]
-    array([[0., 1., 2., 3.],
-           [2., 3., 4., 5.]])
-    """
-    if not 0 <= overlap < 1:
-        raise ShapeError(f"an overlap of {overlap:g} leaves no step; it lies in [0, 1)")
-    step = max(1, round(n * (1 - overlap)))
-    starts = np.arange(0, x.shape[-1] - n + 1, step)
-    if len(starts) == 0:
-        raise ShapeError(f"blocks of {n} samples do not fit a record of {x.shape[-1]}")
-    return np.stack([x[:, k : k + n] for k in starts])
-
-
 def window(name: str, n: int, decay: float = 0.01) -> np.ndarray:
     """Window of n samples: "rectangular", "hann" or "exponential" (falls to ``decay``).
 

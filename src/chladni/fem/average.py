@@ -163,32 +163,3 @@ def _exchanged(rows: Rows, owner: int, mean: Average) -> Rows:
     G = -np.linalg.solve(A[:, m], A[:, ~m])
     row, column = np.nonzero(G)
     return Rows(all_dofs[m], np.full(len(dof), owner), row, all_dofs[~m][column], G[row, column])
-
-
-def average_weights(r: np.ndarray, R: float) -> tuple[np.ndarray, np.ndarray]:
-    """w(r/R) = (1 - r²/R²)² inside R, 0 outside, and dw/dR [1/m]: smooth in R.
-
-    With these weights the radius of a spider is a continuous parameter: weights and their slopes
-    are zero where points enter or leave.
-
-    >>> w, dw = average_weights(np.array([0.0, 1.0, 3.0]), 2.0)
-    >>> w.tolist(), dw.tolist()
-    ([1.0, 0.5625, 0.0], [0.0, 0.375, 0.0])
-    """
-    s = np.minimum(np.asarray(r, dtype=float) / R, 1.0)
-    return (1 - s**2) ** 2, 4 * (1 - s**2) * s**2 / R
-
-
-def average_derivative(
-    S: np.ndarray, w: np.ndarray, dw: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """G = A⁻¹ Sᵀ W and dG = A⁻¹ Sᵀ dW (1 - S G), with A = Sᵀ W S.
-
-    Parameters
-    ----------
-    S : (t, 6)       motion of each dof in a rigid motion of the reference (``lever``)
-    w, dw : (t,)     weights and their derivative by a parameter, such as a radius
-    """
-    inverse = np.linalg.inv(S.T @ (w[:, None] * S))
-    G = inverse @ S.T * w
-    return G, (inverse @ S.T * dw) @ (np.eye(len(w)) - S @ G)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..model.assembly import Assembly, Beams, Bushes, Masses, Scalars, Shells, picked
-from . import beam, shell, solid
+from . import shell
 from .assemble import PIECE, Structure, over_all_motions
 from .shell_section import section_arrays
 
@@ -53,14 +53,6 @@ def part_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
     return _shares(structure, phi, 2, structure.system.K)
 
 
-def part_kinetic_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
-    """Share φᵀ M_p φ / φᵀ M φ of each part in the kinetic energy (parts, r).
-
-    The rest to 1 is in concentrated masses.
-    """
-    return _shares(structure, phi, 0, structure.system.M)
-
-
 def _shares(structure: Structure, phi: np.ndarray, which: int, whole: sp.csr_array) -> np.ndarray:
     """φᵀ A_p φ / φᵀ A φ, A the M (0) or K (2) of every part."""
     u = np.asarray(structure.T @ phi)
@@ -105,24 +97,3 @@ def shell_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
         u_e = u[geo.nodes[rows]].reshape(len(K), -1, phi.shape[1])
         energy[rows] = 0.5 * np.einsum("eir,eij,ejr->er", u_e, K, u_e, optimize=True)
     return energy
-
-
-def beam_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
-    """Strain energy ½ uᵀ K_e u of every beam in each motion: (beams, r) [J]."""
-    nodes, K, _ = beam.stiffness_and_mass(structure.assembly)
-    return _quadratic(structure, phi, nodes, K, 6)
-
-
-def solid_energies(structure: Structure, phi: np.ndarray) -> list[np.ndarray]:
-    """Strain energy of every solid in each motion, one (m, r) a group of solids [J]."""
-    groups = solid.stiffness_and_mass(structure.assembly)
-    return [_quadratic(structure, phi, nodes, K, 3) for nodes, K, _ in groups]
-
-
-def _quadratic(
-    structure: Structure, phi: np.ndarray, nodes: np.ndarray, K: np.ndarray, motions: int
-) -> np.ndarray:
-    """½ uᵀ K_e u with the first 3 or all 6 motions of the nodes (m, k): (m, r)."""
-    u = np.asarray(structure.T @ phi).reshape(len(structure.assembly.points), 6, -1)
-    u_e = u[nodes, :motions].reshape(len(nodes), K.shape[1], phi.shape[1])
-    return 0.5 * np.einsum("eir,eir->er", u_e, K @ u_e)

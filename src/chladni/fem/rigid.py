@@ -16,9 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from .. import dofs as labels
 from ..errors import ModelError
 from ..model.assembly import Assembly, Average, Equation, RigidBody
-from .average import average_derivative as average_derivative
 from .average import average_rows, lever
-from .average import average_weights as average_weights
 from .constraint import Rows
 from .spring import direction
 

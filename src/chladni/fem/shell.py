@@ -220,16 +220,6 @@ def mass_by_thickness(
     return M
 
 
-def areal_mass(geo: ShellGeometry, t: np.ndarray, rho: np.ndarray, nsm: np.ndarray) -> np.ndarray:
-    """m_k = ∫ (ρt + nsm) N_k dA (m, 4) [kg], the share of each corner."""
-    share = np.zeros((len(geo), 4))
-    for rows in _chunks(geo):
-        weight, N = _quadrature(geo[rows])
-        areal = rho[rows, None] * (t[rows] @ N.T) + nsm[rows, None]
-        share[rows] = (areal * weight) @ N
-    return share
-
-
 def turned(Q: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Q in the element frame, Tᵀ Q T, from the material frame turned by ``turn`` (m, 3, 3).
 

@@ -54,11 +54,6 @@ class ShellGeometry:
     def __getitem__(self, which: np.ndarray | slice) -> Self:
         return replace(self, **{name: value[which] for name, value in vars(self).items()})
 
-    @property
-    def corner_count(self) -> np.ndarray:
-        """3 or 4 for every shell (m,)."""
-        return np.where(self.triangle, 3, 4)
-
 
 def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
     """Frames, flattened corners and warp of every shell.

@@ -1,4 +1,4 @@
-"""Responses of a structure: static, enforced and harmonic.
+"""Responses of a structure to loads and to motions of its supports.
 
 Loads and motions are (6n, k) over all points in the basic frame: six motions a point, one column a
 load case. Dependent dofs may have loads, which Tᵀ transfers to their independent dofs.
@@ -12,62 +12,11 @@ import scipy.sparse as sp
 
 from ..dofs import COMPONENTS, rows
 from ..dynamics.modes import ModalModel
-from ..errors import LabelError, ModelError
-from ..model.analysis import Analysis, Subcase
+from ..errors import LabelError
 from ..model.assembly import Assembly
 from ..sparse.factor import factorise
 from .assemble import Structure, over_all_motions, structure
 from .energy import rigid_motions
-
-
-def static(built: Structure, load: np.ndarray) -> np.ndarray:
-    """Displacements u = T K⁻¹ Tᵀ f (6n, k) [m, rad] under loads f (6n, k) [N, N m].
-
-    Raises
-    ------
-    ModelError
-        If the structure can move without strain.
-    """
-    return built.T @ _solved(built.system.K, built.T.T @ load, built.system.dofs)
-
-
-def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
-    """K⁻¹ f, refined once; raise ``ModelError`` if K is singular to working precision."""
-    try:
-        factor = factorise(K, nodes=dofs[:, 0])
-    except ModelError as fault:
-        raise ModelError(f"the structure can move freely, hold it by supports: {fault}") from fault
-    q = factor.solve(f)
-    q = q + factor.solve(f - K @ q)
-    gap, scale = np.abs(K @ q - f).max(initial=0), np.abs(f).max(initial=0)
-    if not gap <= 1e-6 * scale:
-        raise ModelError(
-            f"the structure can move freely, hold it by supports: {gap:.1e} N of {scale:.1e} N "
-            "meet no resistance"
-        )
-    return q
-
-
-def subcase_statics(assembly: Assembly, analysis: Analysis, case: Subcase) -> np.ndarray:
-    """Displacements (6n, 1) of one static subcase: its loads, weight and enforced supports.
-
-    Parameters
-    ----------
-    assembly : with the supports and equations of this subcase
-    """
-    load = np.zeros((6 * len(assembly.ids), 1))
-    if chosen := analysis.loads.get(case.load):
-        np.add.at(load[:, 0], 6 * chosen.rows + chosen.components - 1, chosen.values)
-        if np.any(chosen.gravity):
-            load += inertia_load(assembly, chosen.gravity[:, None])
-    moved = [analysis.prescribed[k] for k in {case.load, case.spc} if k in analysis.prescribed]
-    if not moved:
-        return static(structure(assembly), load)
-    dofs = np.column_stack(
-        [np.concatenate([getattr(m, name) for m in moved]) for name in ("rows", "components")]
-    )
-    values = np.concatenate([m.values for m in moved])
-    return enforced(assembly, dofs, values[:, None], load)
 
 
 def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
@@ -79,32 +28,6 @@ def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
     a = np.asarray(acceleration, dtype=float)
     field = rigid_motions(assembly)[:, : len(a)] @ a
     return over_all_motions(assembly)[0] @ field
-
-
-def enforced(
-    assembly: Assembly, dofs: np.ndarray, values: np.ndarray, load: np.ndarray | None = None
-) -> np.ndarray:
-    """Displacements (6n, k) with some enforced dofs q_s: K_ff q_f = (Tᵀ f)_f - K_fs q_s.
-
-    Parameters
-    ----------
-    dofs : (s, 2) int     row of points and component 1-6 in displacement frames, supports or not
-    values : (s, k)       [m, rad]
-    load : (6n, k)        additional forces [N, N m]
-
-    Raises
-    ------
-    LabelError
-        If an enforced dof depends on others, or has no stiffness.
-    """
-    built, s, f = _split(assembly, dofs)
-    q = np.zeros((len(built.system.dofs), np.shape(values)[1]))
-    q[s] = values
-    force = -(built.system.K @ q)
-    if load is not None:
-        force = force + built.T.T @ load
-    q[f] = _solved(sp.csr_array(built.system.K[f][:, f]), force[f], built.system.dofs[f])
-    return built.T @ q
 
 
 def _split(assembly: Assembly, dofs: np.ndarray) -> tuple[Structure, np.ndarray, np.ndarray]:
@@ -214,14 +137,3 @@ def harmonic(
         Z = sp.csr_array(system.K + 1j * omega * system.V - omega**2 * system.M)
         H[k] = pick @ factorise(Z, nodes=system.dofs[:, 0], definite=False).solve(f)
     return H
-
-
-def motion_at(assembly: Assembly, dofs: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Components of u (6n, k) at (point id, component 1-6) in displacement frames (n_out, k)."""
-    dofs = np.asarray(dofs, dtype=np.int64)
-    at, component = assembly.rows(dofs[:, 0]), dofs[:, 1] - 1
-    first = 6 * at + 3 * (component // 3)
-    axes = np.eye(3)[component % 3]
-    if assembly.axes is not None:
-        axes = assembly.axes[at, component % 3]
-    return np.einsum("oi,oik->ok", axes, u[first[:, None] + np.arange(3)])

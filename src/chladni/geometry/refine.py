@@ -1,8 +1,7 @@
 """Refinement of a structure, every shell split in four and every beam in two, to find mesh error.
 
-New nodes lie on the deck's own facets. Cubic edges from vertex normals (Vlachos et al. 2001, Curved
-PN triangles) are closer to a cylinder, but they round the flat strip between two creases. On a
-tailgate of 20 mm they left 1.4 % of the frequencies of a mesh of 10 mm, and chords leave 0.6 %.
+New nodes of shells lie on the smooth surface through the old ones, and on the deck's own facets at
+folds (:mod:`.smooth_sides`).
 """
 
 from dataclasses import replace
@@ -12,6 +11,7 @@ import numpy as np
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Shells, concatenated, picked
 from .beam_lines import member_beams
+from .smooth_sides import bulges
 
 SAME_AXES = 1e-6  # of unit vectors: frames of neighbours that count as equal for supports
 
@@ -36,10 +36,12 @@ def _finer_shells(assembly: Assembly) -> tuple[Assembly, Middles]:
         return assembly, (np.zeros((0, 2), int), 0)
     tri = shells.triangle
     edges, of = _edges(shells.nodes)
-    middle = assembly.points[edges].mean(axis=1)
+    rise = bulges(assembly.points, shells.nodes, edges, of)
     n, m = len(assembly.points), len(edges)
     quads = shells.nodes[~tri]
-    points = np.concatenate([assembly.points, middle, assembly.points[quads].mean(axis=1)])
+    middle = assembly.points[edges].mean(axis=1) + rise
+    centre = assembly.points[quads].mean(axis=1) + rise[of[~tri]].sum(axis=1) / 2  # Coons
+    points = np.concatenate([assembly.points, middle, centre])
     grown, _ = with_points(assembly, points[n:])
     grown = _held_between(grown, np.arange(n, n + m), edges)
     grown = _held_between(grown, np.arange(n + m, len(points)), quads)

@@ -36,10 +36,6 @@ class MassMeasurement:
     mass: float
     sd: float
 
-    def agrees(self, weight: float) -> bool:
-        """True for a mass [kg] within ``APART`` standard deviations."""
-        return abs(weight - self.mass) <= APART * self.sd
-
 
 @dataclass(frozen=True, eq=False)
 class Fit:

@@ -16,6 +16,7 @@ class NamedEffect:
     where : its place
     parameters : its numbers, as they were found
     gain : increase of -2 ln evidence without this one, all others fitted again
+    written : its numbers in the updated deck, which is a fit without nuisances
     """
 
     name: str
@@ -24,6 +25,7 @@ class NamedEffect:
     where: Location = field(default_factory=Location)
     parameters: tuple[Estimate, ...] = ()
     gain: float | None = None
+    written: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Alternative:
 class Scores:
     """Q, mean |log10(H_model/H_test)|² over channels and lines, of one set of samples.
 
-    The first three belong to decks as they are written, without hidden terms.
+    The first three belong to decks as they are written.  Each deck is a fit of its own.
 
     Attributes
     ----------
@@ -56,23 +58,26 @@ class Scores:
     calibrated : the deck with calibration parameters fitted, no effect in it
     with_effect : the updated deck
     floor : what the noise of the recording alone leaves
-    calibrated_with_mesh_error, with_mesh_error : the same two decks with the mesh error (and the
-        unknown gain) that the fit found; the held-out data judge an effect by these
-    with_scatter : what is left when scatter within the parts and each mode's own error are fitted
+    with_nuisances : the last explanation with all errors that no deck contains: mesh, joints,
+        folds, scatter
     """
 
     nominal: float | None = None
     calibrated: float | None = None
     with_effect: float | None = None
     floor: float | None = None
-    calibrated_with_mesh_error: float | None = None
-    with_mesh_error: float | None = None
-    with_scatter: float | None = None
+    with_nuisances: float | None = None
 
     @property
     def after(self) -> float | None:
         """Q of the updated deck; without a search, of the calibrated deck."""
         return self.calibrated if self.with_effect is None else self.with_effect
+
+    def last_step(self, named: bool) -> dict[str, float | None]:
+        """Q by deck: the last one, and the one before it that it must beat."""
+        if named:
+            return {"calibrated": self.calibrated, "updated": self.after}
+        return {"given": self.nominal, "calibrated": self.after}
 
 
 @dataclass(frozen=True)

@@ -1,34 +1,32 @@
-"""Rows of numbers and flags that a decision reads from fitted hypotheses."""
+"""Fitted hypotheses in the form that a decision reads."""
 
 from collections.abc import Sequence
 
-from ..decision.hypothesis_table import NULL, Row
+from ..decision.hypotheses import Hypothesis, Numbers
 from ..decision.tied import leading
+from ..effects.effect import Effect
 from .hypothesis_fit import HypothesisFit
 from .implausible_values import strained
 
 
-def row_of(hypothesis: HypothesisFit, key: str = "") -> Row:
-    """A hypothesis as a row; its key is the name of its effect unless one is given."""
-    effect, fit = hypothesis.effect, hypothesis.fit
+def hypothesis_of(fitted: HypothesisFit, numbers: Numbers | None = None) -> Hypothesis:
+    """A fitted hypothesis as a decision reads it; calibration alone has no names."""
+    effect, fit = fitted.effect, fitted.fit
+    if type(effect) is Effect:
+        return Hypothesis((), fitted.neg2_log_evidence, numbers, strained=bool(strained(fit)))
     known = effect.remarks(fit.of(effect), fit.sd(effect))
-    return Row(
-        key or effect.name,
-        tuple(e.name for e in hypothesis.effects),
-        hypothesis.neg2_log_evidence,
-        physics=hypothesis.physics,
-        channels=bool(hypothesis.channels),
+    return Hypothesis(
+        tuple(e.name for e in fitted.effects),
+        fitted.neg2_log_evidence,
+        numbers,
+        physics=fitted.physics,
+        channels=bool(fitted.channels),
         expected=effect.expected,
         becomes=known.becomes,
         nearly=known.nearly,
         sound=not known.implausible,
         strained=bool(strained(fit)),
     )
-
-
-def row_of_null(null: HypothesisFit) -> Row:
-    """Calibration alone."""
-    return Row(NULL, (), null.neg2_log_evidence, strained=bool(strained(null.fit)))
 
 
 def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[HypothesisFit]:
@@ -40,5 +38,5 @@ def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[Hyp
     """
     if not hypotheses:
         return []
-    k = leading([row_of(t) for t in hypotheses], null)
+    k = leading([hypothesis_of(t) for t in hypotheses], null)
     return [hypotheses[k], *hypotheses[:k], *hypotheses[k + 1 :]]

@@ -20,9 +20,7 @@ _Q = {  # key: field of Scores
     "Q_calibrated": "calibrated",
     "Q_with_effect": "with_effect",
     "Q_floor": "floor",
-    "Q_calibrated_with_mesh_error": "calibrated_with_mesh_error",
-    "Q_with_mesh_error": "with_mesh_error",
-    "Q_with_scatter": "with_scatter",
+    "Q_with_nuisances": "with_nuisances",
 }
 _FIT = {  # key: field of Agreement
     "gain_over_calibration": "two_log_bayes_factor",

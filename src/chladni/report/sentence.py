@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..effects.registry import families
-from ..inference.result import Agreement, NamedEffect, Scores
+from ..inference.result import NamedEffect, Scores
 from ..workflows.diagnosis_result import DiagnosisResult
 from .words import number
 
@@ -17,7 +17,7 @@ def sentence(result: DiagnosisResult) -> str:
 
 def _sentence(result: DiagnosisResult) -> str:
     """State the verdict in one sentence."""
-    verdict, gain = result.verdict, _gain(result.agreement)
+    verdict, gain = result.verdict, _gain(result)
     what = _each(result.effects)
     if verdict == "missing physics":
         return f"{'; and '.join(_lacks(result))}{'' if result.one_of else gain}."
@@ -95,14 +95,19 @@ def _tied(result: DiagnosisResult) -> str:
     return ", ".join(names) + "".join(f"; to settle it, {check}" for check in checks)
 
 
-def _gain(agreement: Agreement | None) -> str:
-    held = Scores() if agreement is None else agreement.held_out
-    if not held.nominal or held.after is None:
+def _gain(result: DiagnosisResult) -> str:
+    """State Q of the last deck and of the one before it, on data that only report."""
+    held = Scores() if result.agreement is None else result.agreement.held_out
+    (one, before), (last, after) = held.last_step(bool(result.effects)).items()
+    if not before or after is None:
         return ""
-    mesh, said = held.with_mesh_error, ""
-    if mesh is not None and mesh < held.nominal < held.after:
-        said = f", and to {number(mesh, 3)} with the mesh error, which a deck cannot contain"
+    known, said = held.with_nuisances, ""
+    if known is not None and known < before < after:
+        said = (
+            f", and to {number(known, 3)} with errors of mesh, joints and scatter, which a deck "
+            "cannot contain"
+        )
     return (
-        f"; on held-out data the deviation Q goes from {number(held.nominal, 3)} to "
-        f"{number(held.after, 3)}{said}"
+        f"; on held-out data the deviation Q goes from {number(before, 3)} ({one} deck) to "
+        f"{number(after, 3)} ({last} deck){said}"
     )

@@ -57,10 +57,10 @@ def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
     """Held-out misfit, frequencies and mass, before and after."""
     facts, agreement, mass = [], result.agreement or Agreement(), result.mass
     held = agreement.held_out
-    if held.nominal is not None and held.after is not None:
-        change = percent(held.after, held.nominal)
-        text = f"{number(held.nominal, 3)} → {number(held.after, 3)} ({change})"
-        facts.append(("Held-out misfit Q", text))
+    (one, before), (last, after) = held.last_step(bool(result.effects)).items()
+    if before is not None and after is not None:
+        text = f"{one} deck {number(before, 3)} → {last} deck {number(after, 3)}"
+        facts.append(("Held-out misfit Q", f"{text} ({percent(after, before)})"))
     off = [_mean_off(result, key) for key in ("before_hz", "after_hz")]
     if off[0] is not None:
         text = " → ".join(f"{number(100 * x, 2)} %" for x in off if x is not None)
@@ -194,13 +194,23 @@ def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
         blocks.append(Table(heads, gains, ("effect",)))
     for effect in effects:
         blocks.append(Text([": ".join(t for t in (effect.name, effect.claim) if t)]))
-        rows = [(p.name, _interval(p)) for p in effect.parameters]
+        rows = _estimates(effect)
         place = [(name, text) for name, text in _place(effect.where) if text]
         if rows:
-            blocks.append(Table(("parameter", "value (95 % interval)"), rows, ("parameter",)))
+            columns = ("parameter", "found (95 % interval)", "updated deck")[: len(rows[0])]
+            blocks.append(Table(columns, rows, ("parameter",)))
         if place:
             blocks.append(Table(("where", ""), place, ("where", "")))
     return blocks
+
+
+def _estimates(effect: NamedEffect) -> list[tuple[str, ...]]:
+    """A row for each number of an effect: as found, and as the updated deck has it."""
+    rows: list[tuple[str, ...]] = [(p.name, _interval(p)) for p in effect.parameters]
+    if not effect.written:
+        return rows
+    each = zip(rows, effect.parameters, effect.written, strict=True)
+    return [(*row, quantity(value, p.unit)) for row, p, value in each]
 
 
 def _interval(p: Estimate) -> str:
@@ -269,8 +279,11 @@ def _scores(result: DiagnosisResult) -> list[Block]:
         ("nominal deck", "nominal", False),
         ("calibrated deck without an effect", "calibrated", True),
         *((("updated deck", "with_effect", True),) if result.effects else ()),
-        ("deck above, with the fitted mesh error", "with_mesh_error", False),
-        ("without the part that scatter can explain", "with_scatter", False),
+        (
+            "with errors of mesh, joints and scatter, which no deck contains",
+            "with_nuisances",
+            False,
+        ),
         ("floor: the recording's noise alone", "floor", False),
     )
     rows = []

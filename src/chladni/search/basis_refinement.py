@@ -10,9 +10,9 @@ from ..fem.modelled import modelled
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from ..inference.joint_fit import with_priors
 from ..inference.likelihood import Responses
+from ..inference.map_fit import fit
 from ..inference.pole_data import Poles
 from ..reduced.accuracy import LIMIT, Accuracy, accuracy
-from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import reduced_problem
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .preparation import SOLVED, updating_problem
@@ -49,14 +49,14 @@ class Refinement:
 
 
 def refined(
-    question: Question, prepared: Prepared, hypothesis: HypothesisFit, held: bool = False
+    question: Question, prepared: Prepared, hypothesis: HypothesisFit, written: bool = False
 ) -> Refinement:
     """Fit a hypothesis again on an accurate reduced model, and report the model's error.
 
     Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
     computed again where the effect changes that structure. Otherwise the basis is extended by its
     missing vectors until its error is at most ``LIMIT``. All parameters are then fitted again from
-    their last values, or ``held`` at them.
+    their last values. The form of a deck (``written``) keeps the learned error of the model.
     """
     problem = prepared.problem
     if any(e.traits.remakes_structure for e in hypothesis.effects):
@@ -69,15 +69,12 @@ def refined(
         model, begun = found.refined(hypothesis.model), hypothesis.fit
         data = hypothesis.data.rebased(model)
         try:
-            if held:
-                state = evaluate(model, begun.effects, begun.x)
-                fit = replace(begun, state=state, data=data)
-            else:
-                fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
+            again = fit if written else fitted
+            made = again(model, begun.effects, data, problem.mass_measurement, begun.x).kept()
         except ModelError as error:  # the coarse basis hid an impossible structure
             note = f"{note}; the fit on the refined basis failed: {error}"
             break
-        hypothesis = replace(hypothesis, fit=fit, model=model)
+        hypothesis = replace(hypothesis, fit=made, model=model)
         found = _accuracy(problem, hypothesis)
         note = f"{note}; on the refined basis {found.worst:.2%}"
     return Refinement(hypothesis, note, found.worst)

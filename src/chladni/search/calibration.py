@@ -27,13 +27,13 @@ from ..inference.likelihood import Responses
 from ..inference.linear_model import Squares
 from ..inference.map_fit import Fit, MassMeasurement, descend, fit, linearised, unknowns
 from ..inference.pole_data import Poles
+from ..inference.written_hypothesis import as_written
 from ..parallel import in_parallel
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
 from .diagnosis import (
     Diagnosis,
     best_base_fit,
-    fit_of_the_deck,
     named_by_fits,
     nominal_starts,
     without_effects,
@@ -110,7 +110,8 @@ def calibration(
     predicted = () if quick else tuple(bands(problem, null, every))
     null = replace(null, fit=with_frozen(whole, null))
     notes = tuple(_notes(known, basins, ends, sample))
-    found = Diagnosis(nominal, null, fit_of_the_deck(problem, null), (), notes=notes)
+    plain = as_written(null, problem.mass_measurement)
+    found = Diagnosis(nominal, null, plain, (), notes=notes)
     own = calibration_positions(null.fit.effects)
     study = CalibrationStudy(
         known, 0 if quick else settings.starts, basins[:BEST], tuple(_names(null.fit)),

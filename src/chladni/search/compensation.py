@@ -16,6 +16,10 @@ from ..inference.residual_localisation import ResidualLocalisation
 from ..inference.result import Agreement, MassComparison
 from .result_parts import foretells_worse
 
+CURES = (
+    'try chladni diagnose, [test] gain = "unknown" if the level is uncertain, or position_sd for '
+    "uncertain places"
+)
 LEAST = 0.005  # smaller changes of ln mass and stiffness are not named
 BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0}  # powers in the bending stiffness of a part
 
@@ -44,7 +48,8 @@ def compensating(fit: Fit, result: Scored, weighed: MassMeasurement | None) -> t
     fit : of the deck that is written
     """
     reasons = (
-        *foretells_worse(result.agreement), *_leaves_the_scales(result.mass, weighed),
+        *(f"{why}; {CURES}" for why in foretells_worse(result.agreement)),
+        *_leaves_the_scales(result.mass, weighed),
         *implausible_values(fit),
     )  # fmt: skip
     spot = result.residual_localisation

@@ -1,14 +1,15 @@
 """Sentences of a decision: the only module that puts its reasons into English."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
-from ..decision.hypothesis_table import Row, SetRow, Votes, after, refined
+from ..decision.hypotheses import EffectSet, Hypotheses, Hypothesis
 from ..decision.reasons import ALONE, Decision, Reason, Step
 from ..effects.registry import family
 from ..ema.odds import evidence_in_words
 from ..inference.adequacy import FitTest
-from .deciding import Measured, numbers
+from .deciding import Evaluated
 from .diagnosis import Diagnosis
 from .question import Prepared
 
@@ -18,30 +19,33 @@ REFUSED = {
     Reason.TOO_LITTLE: "all data together give too little evidence",
     Reason.WORSE: "the deck with it fits worse than the calibrated deck",
 }
-DATA = {Reason.ALL_DATA: "all data", Reason.WHAT_WAS_FITTED: "the fitted data"}
 
 
 def concluded(
-    prepared: Prepared, found: Diagnosis, decision: Decision, known: Measured
+    prepared: Prepared, found: Diagnosis, case: Hypotheses, decision: Decision
 ) -> tuple[Diagnosis, tuple[str, ...]]:
     """The diagnosis that follows from a decision, and reasons not to trust it."""
-    words = DecisionWords(prepared, decision, known)
-    first = decision.order[0] if decision.order else ""
-    whole, notes = decision.whole, (*found.notes, *words.sentences())
+    words = DecisionWords(prepared, case, decision)
+    order, whole = [_of(h) for h in decision.order], decision.whole
     settled = words.settled() if decision.named else ""
     said = replace(
-        found, verdict=decision.verdict, notes=notes,
-        hypotheses=tuple(known.fits[k] for k in decision.order),
+        found, verdict=decision.verdict, notes=(*found.notes, *words.sentences()),
+        hypotheses=tuple(h.fit for h in order),
         adequacy=words.test(),
         one_of=(*decision.one_of, settled) if settled else decision.one_of,
         gains=whole.gains if decision.named and whole else (),
-        refused=words.refusal(words.row(first).name, decision.reason) if decision.refused else "",
-        passed_over=tuple((name, words.refusal(name, why)) for name, why in decision.passed_over),
+        refused=words.refusal(decision.order[0], decision.reason) if decision.refused else "",
+        passed_over=tuple((h.name, words.refusal(h, why)) for h, why in decision.passed_over),
     )  # fmt: skip
     if not decision.named:
-        return replace(said, plain=numbers(prepared, found, known, decision.deck)), ()
-    distrust = (r.distrust for k, r in known.refinements.items() if refined(k) == first)
-    return replace(said, written=known.written[first]), next(distrust, ())
+        return said, tuple(words.doubts())
+    return replace(said, written=order[0].written), order[0].distrust
+
+
+def _of(one: Hypothesis | None) -> Evaluated:
+    """The fit of a hypothesis, with all tests that were made of it."""
+    assert one is not None
+    return cast(Evaluated, one.numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,70 +53,67 @@ class DecisionWords:
     """The sentences of a decision and of the fits that were made for it."""
 
     prepared: Prepared
+    case: Hypotheses
     decision: Decision
-    known: Measured
 
     def sentences(self) -> tuple[str, ...]:
         """One sentence for every step that has something to report."""
         every = (_SENTENCES[s.reason](self, s) for s in self.decision.steps)
         return tuple(text for text in every if text)
 
-    def row(self, key: str) -> Row:
-        """A row of the table."""
-        return self.known.table.rows[key]
-
-    def gain(self, key: str) -> float:
-        """Gain of a row over calibration alone, in -2 ln evidence."""
-        return self.known.table.gain(self.row(key))
-
-    def whole(self, step: Step) -> SetRow:
-        """The set that a step is about."""
-        return next(s for s in self.known.table.sets if s.key == step.key)
-
     def test(self) -> FitTest | None:
-        """The absolute test: that of the tested row, or the evidence that refutes calibration."""
-        if self.decision.refuting is None:
-            return self.known.tests.get(self.decision.tested or "")
-        step = next(s for s in self.decision.steps if s.reason is self.decision.refuting[0])
-        return FitTest(False, self.decision.refuting[1], self._refuting(step), self._text(step.key))
+        """The absolute test of fit, of the hypothesis that was tested."""
+        tested = self.decision.tested
+        return None if tested is None else _of(tested).chances.test
 
-    def refusal(self, name: str, why: Reason) -> str:
+    def refusal(self, one: Hypothesis, why: Reason) -> str:
         """Reason why a hypothesis is not named."""
-        tests = self.known.tests
+        made = _of(one)
         if why is Reason.TOO_FEW:
             return self.prepared.too_little
         if why is Reason.NOT_FITTED:
-            return f"it could not be fitted again: {self.known.failed[name]}"
+            return f"it could not be fitted again: {made.lost}"
         if why is Reason.DAMPING:
-            return next(t.what for k, t in tests.items() if k.startswith(after(refined(name), "")))
+            assert made.after is not None
+            return made.after.what
         if why is Reason.UNFIT:
-            test = tests.get(refined(name)) or tests[name]
-            return f"its residual is not explained: {test.what}"
+            assert made.chances.test is not None
+            return f"its residual is not explained: {made.chances.test.what}"
         return REFUSED[why]
+
+    def doubts(self) -> Iterator[str]:
+        """Reason not to trust calibration where a refused effect gains what is required."""
+        decision = self.decision
+        if not decision.refused or decision.news is None:
+            return
+        lead = decision.order[0]
+        gain = self.case.gain(lead) + decision.news
+        if decision.one_of and gain > decision.due:
+            yield (
+                f"all data together give {lead.name} {gain:.0f} in -2 ln evidence over "
+                f"calibration alone, but {self.refusal(lead, decision.reason)}: a cause outside "
+                "the catalogue may imitate it"
+            )
 
     def settled(self) -> str:
         """Measurements that would separate the explanations that these data cannot separate."""
         return settled_by(self.decision.one_of)
 
-    def _text(self, key: str) -> str:
-        return self.known.fits[key].effect.text
-
     def _tested(self, step: Step) -> str:
-        test, name = self.known.tests.get(step.key), self.row(step.key).name or ALONE
-        if test is None:
+        test, one = _of(step.of).chances.test, step.of
+        if test is None or one is None:
             return ""
         note = (
-            f"{test.p:.0%} of recordings drawn from a right model are as unusual with {name}: "
-            f"{test.what}"
+            f"{test.p:.0%} of recordings drawn from a right model are as unusual with "
+            f"{one.name or ALONE}: {test.what}"
         )
         if test.passes:
             return note
-        last = step.key == self.decision.tested and not self.decision.named
+        last = one is self.decision.tested and not self.decision.named
         return f"{note}, {test.where}{UNEXPLAINED if last else ''}"
 
     def _refined(self, step: Step) -> str:
-        refinement = self.known.refinements.get(step.key)
-        return "" if refinement is None else refinement.note
+        return _of(step.of).note
 
     def _too_few(self, step: Step) -> str:
         return (
@@ -122,45 +123,30 @@ class DecisionWords:
         )
 
     def _supported_by_all(self, step: Step) -> str:
-        row, data = self.row(step.key), "poles" if self.known.table.poles else "data"
+        one, data = _one(step), "poles" if self.case.poles else "data"
         return (
-            f"{row.name} gained {self.gain(step.key):.1f} in -2 ln evidence on the {data} that "
-            f"were fitted, and {row.held_out_votes().news:.1f} on the held-out data: together "
+            f"{one.name} gained {self.case.gain(one):.1f} in -2 ln evidence on the {data} that "
+            f"were fitted, and {one.numbers.news:.1f} on the held-out data: together "
             f"more than the required {self.decision.due:.0f}"
         )
 
     def _held_out(self, step: Step) -> str:
-        row = self.row(step.key)
-        return f"{row.name} on held-out data: {votes_in_words(row.held_out_votes())}"
+        one = _one(step)
+        return f"{one.name}: {news_in_words(one.numbers.news)}"
 
     def _refused(self, step: Step) -> str:
-        row = self.row(step.key)
-        left = row.leaves()
+        one = _one(step)
+        left = one.numbers.left
         (seen, seen_with), (held, held_with) = left.fitted, left.held_out
         return (
-            f"{row.name} gained {self.gain(step.key):.0f} in -2 ln evidence, but "
-            f"{REFUSED[step.reason]} ({votes_in_words(row.held_out_votes())}; held-out Q "
+            f"{one.name} gained {self.case.gain(one):.0f} in -2 ln evidence, but "
+            f"{REFUSED[step.reason]} ({news_in_words(one.numbers.news)}; held-out Q "
             f"{held:.3g} calibrated, {held_with:.3g} with it; fitted Q {seen:.3g} and "
             f"{seen_with:.3g}), so it is not named"
         )
 
-    def _refuting(self, step: Step) -> str:
-        row, gain = self.row(step.key), self.gain(step.key)
-        if step.reason is Reason.ALL_DATA:
-            gain += row.held_out_votes().news
-        assert step.why is not None
-        return (
-            f"{DATA[step.reason]}: {evidence_in_words(gain / 2)} for {row.name} compared with "
-            f"calibration alone; but {REFUSED[step.why]}"
-        )
-
-    def _unexplained(self, step: Step) -> str:
-        open_ = step.names or self.decision.named
-        text = f"{self._refuting(step)}, {self._text(step.key)}"
-        return text if open_ else f"{text}{UNEXPLAINED}"
-
     def _found_together(self, step: Step) -> str:
-        s = self.whole(step)
+        s = _whole(step)
         gains = ", ".join(f"{n} {g:.0f}" for n, g in zip(s.members, s.gains, strict=True))
         return (
             f"{' and '.join(s.members)} explain the recording together; with the others in place "
@@ -168,32 +154,33 @@ class DecisionWords:
         )
 
     def _held_out_of_set(self, step: Step) -> str:
-        s = self.whole(step)
+        s = _whole(step)
         others = " and ".join(n for k, n in enumerate(s.members) if k != step.member)
-        said = votes_in_words(self.row(s.member(step.member)).held_out_votes())
-        return f"{s.members[step.member]} added to {others}, on held-out data: {said}"
+        said = news_in_words(s.news(step.member))
+        return f"{s.members[step.member]} added to {others}: {said}"
 
     def _set_refused(self, step: Step) -> str:
         assert step.why is not None
         if step.why is Reason.NOT_SUPPORTED:
             why = f"that is too little for {self._held_out_of_set(step)}"
         elif step.why is Reason.UNFIT:
-            why = f"the residual is not explained: {self.known.tests[refined(step.key)].what}"
+            test = _of(step.of).chances.test
+            why = f"the residual is not explained: {'' if test is None else test.what}"
         elif step.why is Reason.NOT_FITTED:
-            why = f"they could not be fitted again: {self.known.failed[step.key]}"
+            why = f"they could not be fitted again: {_of(step.of).lost}"
         else:
             why = REFUSED[step.why]
         return f"{self._found_together(step)}; but {why}"
 
     def _perhaps_of_set(self, step: Step) -> str:
-        s, k = self.whole(step), step.member
+        s, k = _whole(step), step.member
         return (
             f"with {' and '.join(step.names)} in place {s.members[k]} gains {s.gains[k]:.0f} of "
             f"the required {s.due:.0f} in -2 ln evidence: it may be present too"
         )
 
     def _rival_of_member(self, step: Step) -> str:
-        alternatives = self.whole(step).alternatives[step.member]
+        alternatives = _whole(step).alternatives[step.member]
         behind = ", ".join(f"{r.name} by {r.behind:.0f}" for r in alternatives)
         note = (
             f"with the others in place these data do not distinguish {step.names[0]} from the "
@@ -203,37 +190,31 @@ class DecisionWords:
         return _with_check("; ".join([note, *odd]), step.names)
 
     def _next(self, step: Step) -> str:
-        (before,), name = step.names, self.row(step.key).name
-        assert step.why is not None
-        return f"{before} is refused: {self.refusal(before, step.why)}; {name} is next"
+        before, why = next(
+            (h, why) for h, why in self.decision.passed_over if h.name == step.names[0]
+        )
+        return f"{before.name} is refused: {self.refusal(before, why)}; {_one(step).name} is next"
 
     def _tied(self, step: Step) -> str:
-        best = self.row(step.key)
-        each = {self.row(k).name: k for k in self.decision.order}
+        best = _one(step)
+        each = {h.name: h for h in self.decision.order}
         first, *others = step.names
-        gap = {n: self.row(each[n]).neg2_log_evidence - best.neg2_log_evidence for n in others}
+        gap = {n: each[n].neg2_log_evidence - best.neg2_log_evidence for n in others}
         odds = "; ".join(f"{evidence_in_words(gap[n] / 2)} against {n}" for n in others)
-        known = [(n, self.known.fits[k]) for n, k in each.items() if n in step.names]
+        known = [(n, _of(h).fit) for n, h in each.items() if n in step.names]
         odd = [(n, t.effect.remarks(t.fit.of(t.effect)).implausible) for n, t in known]
         note = f"these data do not distinguish {first} from the others: {odds}"
         impossible = [needs_impossible(n, why) for n, why in odd if why]
         return _with_check("; ".join([note, *impossible]), step.names)
 
     def _doubt(self, step: Step) -> str:
-        name = self.row(step.key).name
+        one = _one(step)
         note = (
-            f"{name} explains the recording better than calibration alone, by "
-            f"{self.gain(step.key):.1f} in -2 ln evidence; {self.decision.due:.0f} are required "
+            f"{one.name} explains the recording better than calibration alone, by "
+            f"{self.case.gain(one):.1f} in -2 ln evidence; {self.decision.due:.0f} are required "
             "to name it: neither is certain"
         )
-        return _with_check(note, (name,))
-
-    def _deck_stays(self, step: Step) -> str:
-        note = "the deck keeps its numbers: no plausible calibrated values fit better"
-        test = self.test()
-        if self.decision.one_of or (test is not None and not test.passes):
-            return note
-        return f"{note}; the residual comes from mesh, joints and scatter"
+        return _with_check(note, (one.name,))
 
 
 _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
@@ -245,8 +226,6 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.AGAINST: DecisionWords._refused,
     Reason.TOO_LITTLE: DecisionWords._refused,
     Reason.WORSE: DecisionWords._refused,
-    Reason.ALL_DATA: DecisionWords._unexplained,
-    Reason.WHAT_WAS_FITTED: DecisionWords._unexplained,
     Reason.FOUND_TOGETHER: DecisionWords._found_together,
     Reason.HELD_OUT_OF_SET: DecisionWords._held_out_of_set,
     Reason.SET_REFUSED: DecisionWords._set_refused,
@@ -255,19 +234,24 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
     Reason.NEXT: DecisionWords._next,
     Reason.TIED: DecisionWords._tied,
     Reason.DOUBT: DecisionWords._doubt,
-    Reason.DECK_STAYS: DecisionWords._deck_stays,
 }
 
 
-def votes_in_words(votes: Votes) -> str:
-    """Sentence on the gains of held-out data."""
-    every = {
-        "the data held out": votes.held_out,
-        "sensors predicted from the others": votes.sensors,
-        "lines predicted from the others": votes.lines,
-    }
-    words = [f"{what} {gain:+.0f}" for what, gain in every.items() if gain is not None]
-    return ", ".join(words) + " in 2 ln predictive density" if words else "nothing was held out"
+def _one(step: Step) -> Hypothesis:
+    """The hypothesis that a step is about."""
+    assert step.of is not None
+    return step.of
+
+
+def _whole(step: Step) -> EffectSet:
+    """The set that a step is about."""
+    assert step.whole is not None
+    return step.whole
+
+
+def news_in_words(news: float) -> str:
+    """The gain on the held-out data in words."""
+    return f"the held-out data bring {news:+.0f} in 2 ln predictive density"
 
 
 def needs_impossible(name: str, why: str) -> str:

@@ -11,12 +11,14 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import cast
 
 import numpy as np
 
-from ..decision.decide import RULES, called
-from ..decision.decision_rules import gain_due
-from ..decision.hypothesis_table import NULL, HypothesisTable, Row, Wanted
+from ..decision.decide import called
+from ..decision.decision_rules import RULES, gain_due
+from ..decision.hypotheses import Hypotheses, Numbers
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
@@ -29,12 +31,11 @@ from ..inference.hypothesis_fit import (
     UpdatingProblem,
     fitted,
 )
-from ..inference.implausible_values import implausible_values
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_test_along_effect
 from ..inference.pole_data import Poles
-from ..inference.rows_of_fits import row_of, row_of_null
-from ..inference.written_hypothesis import in_deck
+from ..inference.rows_of_fits import hypothesis_of
+from ..inference.written_hypothesis import as_written
 from ..progress import within
 from ..reduced.accuracy import accuracy
 from ..reduced.reduced_model import evaluate
@@ -49,6 +50,47 @@ SHIFTS = np.arange(-14, 15) / 20  # of ln E: 2.5 % of frequency apart
 Progress = Callable[[str, float], None]
 
 
+@dataclass(frozen=True)
+class FitChances:
+    """The test of fit of a hypothesis, with p of it and of damping that follows what it changes.
+
+    p is NaN where there is no test, and where damping is no less likely than the rest.
+    """
+
+    test: FitTest | None
+    p: float
+    p_damping: float
+
+
+@dataclass(eq=False)
+class Tested:
+    """A fitted hypothesis with its test of fit, which is made when it is read.
+
+    Attributes
+    ----------
+    known : its test, where it was made before
+    """
+
+    problem: UpdatingProblem
+    fit: HypothesisFit
+    known: FitChances | None = None
+
+    @cached_property
+    def chances(self) -> FitChances:
+        """The test of fit."""
+        return self.known or fit_test(self.problem, self.fit)
+
+    @property
+    def p(self) -> float:
+        """P of the test of fit; NaN: no test."""
+        return self.chances.p
+
+    @property
+    def p_damping(self) -> float:
+        """P of modal damping that follows an elastic change; NaN: no test."""
+        return self.chances.p_damping
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What was found.
@@ -56,16 +98,13 @@ class Diagnosis:
     Attributes
     ----------
     nominal, null : fits without, and with calibration parameters free, scatter allowed in both
-    plain : calibration parameters alone, as any calibration would: what a named effect is compared
-        with; where nothing is named, with the learned error of the model
+    plain : the null in the form of a deck: what a named effect is compared with
     hypotheses : best hypothesis of every family, best first
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     sets : several effects together, each of which pays, in the order in which the sets grew
-    table : all of them as the decision reads them
-    tests : of the rows that were held against what they predict themselves
-    written : the named effect as a deck can hold it, once data that no fit saw were asked
-    deck : the same with numbers that make the updated deck respond as all that was found does
+    chances : of the tests of fit that were made, by name
+    written : the named effect in the form of a deck
     adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, and what would settle it
     gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
@@ -81,10 +120,8 @@ class Diagnosis:
     verdict: str = ""
     notes: tuple[str, ...] = ()
     sets: tuple[Several, ...] = ()
-    table: HypothesisTable = field(default_factory=lambda: HypothesisTable({}))
-    tests: Mapping[str, FitTest] = field(default_factory=dict)
+    chances: Mapping[str, FitChances] = field(default_factory=dict)
     written: HypothesisFit | None = None
-    deck: HypothesisFit | None = None
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
     gains: tuple[float, ...] = ()
@@ -99,15 +136,9 @@ class Diagnosis:
         return self.hypotheses[0] if named and self.hypotheses else None
 
     @property
-    def without_effects(self) -> "Diagnosis":
-        """What calibration alone finds."""
-        table = replace(self.table, singles=(), sets=())
-        return replace(self, hypotheses=(), sets=(), table=table)
-
-    @property
     def as_deck(self) -> HypothesisFit | None:
         """The named effect as the updated deck holds it, if anything is named."""
-        return self.deck or self.written or self.found
+        return self.written or self.found
 
     @property
     def unexplained(self) -> bool:
@@ -125,13 +156,6 @@ class Diagnosis:
         due = threshold(self.null.data, len(self.hypotheses))
         return min(due, RULES.expected_due) if hypothesis.effect.expected else due
 
-    @property
-    def as_the_null(self) -> bool:
-        """True if the calibration keeps the numbers of the null."""
-        plain, null = self.plain.fit, self.null.fit
-        shared = [e for e in plain.effects if e in null.effects]
-        return all(np.array_equal(plain.of(e), null.of(e)) for e in shared)
-
     def two_log_bayes_factor(self, hypothesis: HypothesisFit) -> float:
         """How much better than the null, in -2 ln evidence."""
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence
@@ -142,7 +166,6 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     progress("calibration without new physics", 0.05)
     problem, null = without_effects(problem)
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
-    plain = fit_of_the_deck(problem, null)
     progress("scan of the catalogue", 0.2)
     tried = proposals(problem, null)
     give_back_freed_memory()
@@ -150,6 +173,7 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     notes = (*unasked(problem), *could_not_be_evaluated(tried, hypotheses))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
+    plain = as_written(null, problem.mass_measurement)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=notes)
     found = named_by_fits(problem, found)
     whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
@@ -170,30 +194,34 @@ def could_not_be_evaluated(found: Proposals, hypotheses: Sequence[HypothesisFit]
             yield f"the hypothesis {name} could not be evaluated: {why}"
 
 
+def hypotheses_of(
+    problem: UpdatingProblem, found: Diagnosis, numbers: Callable[[HypothesisFit, bool], Numbers]
+) -> Hypotheses:
+    """All single effects as a decision reads them.
+
+    Parameters
+    ----------
+    numbers : of a fit, and whether it is behind the leader
+    """
+    singles = tuple(hypothesis_of(t, numbers(t, k > 0)) for k, t in enumerate(found.hypotheses))
+    return Hypotheses(
+        hypothesis_of(found.null, numbers(found.null, False)), singles,
+        nominal=found.nominal.neg2_log_evidence, poles=isinstance(found.null.data, Poles),
+        families=len(problem.families),
+    )  # fmt: skip
+
+
 def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
     """The diagnosis by what was fitted alone: the leader, or calibration, is named and tested."""
-    table = HypothesisTable(
-        {NULL: row_of_null(found.null), **{t.effect.name: row_of(t) for t in found.hypotheses}},
-        tuple(t.effect.name for t in found.hypotheses),
-        nominal=found.nominal.neg2_log_evidence,
-        poles=isinstance(found.null.data, Poles),
-        implausible=bool(implausible_values(found.plain.fit))
-        or not _keeps_mass(problem, found.plain),
-        families=len(problem.families),
-    )
-    tests = dict(found.tests)
-    while isinstance(said := called(table), Wanted):
-        tested = found.null if said.key == NULL else found.hypotheses[0]
-        chances = fit_test(problem, tested)
-        table = table.having(chances.of(table.rows[said.key]))
-        tests |= {said.key: chances.test} if chances.test else {}
-    return replace(found, verdict=said.verdict, table=table, tests=tests)
+    every: list[Tested] = []
 
+    def numbers(fit: HypothesisFit, _: bool) -> Numbers:
+        every.append(Tested(problem, fit, found.chances.get(fit.name)))
+        return cast(Numbers, every[-1])  # the test of fit is all that is read
 
-def _keeps_mass(problem: UpdatingProblem, plain: HypothesisFit) -> bool:
-    """True where plain calibration has the weighed mass, or nothing was weighed."""
-    weighed = problem.mass_measurement
-    return weighed is None or weighed.agrees(float(plain.fit.state.weight))
+    said = called(hypotheses_of(problem, found, numbers))
+    made = {t.fit.name: t.chances for t in every if "chances" in vars(t)}
+    return replace(found, verdict=said.verdict, chances={**found.chances, **made})
 
 
 def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
@@ -217,22 +245,6 @@ def _with_sets_of_effects(
     search = several(problem, alone.hypotheses, due, unfit, progress)
     notes = (*alone.notes, search.note) if search.note else alone.notes
     return replace(alone, sets=search.sets, notes=notes)
-
-
-@dataclass(frozen=True)
-class FitChances:
-    """The test of fit of a hypothesis, with p of it and of damping that follows what it changes.
-
-    p is NaN where there is no test, and where damping is no less likely than the rest.
-    """
-
-    test: FitTest | None
-    p: float
-    p_damping: float
-
-    def of(self, row: Row) -> Row:
-        """A row with these."""
-        return replace(row, p=self.p, p_damping=self.p_damping)
 
 
 def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
@@ -317,18 +329,6 @@ def best_base_fit(
             if not fits and k == len(starts) - 1:
                 raise
     return HypothesisFit(Effect(), min(fits, key=lambda f: f.neg2_log_evidence), model)
-
-
-def fit_of_the_deck(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
-    """Calibration parameters alone, no scatter or modal discrepancy: same starts, and the null."""
-    kept = [in_deck(e, problem.data) for e in problem.base]
-    chosen = [e for e, k in zip(problem.base, kept, strict=True) if k]
-    inside = np.concatenate(
-        [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]
-    ).astype(bool)
-    problem = problem.exactly()
-    starts = [x[inside] for x in (*_null_starts(problem), null.fit.x)]
-    return on_its_basis(problem, best_base_fit(problem, chosen, starts))[1]
 
 
 def nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:

@@ -32,11 +32,13 @@ from ..inference.damping_scatter import modal_damping
 from ..inference.hypothesis_fit import UpdatingProblem
 from ..inference.least_data import numbers, too_little
 from ..inference.likelihood import Responses, rms_over_lines
+from ..inference.map_fit import APART, unknowns
 from ..inference.pole_data import Poles
 from ..inference.sensor_errors import sensor_errors
 from ..model.free_parameter import FreeParameter
 from ..progress import Progress, silent, within
 from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
+from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
 from .held_out_data import HeldOutChoice, held_out_sensors, of_poles, upper_part
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
@@ -158,7 +160,7 @@ def _by_responses(
     if unseen.choosing.any():
         notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
     notes.append(_sensor_note(question))
-    notes += _mass_note(question)
+    notes += _mass_note(question, problem)
     known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
     setup = replace(problem.setup, damping=known)
     problem = replace(problem, damping=known, coupling=coupling, setup=setup)
@@ -228,7 +230,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     left_out = of_poles(held)
     n = int(left_out.reporting.sum())
     what = f"{n} of {len(held)} frequencies" if n else "nothing"
-    notes = (*notes, *_unscored(question), *_mass_note(question))
+    notes = (*notes, *_unscored(question), *_mass_note(question, problem))
     few = too_little(len(frequency), 0), numbers(len(frequency), 0)
     return Prepared(
         problem, data, left_out, left_out, what, notes, nominal, None, found, *few, ~held
@@ -344,8 +346,33 @@ NOT_WEIGHED = (
 )
 
 
-def _mass_note(question: Question) -> list[str]:
-    if question.mass_measurement is None:
-        return [NOT_WEIGHED]
+ANOTHER_MASS = "check that the article is the one of the deck, without trim and sensors"
+
+
+def _mass_note(question: Question, problem: UpdatingProblem) -> list[str]:
     w = question.mass_measurement
-    return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is fitted with the other data"]
+    if w is None:
+        return [NOT_WEIGHED]
+    said = f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is fitted with the other data"
+    off = off_the_scales(problem)
+    return [said, f"{off}: {ANOTHER_MASS}"] if off else [said]
+
+
+def off_the_scales(problem: UpdatingProblem) -> str:
+    """Sentence where deck and weighed mass differ by more than both allow; "" elsewhere.
+
+    The deck's mass has the variance Σ (∂m/∂x_k σ_k)² of the calibration parameters.
+    """
+    weighed = problem.mass_measurement
+    if weighed is None:
+        return ""
+    state = evaluate(problem.reduced.model, problem.base, problem.mean())
+    sd = np.array([p.sd for p in unknowns(problem.base)])
+    known = float(np.linalg.norm(state.dweight * sd))
+    off = weighed.mass - state.weight
+    if abs(off) <= APART * np.hypot(known, weighed.sd):
+        return ""
+    return (
+        f"the article weighs {abs(off):.2g} kg {'more' if off > 0 else 'less'} than the deck, "
+        f"whose densities and thicknesses allow {APART * known:.2g} kg"
+    )

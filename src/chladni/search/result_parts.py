@@ -23,7 +23,7 @@ from ..inference.result import (
     Remainder,
     Scores,
 )
-from ..inference.rows_of_fits import row_of
+from ..inference.rows_of_fits import hypothesis_of
 from .diagnosis import Diagnosis
 from .question import Prepared
 from .verdict_models import real_poles
@@ -39,10 +39,14 @@ def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
     if found is None:
         return ()
     gains = diagnosis.gains or (diagnosis.two_log_bayes_factor(found),)
-    return tuple(_named(found, e, g) for e, g in zip(found.effects, gains, strict=True))
+    each = zip(found.effects, gains, strict=True)
+    return tuple(_named(found, e, g, diagnosis.as_deck or found) for e, g in each)
 
 
-def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffect:
+def _named(
+    hypothesis: HypothesisFit, effect: Effect, gain: float, deck: HypothesisFit
+) -> NamedEffect:
+    written = effect.reported(deck.fit.of(effect), deck.fit.sd(effect))
     return NamedEffect(
         effect.name,
         effect.claim,
@@ -50,6 +54,7 @@ def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffec
         _located(hypothesis, effect),
         _reported(hypothesis, effect),
         gain,
+        () if effect.kind == "test" else tuple(row.value for row in written),
     )
 
 
@@ -174,7 +179,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are required "
             "to name an effect"
         )
-    if same(row_of(hypothesis), best.name):
+    if same(hypothesis_of(hypothesis), best.name):
         return f"these data cannot distinguish its fitted form from {best.name}"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (
@@ -202,20 +207,24 @@ def agreement(
     )
 
 
-def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
-    """Reason not to trust a calibration that predicts the held-out data worse than the deck.
+def foretells_worse(agreement: Agreement | None, named: bool = False) -> tuple[str, ...]:
+    """Reason not to use a deck that predicts the held-out data worse than the deck before it.
 
     An increase of Q within the noise of the recording may be chance and is accepted.
     """
-    held = None if agreement is None else agreement.held_out
-    if held is None or held.nominal is None or held.calibrated is None:
+    held = Scores() if agreement is None else agreement.held_out
+    (one, before), (last, after) = held.last_step(named).items()
+    if before is None or after is None or after <= before + (held.floor or 0.0):
         return ()
-    if held.calibrated <= held.nominal + (held.floor or 0.0):
-        return ()
+    known, why = held.with_nuisances, ""
+    if known is not None and known < before:
+        why = (
+            f"; with errors of mesh, joints and scatter Q is {known:.3g}: the deck lacks these, so "
+            "refine its mesh where it bends most"
+        )
     return (
-        "the calibrated deck predicts the held-out data worse than the given deck "
-        f"(Q {held.calibrated:.3g}, {held.nominal:.3g} before); try chladni diagnose, "
-        '[test] gain = "unknown" if the level is uncertain, or position_sd for uncertain places',
+        f"the {last} deck predicts the held-out data worse than the {one} deck "
+        f"(Q {after:.3g}, {before:.3g} before){why}",
     )
 
 

@@ -20,7 +20,7 @@ from itertools import combinations
 import numpy as np
 
 from ..decision.decision_rules import GOOD_PART, TIED
-from ..decision.hypothesis_table import AlternativeRow
+from ..decision.hypotheses import AlternativeRow
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
 from ..errors import ModelError

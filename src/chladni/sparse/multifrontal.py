@@ -110,7 +110,7 @@ class NotDefinite(ModelError):
 
 
 class Multifrontal:
-    """A = L Lᵀ front by front; ``renewed`` keeps the order if only the values change.
+    """A = L Lᵀ front by front.
 
     Attributes
     ----------
@@ -135,10 +135,6 @@ class Multifrontal:
     def nnz(self) -> int:
         """Entries of L."""
         return self.fronts.nnz
-
-    def renewed(self, A: sp.sparray) -> "Multifrontal":
-        """The factorisation of another matrix whose pattern lies within this one's."""
-        return Multifrontal(A, definite=self.definite, fronts=self.fronts)
 
     def solve(self, B: np.ndarray) -> np.ndarray:
         """X = A⁻¹ B for one (n,) or several (n, k) right sides."""

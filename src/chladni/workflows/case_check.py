@@ -18,6 +18,7 @@ from ..geometry.nearest import ShellSurface
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
 from ..results import Result
+from ..search.preparation import ANOTHER_MASS, off_the_scales
 from .case_draft import said_of
 from .given_case import Source, given_case
 from .loaded_model import as_model
@@ -121,7 +122,7 @@ def check(
         findings.append(CaseFinding("there is no recording yet", NO_RECORDING))
     elif not any(f.fault for f in findings):
         more = _asked(case, within(progress, 0.8, 1.0))
-        sure = {f.remedy for f in more if f.fault}  # is not a guess any more
+        sure = {f.remedy for f in more if f.fault or f.remedy == ANOTHER_MASS}  # no guess any more
         findings = [f for f in findings if f.remedy.partition(", if ")[0] not in sure] + more
     unused = {c: tuple(case.said(c)) for c in COMMANDS}
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused, origin=case)
@@ -207,9 +208,7 @@ def _mass(case: Case) -> list[CaseFinding]:
     if in_pounds(mass, weighed):
         mend = f"in case.toml, [test]: mass = {weighed * POUND:.5g}, if the weight was in pounds"
         return [CaseFinding(said, mend)]
-    return [
-        CaseFinding(said, "check that the article is the one of the deck, without trim and sensors")
-    ]
+    return [CaseFinding(said, ANOTHER_MASS)]
 
 
 def _size(case: Case) -> list[CaseFinding]:
@@ -265,7 +264,8 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
         every = each_state(with_natural_frequencies(case))
         for k, state in enumerate(every):
             stage = within(progress, k / len(every), (k + 1) / len(every))
-            screening = _screened(state, diagnosing, stage)
+            off, screening = _screened(state, diagnosing, stage)
+            out += [CaseFinding(off, ANOTHER_MASS)] if off else []
             for f in () if screening is None else screening.findings:
                 text, remedy = f.text.rstrip("."), f.repair + _ITSELF * bool(f.mend)
                 out.append(CaseFinding(text, remedy, f.severity == "fault"))
@@ -274,11 +274,13 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
     return list(dict.fromkeys(out))
 
 
-def _screened(state: Case, diagnosing: bool, progress: Progress) -> Screening | None:
+def _screened(state: Case, diagnosing: bool, progress: Progress) -> tuple[str, Screening | None]:
+    """A mass that deck and scales do not allow, and the findings on the recording."""
     try:
-        return ready(with_sign_of_gain(state), diagnosing, progress, fitted=False)[2]
+        _, prepared, screening = ready(with_sign_of_gain(state), diagnosing, progress, fitted=False)
     except RecordingAtFault as fault:
-        return fault.screening
+        return "", fault.screening
+    return off_the_scales(prepared.problem), screening
 
 
 def _without_path(case: Case, error: ChladniError) -> str:

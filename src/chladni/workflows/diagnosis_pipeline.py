@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..case import Case
-from ..decision.decide import RULES
-from ..decision.decision_rules import odds_of_something_else
+from ..decision.decision_rules import RULES, odds_of_something_else
 from ..dynamics.frf import FRF
 from ..ema.finding import Finding, Screening
 from ..errors import FileError, LabelError, ModelError
@@ -52,14 +51,14 @@ from ..search.result_parts import (
     alternatives,
     blind_note,
     calibrated,
+    foretells_worse,
     laid_on_sheets,
     named_effects,
     otherwise,
     remainder,
 )
-from ..search.verdict_models import fitted_scores, models, of_channels, real_poles, with_deck
+from ..search.verdict_models import models, of_channels, real_poles, scores_of
 from ..search.written_scores import noise_Q, written_Q
-from ..sparse.freed_memory import give_back_freed_memory
 from .case_model import DAMPING, model_frf
 from .deck_comments import with_mended, with_remarks
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
@@ -150,8 +149,7 @@ def explained(
 def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
     """Write an explanation into decks and compute every number of the result from them."""
     case, question, prepared = known.case, known.question, known.prepared
-    found = with_deck(prepared, known.found)
-    give_back_freed_memory()
+    found = known.found
     progress("the updated deck", 0.85)
     mended = () if known.screening is None else known.screening.mended
     stages, lost = _updated(case, question, prepared, found, mended)
@@ -170,6 +168,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
             next_ = regions_to_free(rows, stages.final.model, fit, study)
             lossy = damping_by_part(rows, stages.final.model)
             study = replace(study, compensating=reasons, guidance=next_, damping=lossy)
+    else:
+        distrust = (*foretells_worse(result.agreement, bool(result.effects)), *distrust)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     seen, distrust = known.screening, (*far_off(result), *distrust)
@@ -201,17 +201,13 @@ def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple
     """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
-    decision, known = decided(prepared, made.found, made.refine)
-    found, distrust = concluded(prepared, made.found, decision, known)
-    if decision.named:  # it is compared with what calibrate answers
-        prepared, alone = replace(prepared, too_little=""), made.found.without_effects
-        calibration = concluded(prepared, alone, *decided(prepared, alone, made.refine))[0]
-        found = replace(found, plain=calibration.plain)
-    plain = refined(made.question, prepared, found.plain, held=found.as_the_null)
+    case, decision = decided(prepared, made.found, made.refine)
+    found, distrust = concluded(prepared, made.found, case, decision)
+    plain = refined(made.question, prepared, found.plain, written=True)
     found = replace(found, plain=plain.hypothesis)
     if found.found is not None:
         return found, distrust
-    return replace(found, notes=(*found.notes, plain.note)), plain.distrust
+    return replace(found, notes=(*found.notes, plain.note)), (*plain.distrust, *distrust)
 
 
 def _updated(
@@ -364,7 +360,7 @@ def _scores(
     question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
     real: np.ndarray | None,
 ) -> tuple[Scores, Scores]:  # fmt: skip
-    """Return Q of the three decks on fitted and held-out data, of noise, and of nuisances."""
+    """Return Q of the three decks on fitted and held-out data, of noise, and with nuisances."""
     winner = found.found or found.null
     sets = prepared.score.use, of_channels(prepared, winner, prepared.held.reporting)
     named = found.found
@@ -374,12 +370,10 @@ def _scores(
         final = calibrated = written_Q(question, prepared, stages.calibrated.model, sets, real)
     if named is not None or stages.final is not stages.calibrated:
         final = written_Q(question, prepared, stages.final.model, sets, real, named)
-    fits = fitted_scores(prepared, found)
+    known = scores_of(prepared, winner, [(winner, winner.fit.state)], prepared.held.reporting)
     first, second = (
-        (q[0], q[1], q[2], noise_Q(prepared, use, real), fit.calibrated, fit.effect, fit.scatter)
-        for q, use, fit in zip(
-            zip(nominal, calibrated, final, strict=True), sets, fits, strict=True
-        )
+        (*decks, noise_Q(prepared, use, real), *nuisances)
+        for *decks, use, nuisances in zip(nominal, calibrated, final, sets, known, strict=True)
     )
     return Scores(*map(_finite, first)), Scores(*map(_finite, second))
 

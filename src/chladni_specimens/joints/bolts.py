@@ -17,13 +17,10 @@ from chladni.model.properties import BeamSection, Isotropic
 
 from .builders import (
     REACH,
-    SOFT_ADHESIVE,
     STEEL,
     Joined,
     Joint,
-    adhesive_bead,
     cell_carriers,
-    followed,
     tied,
     with_part,
 )
@@ -223,52 +220,3 @@ def along_line(line: np.ndarray, per_length: float) -> tuple[np.ndarray, np.ndar
     t = np.gradient(line, axis=0)
     length = np.linalg.norm(t, axis=1)
     return t / length[:, None], per_length * length
-
-
-def hem(
-    assembly: Assembly,
-    edge: np.ndarray,
-    sheets: tuple[ShellChoice, ShellChoice],
-    *,
-    inset: float = 0.0075,
-    width: float = 0.010,
-    height: float | None = 0.15e-3,
-    pitch: float | None = None,
-    grip_stiffness: float = 0.0,
-    material: Isotropic = SOFT_ADHESIVE,
-    reach: float = REACH,
-    name: str = "hem adhesive",
-) -> Joined:
-    """A string of adhesive along the inner sheet's edge, and springs against sliding along it.
-
-    Parameters
-    ----------
-    edge : (k, 3)          the inner sheet's edge; the string runs `inset` inboard of it [m]
-    sheets : the inner and the outer sheet
-    grip_stiffness : stiffness against sliding along the edge per length [N/m²]; 0: the soft
-        string alone, as Echaniz Granado (2015), section 2.3.2, models it
-    """
-    inner = ShellSurface.of(assembly, sheets[0])
-    edge = followed(np.asarray(edge, dtype=float), pitch)
-    tangent, _ = along_line(edge, 1.0)  # the bead lies inboard, along the surface
-    side = np.cross(inner.closest_points(edge).normal, tangent)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    left, right = (inner.closest_points(edge + s * inset * side) for s in (1, -1))
-    sign = np.where(left.distance.sum() <= right.distance.sum(), 1.0, -1.0)
-    line = inner.closest_points(edge + sign * inset * side).place
-    assembly, joints = adhesive_bead(
-        assembly,
-        line,
-        sheets,
-        width=width,
-        height=height,
-        material=material,
-        reach=reach,
-        name=name,
-    )
-    joints = tuple(replace(j, kind="hem") for j in joints)
-    if not grip_stiffness:
-        return assembly, joints
-    direction, k = along_line(edge, grip_stiffness)
-    assembly, grips = grip(assembly, edge, direction, k, sheets, reach=reach)
-    return assembly, joints + grips

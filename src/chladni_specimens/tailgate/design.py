@@ -18,7 +18,6 @@ ADHESIVE = Isotropic(6e6, 0.4, 1000.0, id=2)
 WELD = Isotropic(210e9, 0.3, 0.0, id=3)
 SCREW = Isotropic(210e9, 0.3, 7850.0, id=4)
 SEALANT = Isotropic(6e6, 0.499, 1000.0, id=5)
-STIFF = Isotropic(210e9, 0.49, 1000.0, id=2)  # Echaniz Granado 2015, table 9: a real hem
 
 HEMS = ("modelled", "sealed", "real")
 STRETCHES = ("all", "left", "right", "above", "below")
