@@ -41,6 +41,7 @@ from ..search.decision_in_words import concluded
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
 from ..search.frequency_table import frequency_error, frequency_rows
+from ..search.left_frequencies import left_frequencies
 from ..search.measured_modes import MeasuredModes, measured_modes
 from ..search.other_recordings import scored_others
 from ..search.preparation import NOT_WEIGHED
@@ -172,6 +173,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*foretells_worse(result.agreement, bool(result.effects)), *distrust)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
+    if result.compared == "frequencies":
+        distrust = (*left_frequencies(result.frequencies, stages.final.model), *distrust)
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
