@@ -10,19 +10,12 @@ from .small_specimens import plate
 
 @dataclass(frozen=True, eq=False)
 class CalibrationQuestion:
-    """A model over parameters in [-1, 1] and a recording.
-
-    Attributes
-    ----------
-    names : tuple of str
-    frequency : (n_f,)                       [Hz]
-    predict : x (p,) -> (n_f, n_out) complex
-    recorded : (n_f, n_out) complex, or None: drawn at each reset, x uniform within ±0.8
-    """
+    """A model over parameters in [-1, 1] and a recording."""
 
     names: tuple[str, ...]
-    frequency: np.ndarray
-    predict: Callable[[np.ndarray], np.ndarray]
+    frequency: np.ndarray  # (n_f,) [Hz]
+    predict: Callable[[np.ndarray], np.ndarray]  # x (p,) -> (n_f, n_out) complex
+    # (n_f, n_out) complex, or None: drawn at each reset, x uniform within ±0.8
     recorded: np.ndarray | None = None
 
 

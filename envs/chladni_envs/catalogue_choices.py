@@ -21,19 +21,12 @@ from chladni_planning import Linearised
 
 @dataclass(frozen=True, eq=False)
 class CatalogueChoices:
-    """Every effect that the search proposes for a case, one choice each.
+    """Every effect that the search proposes for a case, one choice each."""
 
-    Attributes
-    ----------
-    problem : with errors of the model's form from the state of the null
-    null : the fit of calibration parameters and nuisances alone
-    candidates : effects, each with the values at which it scored best
-    fits : best fits made so far, by the choices in them
-    """
-
-    problem: UpdatingProblem
-    null: HypothesisFit
-    candidates: tuple[Candidate, ...]
+    problem: UpdatingProblem  # with errors of the model's form from the state of the null
+    null: HypothesisFit  # the fit of calibration parameters and nuisances alone
+    candidates: tuple[Candidate, ...]  # effects, each with the values at which it scored best
+    # best fits made so far, by the choices in them
     fits: dict[frozenset[int], HypothesisFit] = field(default_factory=dict)
 
     @property

@@ -7,31 +7,20 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class ModalSpecimen:
-    """Modes at places where a sensor or shaker may be mounted.
+    """Modes at places where a sensor or shaker may be mounted."""
 
-    Attributes
-    ----------
-    points : (n, 2) or (n, 3)  places [m]
-    phi : (n, r)               mass-normalised shapes along each place's direction [1/√kg]
-    frequency, damping : (r,)  [Hz], fraction of critical
-    labels : tuple of str      labels of the places
-    outline : (k, 2, 3)        edges of the structure, for pictures [m]
-    access : (n,) bool         True where a free line leads to the place, for a shaker's rod
-    gap_shapes : (g, r)        opening of gaps between sheets [1/√kg]
-    clearance : (g,)           of these gaps [m]
-    notes : sentences on the deck, as the unit system that was guessed
-    """
-
-    points: np.ndarray
-    phi: np.ndarray
+    points: np.ndarray  # (n, 2) or (n, 3) places [m]
+    phi: np.ndarray  # (n, r) mass-normalised shapes along each place's direction [1/√kg]
+    # frequency, damping: (r,) [Hz], fraction of critical
     frequency: np.ndarray
     damping: np.ndarray
-    labels: tuple[str, ...] = ()
-    outline: np.ndarray | None = None
+    labels: tuple[str, ...] = ()  # labels of the places
+    outline: np.ndarray | None = None  # (k, 2, 3) edges of the structure, for pictures [m]
+    # (n,) bool: True where a free line leads to the place, for a shaker's rod
     access: np.ndarray | None = None
-    gap_shapes: np.ndarray | None = None
-    clearance: np.ndarray | None = None
-    notes: tuple[str, ...] = ()
+    gap_shapes: np.ndarray | None = None  # (g, r) opening of gaps between sheets [1/√kg]
+    clearance: np.ndarray | None = None  # (g,) of these gaps [m]
+    notes: tuple[str, ...] = ()  # sentences on the deck, as the unit system that was guessed
 
 
 def plate(

@@ -28,20 +28,12 @@ RIGID = 0.02  # below it a frequency of CalculiX is rounding [Hz]
 
 @dataclass(frozen=True, eq=False)
 class ArticleModes:
-    """Modes of an article, rigid ones first; modes above the band act as a static complement.
+    """Modes of an article, rigid ones first; modes above the band act as a static complement."""
 
-    Attributes
-    ----------
-    frequency : (r,) Hz      0 for rigid modes
-    rows : (k,) int          rows of the article's points, increasing
-    shapes : (k, 3, r)       motion of these points [1/√kg]
-    loss : (r, r)            Φᵀ K_loss Φ of materials with losses [rad²/s²]
-    """
-
-    frequency: np.ndarray
-    rows: np.ndarray
-    shapes: np.ndarray
-    loss: np.ndarray
+    frequency: np.ndarray  # (r,) Hz: 0 for rigid modes
+    rows: np.ndarray  # (k,) int: rows of the article's points, increasing
+    shapes: np.ndarray  # (k, 3, r) motion of these points [1/√kg]
+    loss: np.ndarray  # (r, r) Φᵀ K_loss Φ of materials with losses [rad²/s²]
 
     def at(self, rows: np.ndarray) -> np.ndarray:
         """Motion (..., 3, r) of these points."""

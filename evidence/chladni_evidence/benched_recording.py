@@ -45,17 +45,11 @@ DELAY = 200.0  # cycles: 0.7 % of the transient remains for a mode of 0.4 % damp
 
 @dataclass(frozen=True, eq=False)
 class Benched:
-    """A recording of the bench, with the laboratory's knowledge of it.
+    """A recording of the bench, with the laboratory's knowledge of it."""
 
-    Attributes
-    ----------
-    frf : FRF            at the places as the user states them
-    averages : float
-    sensor_mass, gauge_mass : mass that each device adds to the article [kg]
-    """
-
-    frf: FRF
+    frf: FRF  # at the places as the user states them
     averages: float
+    # sensor_mass, gauge_mass: mass that each device adds to the article [kg]
     sensor_mass: float
     gauge_mass: float
 

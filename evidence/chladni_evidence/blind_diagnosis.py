@@ -20,20 +20,14 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Result of a diagnosis.
+    """Result of a diagnosis."""
 
-    Attributes
-    ----------
-    code : int         exit code of the command, negative where it was ended by a signal
-    seconds, gigabytes : float   by the clock; highest resident memory
-    said : str         its last output
-    result : dict      diagnosis.json; empty where none was written
-    """
-
-    code: int
+    code: int  # exit code of the command, negative where it was ended by a signal
+    # seconds, gigabytes: by the clock; highest resident memory
     seconds: float
     gigabytes: float
-    said: str
+    said: str  # its last output
+    # diagnosis.json; empty where none was written
     result: dict[str, Any] = field(default_factory=dict)
 
     @property

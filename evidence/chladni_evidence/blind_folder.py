@@ -53,22 +53,15 @@ class BlindFolder:
 
 @dataclass(frozen=True)
 class Seals:
-    """Hashes and settings that are published before any answer.
+    """Hashes and settings that are published before any answer."""
 
-    Attributes
-    ----------
-    purpose : tune or report
-    set, seeds : of the cases, as they were requested
-    version : of the chladni that made them
-    failed : number of cases that could not be made
-    truths, files : SHA-256 of each case's truth, and of its own files together
-    """
-
-    purpose: Purpose
+    purpose: Purpose  # tune or report
+    # set, seeds: of the cases, as they were requested
     set: str
     seeds: str
-    version: str
-    failed: int
+    version: str  # of the chladni that made them
+    failed: int  # number of cases that could not be made
+    # truths, files: SHA-256 of each case's truth, and of its own files together
     truths: dict[str, str]
     files: dict[str, str]
 

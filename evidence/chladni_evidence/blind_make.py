@@ -18,6 +18,7 @@ from chladni.own_folder import own_folder
 from chladni.parallel import one_blas_thread
 from chladni_bench import scattered_parts
 
+from . import kratos
 from .blind_folder import BlindFolder, Seals, hash_of, hash_of_case, published, read_json
 from .evidence_sets import MEANT, Order, Purpose, purpose
 from .interval_evidence import of_prior
@@ -40,8 +41,10 @@ def make(
     LabelError
         If the seeds are not for this purpose.
     FileError
-        If the folder holds anything else.
+        If the folder holds anything else, or Kratos is needed and not installed.
     """
+    if any(o.mesh == "kratos" for o in chosen):
+        kratos.needed()
     seeds = sorted({o.seed for o in chosen})
     if purpose(seeds) != why:
         raise LabelError(

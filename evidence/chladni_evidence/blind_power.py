@@ -18,20 +18,13 @@ NAMED = ("right", "among")
 
 @dataclass(frozen=True)
 class Share:
-    """Share of some cases, with its interval of 90 % (Jeffreys).
+    """Share of some cases, with its interval of 90 % (Jeffreys)."""
 
-    Attributes
-    ----------
-    times : size of the effects over scatter and mesh together; 0 for cases without an effect
-    named : named right, or among several names; without an effect, named at all
-    cases : all of this size
-    listed : these, and those that "calibration alone, or one of" lists
-    """
-
+    # size of the effects over scatter and mesh together; 0 for cases without an effect
     times: float
-    named: int
-    cases: int
-    listed: int
+    named: int  # named right, or among several names; without an effect, named at all
+    cases: int  # all of this size
+    listed: int  # these, and those that "calibration alone, or one of" lists
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -9,19 +9,15 @@ from .sound_files import Files
 
 @dataclass(frozen=True)
 class FuzzInput:
-    """Files of one input, which of them was injured, and the command that is given it.
-
-    Attributes
-    ----------
-    links : {name: where it leads}, made after the files; a name may lie in a folder
-    cause : pattern that an answer (exit 0) must contain: what contradicts itself is named
-    """
+    """Files of one input, which of them was injured, and the command that is given it."""
 
     kind: str
     files: dict[str, bytes]
     arguments: tuple[str, ...]
+    # {name: where it leads}, made after the files; a name may lie in a folder
     links: dict[str, str] = field(default_factory=dict)
     sound: bool = False  # nothing was injured: to be answered, not refused
+    # pattern that an answer (exit 0) must contain: what contradicts itself is named
     cause: str = ""
 
 

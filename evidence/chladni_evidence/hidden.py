@@ -20,28 +20,18 @@ Spoil = Callable[[np.ndarray], np.ndarray]  # recorded values (n_f, n_out, n_in)
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """An article before an effect is hidden in it.
+    """An article before an effect is hidden in it."""
 
-    Attributes
-    ----------
-    article : Assembly     scattered, on a mesh of its own
-    outputs : Spots        measured places
-    hangers : (k, 3)       places of the cords [m]
-    drive : Spots          driven place
-    mass : float           [kg]
-    first, f_max : float   first elastic mode, highest frequency of the fitted band [Hz]
-    sheets : tuple of str  parts an effect may sit on
-    material_axis, rolled : direction of rolling, and the parts that may be orthotropic
-    """
-
-    article: Assembly
-    outputs: Spots
-    hangers: np.ndarray
-    drive: Spots
-    mass: float
+    article: Assembly  # scattered, on a mesh of its own
+    outputs: Spots  # measured places
+    hangers: np.ndarray  # (k, 3) places of the cords [m]
+    drive: Spots  # driven place
+    mass: float  # [kg]
+    # first, f_max: first elastic mode, highest frequency of the fitted band [Hz]
     first: float
     f_max: float
-    sheets: tuple[str, ...]
+    sheets: tuple[str, ...]  # parts an effect may sit on
+    # material_axis, rolled: direction of rolling, and the parts that may be orthotropic
     material_axis: np.ndarray
     rolled: tuple[str, ...]
 
@@ -91,24 +81,15 @@ def _same(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Hidden:
-    """An article with an effect in it.
+    """An article with an effect in it."""
 
-    Attributes
-    ----------
-    article : Assembly      with the masses, springs and sections of the effect
-    truth : dict            value, point_m, channel ...: for the seal
-    couplings : tuple       parts that depend on frequency or have no symmetric matrix
-    spoil : Spoil           change of the recording
-    unweighed : float       mass that is on the article in the test, not on the balance [kg]
-    law : Law or None       E(s)/E - 1 of the parts that have a loss factor (of 1, as a mark)
-    """
-
-    article: Assembly
-    truth: dict[str, Any]
+    article: Assembly  # with the masses, springs and sections of the effect
+    truth: dict[str, Any]  # value, point_m, channel ...: for the seal
+    # parts that depend on frequency or have no symmetric matrix
     couplings: tuple[Coupling, ...] = ()
-    spoil: Spoil = field(default=_same)
-    unweighed: float = 0.0
-    law: Law | None = None
+    spoil: Spoil = field(default=_same)  # change of the recording
+    unweighed: float = 0.0  # mass that is on the article in the test, not on the balance [kg]
+    law: Law | None = None  # E(s)/E - 1 of the parts that have a loss factor (of 1, as a mark)
 
 
 def with_lumps(assembly: Assembly, rows: np.ndarray, mass: float) -> Assembly:

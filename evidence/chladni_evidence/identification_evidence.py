@@ -78,25 +78,19 @@ def recording(known: Known, kind: str, seed: int, lines: int = LINES) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Errors of one recording, mode by mode for modes that a recording can show.
+    """Errors of one recording, mode by mode for modes that a recording can show."""
 
-    Attributes
-    ----------
-    frequency, damping : (k,)   relative errors of the modes found
-    z_frequency, z_damping : (k,)   the same over their stated standard deviations
-    bound : (k,)       Cramér-Rao standard deviation of the frequency over the frequency
-    visible, missed : int    modes with significant χ² at the true poles; number of them not found
-    invented : int     poles called firm that are not modes
-    """
-
+    # frequency, damping: (k,) relative errors of the modes found
     frequency: np.ndarray
     damping: np.ndarray
+    # z_frequency, z_damping: (k,) the same over their stated standard deviations
     z_frequency: np.ndarray
     z_damping: np.ndarray
-    bound: np.ndarray
+    bound: np.ndarray  # (k,) Cramér-Rao standard deviation of the frequency over the frequency
+    # visible, missed: modes with significant χ² at the true poles; number of them not found
     visible: int
     missed: int
-    invented: int
+    invented: int  # poles called firm that are not modes
 
 
 def held_against(known: Known, frf: FRF, variance: np.ndarray, found: Identified) -> Found:

@@ -49,6 +49,15 @@ def installed() -> bool:
     return run.returncode == 0
 
 
+def needed() -> None:
+    """Raise ``FileError`` where no Python has Kratos."""
+    if not installed():
+        raise FileError(
+            f"{_python()} has no KratosMultiphysics with its StructuralMechanicsApplication; "
+            f"set {PYTHON} to a Python that has both"
+        )
+
+
 def kratos_modes(
     assembly: Assembly, rows: np.ndarray, loaded: np.ndarray, top: float, triangles: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -111,8 +120,7 @@ def matrices_of(assembly: Assembly, triangles: bool) -> tuple[sp.csr_matrix, sp.
     AccuracyError
         If Kratos failed; the message quotes the end of its output.
     """
-    if not installed():
-        raise FileError(f"{_python()} has no KratosMultiphysics; {PYTHON} names a Python that has")
+    needed()
     if assembly.rigid or any(map(len, assembly.solids)) or assembly.axes is not None:
         raise ModelError("Kratos is given no rigid elements, solids or displacement frames")
     n = len(assembly.points)

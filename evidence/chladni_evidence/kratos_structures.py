@@ -182,9 +182,10 @@ DECKS = {
         DrawnForm("cut-out plate", _CUT, cut_out_plate, 0.022),
     )
 }
-ARTICLES = {
+ARTICLES = {  # a spot at one point acts as one of radius h/5, so h is 15 mm for spots of 6 mm
     **DECKS,
     "stringer plate": replace(DECKS["stringer plate"], build=partial(stringer_plate, bars=False)),
+    "covered trough": replace(DECKS["covered trough"], size=0.033),
 }
 FINER = 2.2  # refinement of an article over its deck
 TOLERANCE = {

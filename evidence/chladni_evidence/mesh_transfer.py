@@ -12,22 +12,13 @@ from chladni.model.assembly import Assembly
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """Places and directions where a structure is measured, driven or attached.
-
-    Attributes
-    ----------
-    labels : tuple of str
-    grids : (k,) int         of the deck, 0 where the place is not a grid
-    points : (k, 3)          [m]
-    directions : (k, 3)      unit vectors
-    parts : tuple of str     the part of each place
-    """
+    """Places and directions where a structure is measured, driven or attached."""
 
     labels: tuple[str, ...]
-    grids: np.ndarray
-    points: np.ndarray
-    directions: np.ndarray
-    parts: tuple[str, ...]
+    grids: np.ndarray  # (k,) int: of the deck, 0 where the place is not a grid
+    points: np.ndarray  # (k, 3) [m]
+    directions: np.ndarray  # (k, 3) unit vectors
+    parts: tuple[str, ...]  # the part of each place
 
     def __len__(self) -> int:
         return len(self.labels)

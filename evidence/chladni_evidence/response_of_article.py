@@ -14,17 +14,11 @@ Law = Callable[[np.ndarray], np.ndarray]  # complex (n_f,) of s (n_f,) [rad/s]
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """A coupling on the article with the force -D(s) q under its motion q = W u.
+    """A coupling on the article with the force -D(s) q under its motion q = W u."""
 
-    Attributes
-    ----------
-    rows : (k,) int                     of the article's points
-    weights : (n, k, 3)                 q from the translations of these points
-    stiffness : (n_f,) -> (n_f, n, n)   dynamic stiffness D at s [rad/s]
-    """
-
-    rows: np.ndarray
-    weights: np.ndarray
+    rows: np.ndarray  # (k,) int: of the article's points
+    weights: np.ndarray  # (n, k, 3) q from the translations of these points
+    # (n_f,) -> (n_f, n, n) dynamic stiffness D at s [rad/s]
     stiffness: Callable[[np.ndarray], np.ndarray]
 
 

@@ -54,47 +54,33 @@ WAYS: tuple[Held, ...] = ("free", "held", "rubber")
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """The tested structure, before its three articles differ.
-
-    Attributes
-    ----------
-    article : BenchArticle
-    drive : row of the output next to the shaker
-    at_cord : row of the output nearest to a cord
-    nodes : {node: (3,)}  places by the number of a label [m]
-    """
+    """The tested structure, before its three articles differ."""
 
     article: BenchArticle
-    drive: int
-    at_cord: int
-    nodes: dict[int, np.ndarray]
+    drive: int  # row of the output next to the shaker
+    at_cord: int  # row of the output nearest to a cord
+    nodes: dict[int, np.ndarray]  # {node: (3,)}: places by the number of a label [m]
 
 
 @dataclass(frozen=True, eq=False)
 class ThesisTest:
-    """All recordings of the chapter.
-
-    Attributes
-    ----------
-    subject : Subject
-    stages, articles : the schedule; A, B and C
-    stepped, bursts : recordings of A, B and C
-    levels : recordings of A by stepped sine, one for each of ``FACTORS``
-    cords : {free, held, rubber: recordings of A, B and C about the cords' resonances}
-    tapped, along : (3, k)   resonances of each article's cords, across and along them [Hz]
-    poles : of A's FRFs, with sensors, gauge and cords (m,) [rad/s]
-    """
+    """All recordings of the chapter."""
 
     subject: Subject
+    # stages, articles: the schedule; A, B and C
     stages: tuple[Stage, ...]
     articles: tuple[BenchArticle, ...]
+    # stepped, bursts: recordings of A, B and C
     stepped: tuple[BenchRecording, ...]
     bursts: tuple[BenchRecording, ...]
+    # recordings of A by stepped sine, one for each of ``FACTORS``
     levels: tuple[BenchRecording, ...]
+    # {free, held, rubber: recordings of A, B and C about the cords' resonances}
     cords: dict[Held, tuple[BenchRecording, ...]]
+    # tapped, along: (3, k) resonances of each article's cords, across and along them [Hz]
     tapped: np.ndarray
     along: np.ndarray
-    poles: np.ndarray
+    poles: np.ndarray  # of A's FRFs, with sensors, gauge and cords (m,) [rad/s]
 
 
 def thesis_subject(

@@ -168,18 +168,11 @@ def _along(p: ParameterKnowledge, at: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class DeviationFit:
-    """Values that minimise the deviation metric, without priors and without a weighed mass.
+    """Values that minimise the deviation metric, without priors and without a weighed mass."""
 
-    Attributes
-    ----------
-    values : {parameter: (deck's, fitted)} [SI]
-    assembly : with the fitted values
-    Q : before and after, of responses with equal damping, 26 to 195 Hz
-    """
-
-    values: dict[str, tuple[float, float]]
-    assembly: Assembly
-    Q: tuple[float, float]
+    values: dict[str, tuple[float, float]]  # {parameter: (deck's, fitted)} [SI]
+    assembly: Assembly  # with the fitted values
+    Q: tuple[float, float]  # before and after, of responses with equal damping, 26 to 195 Hz
 
 
 @one_blas_thread()

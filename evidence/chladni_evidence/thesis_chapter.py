@@ -27,20 +27,13 @@ _BLOCKS = {kind.__name__.lower(): kind for kind in (Text, Items, Facts, Table, P
 
 @dataclass(frozen=True)
 class Chapter:
-    """Part of the page of the thesis.
+    """Part of the page of the thesis."""
 
-    Attributes
-    ----------
-    lead : its result in one sentence
-    sections : blocks of words, numbers and pictures; pictures lie in the folder of the chapters
-    numbers : the same for other programs
-    files : (name, description) in that folder
-    """
-
-    lead: str
+    lead: str  # its result in one sentence
+    # blocks of words, numbers and pictures; pictures lie in the folder of the chapters
     sections: tuple[Section, ...]
-    numbers: Mapping[str, Any]
-    files: tuple[tuple[str, str], ...] = ()
+    numbers: Mapping[str, Any]  # the same for other programs
+    files: tuple[tuple[str, str], ...] = ()  # (name, description) in that folder
 
 
 @dataclass(frozen=True)
@@ -54,15 +47,10 @@ class StoryStep:
 
 @dataclass(frozen=True)
 class ChapterStore:
-    """Folder of finished chapters, one JSON file each, with decks and pictures.
-
-    Attributes
-    ----------
-    folder : Path
-    settings : of the run; chapters of other settings are refused
-    """
+    """Folder of finished chapters, one JSON file each, with decks and pictures."""
 
     folder: Path
+    # of the run; chapters of other settings are refused
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def open(self) -> None:

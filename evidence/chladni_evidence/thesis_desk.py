@@ -30,23 +30,17 @@ HUNG = (0.485, 0.940)  # |y|, s of the upper bolt holes, from which the thesis h
 
 @dataclass(frozen=True, eq=False)
 class ThesisSpecimen:
-    """The structure of the story: the engineer's deck, the article, the forming simulation.
+    """The structure of the story: the engineer's deck, the article, the forming simulation."""
 
-    Attributes
-    ----------
-    deck, article : Assembly   the article has formed thickness and a hem that holds
-    formed : FormedMesh
-    hangers : grids of the article that its cords hold
-    seam, control : parts of adhesive: of the hem, and of a string without a hem ("": none)
-    welds, screws : parts ("": none)
-    """
-
+    # deck, article: the article has formed thickness and a hem that holds
     deck: Callable[[], Assembly]
     article: Callable[[], Assembly]
     formed: Callable[[], FormedMesh]
-    hangers: Callable[[Assembly], list[int]]
+    hangers: Callable[[Assembly], list[int]]  # grids of the article that its cords hold
+    # seam, control: parts of adhesive: of the hem, and of a string without a hem ("": none)
     seam: str = "hem adhesive"
     control: str = "middle adhesive"
+    # welds, screws: parts ("": none)
     welds: str = "spot welds"
     screws: str = "screws"
 
@@ -74,25 +68,16 @@ def _upper_holes(assembly: Assembly, skin: Skin) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class Desk:
-    """Working place of the chapters.
+    """Working place of the chapters."""
 
-    Attributes
-    ----------
-    folder : Path            of decks, recordings and pictures
-    specimen : ThesisSpecimen
-    seed : of scatter and noise
-    stages, resolution : schedule of the stepped sine, lines of burst random [Hz]
-    sensors : how many are planned
-    effects : that the last chapter searches; none: all of the catalogue
-    """
-
-    folder: Path
+    folder: Path  # of decks, recordings and pictures
     specimen: ThesisSpecimen
-    seed: int = 1
+    seed: int = 1  # of scatter and noise
+    # stages, resolution: schedule of the stepped sine, lines of burst random [Hz]
     stages: tuple[Stage, ...] = TABLE_3
     resolution: float = 0.05
-    sensors: int = 30
-    effects: tuple[str, ...] = ()
+    sensors: int = 30  # how many are planned
+    effects: tuple[str, ...] = ()  # that the last chapter searches; none: all of the catalogue
 
     def deck(self, name: str = DECK) -> WorkingModel:
         """Load a deck of the folder."""

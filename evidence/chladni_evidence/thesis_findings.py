@@ -21,78 +21,48 @@ OUTER = 0.25  # share of the weakest or the strongest lines of a channel
 
 @dataclass(frozen=True, eq=False)
 class StageRun:
-    """A row of table 3 as it was run.
-
-    Attributes
-    ----------
-    stage : Stage
-    lines : number of lines
-    per_octave : actual lines per octave
-    transient : median over lines of the largest remaining transient, over all channels of A
-    """
+    """A row of table 3 as it was run."""
 
     stage: Stage
-    lines: int
-    per_octave: float
-    transient: float
+    lines: int  # number of lines
+    per_octave: float  # actual lines per octave
+    transient: float  # median over lines of the largest remaining transient, over all channels of A
 
 
 @dataclass(frozen=True, eq=False)
 class CordReading:
-    """Figure 19 of one article.
+    """Figure 19 of one article."""
 
-    Attributes
-    ----------
-    tapped : (k,)          [Hz]
-    height : (k,)          |H| at them over that with the cords held
-    rubber : (k,)          |H| at them with rubber, over that with the cords held
-    first : (3,)           peak of the first mode, free, held, with rubber [Hz]
-    """
-
-    tapped: np.ndarray
-    height: np.ndarray
-    rubber: np.ndarray
-    first: np.ndarray
+    tapped: np.ndarray  # (k,) [Hz]
+    height: np.ndarray  # (k,) |H| at them over that with the cords held
+    rubber: np.ndarray  # (k,) |H| at them with rubber, over that with the cords held
+    first: np.ndarray  # (3,) peak of the first mode, free, held, with rubber [Hz]
 
 
 @dataclass(frozen=True, eq=False)
 class ThesisFindings:
-    """Numbers of every table and figure.
+    """Numbers of every table and figure."""
 
-    Attributes
-    ----------
-    schedule : rows of table 3
-    minutes : duration of all its sweeps
-    weights : (3,) [kg]
-    identified : of A, B and C
-    modes : their modes, paired
-    partner : (r,)         row of the thesis' table 5 nearest to each mode, -1: none
-    worst : largest error of frequency and damping of A against the bench's own poles
-    cords : figure 19, by article
-    lines : (r,)           of A's modes, lines between their half-power points
-    levels : homogeneity of A at half the level and at twice, each against the level itself
-    between_articles, between_excitations : (bands,)  rms of 20 log|H| about the mean [dB]
-    faint, strong : rms between excitations at the weakest and strongest quarter of the lines [dB]
-    state_space : deviation of the state space from A's recording
-    states : order of the state space
-    """
-
-    schedule: tuple[StageRun, ...]
-    minutes: float
-    weights: np.ndarray
-    identified: tuple[ArticleIdentified, ...]
-    modes: ModesOfArticles
-    partner: np.ndarray
+    schedule: tuple[StageRun, ...]  # rows of table 3
+    minutes: float  # duration of all its sweeps
+    weights: np.ndarray  # (3,) [kg]
+    identified: tuple[ArticleIdentified, ...]  # of A, B and C
+    modes: ModesOfArticles  # their modes, paired
+    partner: np.ndarray  # (r,) row of the thesis' table 5 nearest to each mode, -1: none
+    # largest error of frequency and damping of A against the bench's own poles
     worst: tuple[float, float]
-    cords: tuple[CordReading, ...]
-    lines: np.ndarray
+    cords: tuple[CordReading, ...]  # figure 19, by article
+    lines: np.ndarray  # (r,) of A's modes, lines between their half-power points
+    # homogeneity of A at half the level and at twice, each against the level itself
     levels: tuple[Homogeneity, ...]
+    # between_articles, between_excitations: (bands,) rms of 20 log|H| about the mean [dB]
     between_articles: np.ndarray
     between_excitations: np.ndarray
+    # faint, strong: rms between excitations at the weakest and strongest quarter of the lines [dB]
     faint: float
     strong: float
-    state_space: Quality
-    states: int
+    state_space: Quality  # deviation of the state space from A's recording
+    states: int  # order of the state space
 
 
 def findings(

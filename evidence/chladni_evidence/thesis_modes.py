@@ -24,24 +24,14 @@ SAME = 0.9  # MAC of a pole with a stronger one in whose bandwidth it lies: the 
 
 @dataclass(frozen=True, eq=False)
 class ArticleIdentified:
-    """Modes of one article.
+    """Modes of one article."""
 
-    Attributes
-    ----------
-    frf : FRF             of the recording
-    use : (n_f,) bool     lines of the identification
-    whole : Identified    with poles that no peak confirms and poles outside the band
-    modes : Identified    the article's own modes within the band
-    doubles : (k,)        poles next to a mode with the same shape, or without a peak [Hz]
-    cords : (l,)          poles of the cords [Hz]
-    """
-
-    frf: FRF
-    use: np.ndarray
-    whole: Identified
-    modes: Identified
-    doubles: np.ndarray
-    cords: np.ndarray
+    frf: FRF  # of the recording
+    use: np.ndarray  # (n_f,) bool: lines of the identification
+    whole: Identified  # with poles that no peak confirms and poles outside the band
+    modes: Identified  # the article's own modes within the band
+    doubles: np.ndarray  # (k,) poles next to a mode with the same shape, or without a peak [Hz]
+    cords: np.ndarray  # (l,) poles of the cords [Hz]
 
     @property
     def raw(self) -> FRF:
@@ -88,21 +78,14 @@ def doubled(found: Identified) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ModesOfArticles:
-    """Modes of A with their partners in B and C; every mode has at least one partner.
+    """Modes of A with their partners in B and C; every mode has at least one partner."""
 
-    Attributes
-    ----------
-    rows : (r,)                   of A's modes
-    alone : (k,)                  frequencies of A's poles that neither B nor C shows [Hz]
-    frequency, damping : (r, 3)   [Hz], [-]; nan where an article has no partner
-    mac : (r, 2)                  of A with B and with C
-    """
-
-    rows: np.ndarray
-    alone: np.ndarray
+    rows: np.ndarray  # (r,) of A's modes
+    alone: np.ndarray  # (k,) frequencies of A's poles that neither B nor C shows [Hz]
+    # frequency, damping: (r, 3) [Hz], [-]; nan where an article has no partner
     frequency: np.ndarray
     damping: np.ndarray
-    mac: np.ndarray
+    mac: np.ndarray  # (r, 2) of A with B and with C
 
 
 def paired(found: tuple[ArticleIdentified, ...]) -> ModesOfArticles:

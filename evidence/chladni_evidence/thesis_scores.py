@@ -31,30 +31,22 @@ MODES_A = "modes_A.npz"
 
 @dataclass(frozen=True, eq=False)
 class ModelScore:
-    """A model against the test.
+    """A model against the test."""
 
-    Attributes
-    ----------
-    name : of the model
-    mass : without sensors [kg]
-    Q, fit : mean over channels and lines of tailgate A, 10 to 195 and 26 to 195 Hz
-    summed : Σ over channels of the mean over lines, 10 to 195 Hz
-    other, beyond : Q of tailgates B and C, 26 to 195 Hz; of A, 200 to 300 Hz (none of them fitted)
-    test, model, mac : (r,)    of the modes of A; nan where the model has no partner
-    alone : frequencies of the model's modes below 195 Hz without partner [Hz]
-    """
-
-    name: str
-    mass: float
+    name: str  # of the model
+    mass: float  # without sensors [kg]
+    # Q, fit: mean over channels and lines of tailgate A, 10 to 195 and 26 to 195 Hz
     Q: float
     fit: float
-    summed: float
+    summed: float  # Σ over channels of the mean over lines, 10 to 195 Hz
+    # other, beyond: Q of tailgates B and C, 26 to 195 Hz; of A, 200 to 300 Hz (none of them fitted)
     other: float
     beyond: float
+    # test, model, mac: (r,) of the modes of A; nan where the model has no partner
     test: np.ndarray
     model: np.ndarray
     mac: np.ndarray
-    alone: np.ndarray
+    alone: np.ndarray  # frequencies of the model's modes below 195 Hz without partner [Hz]
 
     @property
     def error(self) -> float:

@@ -26,16 +26,10 @@ _MODES = {"ab": os.O_WRONLY | os.O_APPEND, "a+b": os.O_RDWR | os.O_APPEND}
 
 @dataclass(frozen=True)
 class OwnFolder:
-    """A folder held open; names within it are relative, with ``/`` between their parts.
-
-    Attributes
-    ----------
-    path : Path
-    handle : int    of the open folder; -1 where the system opens none
-    """
+    """A folder held open; names within it are relative, with ``/`` between their parts."""
 
     path: Path
-    handle: int
+    handle: int  # of the open folder; -1 where the system opens none
 
     @contextmanager
     def _above(self, name: str, make: bool = False) -> Iterator[tuple[int | None, str]]:

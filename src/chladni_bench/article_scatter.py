@@ -30,22 +30,15 @@ BETWEEN = 0.5  # scatter between two modes over that of one, 0.7/√2: Soize's m
 
 @dataclass(frozen=True)
 class Scatter:
-    """Standard deviations of natural logarithms.
+    """Standard deviations of natural logarithms."""
 
-    Attributes
-    ----------
-    whole, mode : of frequencies: what all modes of an article share, and of each for itself
-    weight : of the mass
-    damping : median of the damping ratios [-]
-    damping_of_modes : between the modes of a structure, the same in all articles
-    damping_whole, damping_mode : between articles, as for frequencies
-    """
-
+    # whole, mode: of frequencies: what all modes of an article share, and of each for itself
     whole: float
     mode: float
-    weight: float
-    damping: float
-    damping_of_modes: float
+    weight: float  # of the mass
+    damping: float  # median of the damping ratios [-]
+    damping_of_modes: float  # between the modes of a structure, the same in all articles
+    # damping_whole, damping_mode: between articles, as for frequencies
     damping_whole: float
     damping_mode: float
 

@@ -31,17 +31,12 @@ FLAT = 0.05  # of the structure's size: hangers nearer to the centre of gravity 
 
 @dataclass(frozen=True, eq=False)
 class TruePlaces:
-    """True places and directions of sensors.
+    """True places and directions of sensors."""
 
-    Attributes
-    ----------
-    points, directions : (n, 3)   [m], unit vectors
-    grids : (n,) int              0 where the place is no grid
-    """
-
+    # points, directions: (n, 3) [m], unit vectors
     points: np.ndarray
     directions: np.ndarray
-    grids: np.ndarray
+    grids: np.ndarray  # (n,) int: 0 where the place is no grid
 
 
 def true_places(

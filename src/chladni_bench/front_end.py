@@ -12,18 +12,12 @@ RIPPLE, STOP, ORDER = 0.05, 100.0, 11  # [dB], [dB]; an odd order falls to nothi
 
 @dataclass(frozen=True)
 class FrontEnd:
-    """One converter a channel.
+    """One converter a channel."""
 
-    Attributes
-    ----------
-    volts : range ± [V]; the sensors' own limit in Echaniz Granado (2015), section 4.2.5
-    bits : of the converter over the whole range
-    noise : of converter and cable [V/√Hz]
-    """
-
+    # range ± [V]; the sensors' own limit in Echaniz Granado (2015), section 4.2.5
     volts: float = 5.0
-    bits: int = 24
-    noise: float = 2e-7
+    bits: int = 24  # of the converter over the whole range
+    noise: float = 2e-7  # of converter and cable [V/√Hz]
 
     @property
     def step(self) -> float:

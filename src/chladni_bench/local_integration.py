@@ -21,16 +21,10 @@ ROUNDS = 3  # Gauss-Seidel over the sites of one step: they couple by h² / m on
 
 @dataclass
 class LocalRun:
-    """Local forces that run on from block to block.
+    """Local forces that run on from block to block."""
 
-    Attributes
-    ----------
-    openings : PoleModel      x of every site; its inputs are the drives, then a force a site
-    laws : what acts at each site
-    """
-
-    openings: PoleModel
-    laws: Sequence[LocalForce]
+    openings: PoleModel  # x of every site; its inputs are the drives, then a force a site
+    laws: Sequence[LocalForce]  # what acts at each site
     h: float
     free: HeldRun = field(init=False)
     state: np.ndarray = field(init=False)
@@ -111,22 +105,13 @@ class LocalRun:
 
 @dataclass(frozen=True, eq=False)
 class _Together:
-    """Several steps of one site at once.
+    """Several steps of one site at once."""
 
-    Attributes
-    ----------
-    powers : (n + 1, m)   Eʲ
-    W : (m,)              what a unit of force adds to r in a step
-    S : float             what it moves the site in that step
-    seen : (n, 2 m)       a of r, as real and imaginary parts in turn
-    H : (n, n)            a of the forces of earlier steps
-    """
-
-    powers: np.ndarray
-    W: np.ndarray
-    S: float
-    seen: np.ndarray
-    H: np.ndarray
+    powers: np.ndarray  # (n + 1, m) Eʲ
+    W: np.ndarray  # (m,) what a unit of force adds to r in a step
+    S: float  # what it moves the site in that step
+    seen: np.ndarray  # (n, 2 m) a of r, as real and imaginary parts in turn
+    H: np.ndarray  # (n, n) a of the forces of earlier steps
     back: np.ndarray = field(init=False)
     inverses: dict[float, np.ndarray] = field(init=False, default_factory=dict)
 

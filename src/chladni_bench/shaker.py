@@ -7,21 +7,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ForceGauge:
-    """A force transducer between stinger and skin (of the kind of a PCB 208C02).
+    """A force transducer between stinger and skin (of the kind of a PCB 208C02)."""
 
-    Attributes
-    ----------
-    mass : [kg]
-    beyond : share of it, with its stud, between the crystal and the skin: what the article carries
-        and no force that is read accounts for
-    sensitivity : [V/N]
-    noise : of its crystal and amplifier [N/√Hz]
-    """
-
-    mass: float = 0.023
+    mass: float = 0.023  # [kg]
+    # share of it, with its stud, between the crystal and the skin: what the article carries and no
+    # force that is read accounts for
     beyond: float = 0.4
-    sensitivity: float = 0.01124
-    noise: float = 4.5e-5
+    sensitivity: float = 0.01124  # [V/N]
+    noise: float = 4.5e-5  # of its crystal and amplifier [N/√Hz]
 
 
 @dataclass(frozen=True)

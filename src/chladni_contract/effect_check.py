@@ -99,18 +99,11 @@ RULES: dict[str, FamilyRule] = {  # what an effect does: the rule that checks it
 
 @dataclass(frozen=True)
 class CheckedRule:
-    """A rule of the contract and its outcome.
+    """A rule of the contract and its outcome."""
 
-    Attributes
-    ----------
-    rule : what the effect has to do
-    passed : None where the rule could not be tried
-    text : the number that was measured, or the fault and its remedy
-    """
-
-    rule: str
-    passed: bool | None
-    text: str
+    rule: str  # what the effect has to do
+    passed: bool | None  # None where the rule could not be tried
+    text: str  # the number that was measured, or the fault and its remedy
 
     @property
     def outcome(self) -> str:

@@ -41,20 +41,15 @@ HELD = (1570, 1100, 1630, 1400, 1250, 1390)  # those of the plate in a clamp
 
 @dataclass(frozen=True, eq=False)
 class EffectGround:
-    """A deck, what is known of its test, two recordings of it, and an article of a finer mesh.
-
-    Attributes
-    ----------
-    by_responses, by_poles : searches with FRFs and with natural frequencies alone
-    flexible : positions of the flexible modes that are compared
-    """
+    """A deck, what is known of its test, two recordings of it, and an article of a finer mesh."""
 
     deck: Assembly
     reduced: ReducedProblem
+    # by_responses, by_poles: searches with FRFs and with natural frequencies alone
     by_responses: UpdatingContext
     by_poles: UpdatingContext
     article: Article
-    flexible: slice
+    flexible: slice  # positions of the flexible modes that are compared
 
 
 def ground(

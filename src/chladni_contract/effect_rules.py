@@ -32,21 +32,13 @@ class BrokenRule(AccuracyError):
 
 @dataclass(frozen=True, eq=False)
 class ActingEffect:
-    """An effect on a reduced model.
-
-    Attributes
-    ----------
-    x : (n_p,)       at which it acts
-    idle : (n_p,)    at which it does nothing
-    model : over a basis that can represent it near x
-    flexible : positions of the eigenvalues that are compared
-    """
+    """An effect on a reduced model."""
 
     effect: Effect
-    x: np.ndarray
-    idle: np.ndarray
-    model: Reduced
-    flexible: slice
+    x: np.ndarray  # (n_p,) at which it acts
+    idle: np.ndarray  # (n_p,) at which it does nothing
+    model: Reduced  # over a basis that can represent it near x
+    flexible: slice  # positions of the eigenvalues that are compared
 
     def state(self, x: np.ndarray, gradient: bool = False) -> State:
         """The model with the effect at x."""

@@ -21,18 +21,11 @@ ABOVE = 1.6  # modes reach up to this many times the highest line
 
 @dataclass(frozen=True)
 class Visibility:
-    """Change of the responses by draws of a concealed effect and by the scatter of E and t.
+    """Change of the responses by draws of a concealed effect and by the scatter of E and t."""
 
-    Attributes
-    ----------
-    moved : by each draw [rms decades]
-    scatter : by another article of the same drawing [rms decades]
-    due : change from which the effect can be recognised
-    """
-
-    moved: tuple[float, ...]
-    scatter: float
-    due: float
+    moved: tuple[float, ...]  # by each draw [rms decades]
+    scatter: float  # by another article of the same drawing [rms decades]
+    due: float  # change from which the effect can be recognised
 
     @property
     def seen(self) -> int:

@@ -38,18 +38,12 @@ SYSTEM = UNITS["mm-t-s"]
 
 @dataclass(frozen=True, eq=False)
 class TriedFamily:
-    """A family on a structure, with its candidates.
-
-    Attributes
-    ----------
-    candidates : of a search with FRFs
-    acting : each of them, off every symmetry near its start
-    """
+    """A family on a structure, with its candidates."""
 
     family: Family
     ground: EffectGround
-    candidates: Sequence[Candidate]
-    acting: Sequence[ActingEffect]
+    candidates: Sequence[Candidate]  # of a search with FRFs
+    acting: Sequence[ActingEffect]  # each of them, off every symmetry near its start
 
 
 def tried(family: Family, ground: EffectGround) -> TriedFamily:

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects import compliant_support
-from chladni.effects.compliant_support import on_springs
+from chladni.effects.compliant_support import SupportDirection, on_springs
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.masses import sensor_mass
 from chladni.effects.model_errors import mesh_errors
@@ -56,16 +56,25 @@ class Context:
     scan, bases = object(), (np.zeros(0),)
 
     def __init__(self, problem):
-        self.where = where(problem)
+        self.where, self.tried = where(problem), []
 
     def scores(self, effect, starts):
-        return np.full((1, len(starts)), -effect.direction.frame[0][2])
+        self.tried += [effect] if effect not in self.tried else []
+        frame = getattr(effect.direction, "frame", np.eye(3))
+        return np.full((1, len(starts)), -frame[0][2])
 
 
 def proposed(problem):
     """Of each clamp what bends across the strip, from x = 0 on."""
-    every = [c.effect for c in compliant_support.candidates(Context(problem))]
+    every = [e for e in tried(problem) if isinstance(e.direction, SupportDirection)]
     return sorted((e for e in every if e.direction.frame[0][2] > 0.9), key=lambda e: e.point)
+
+
+def tried(problem):
+    """Everything that the search has a score of."""
+    context = Context(problem)
+    compliant_support.candidates(context)
+    return context.tried
 
 
 @pytest.fixture(scope="module")

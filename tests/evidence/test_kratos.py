@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.errors import ModelError
+from chladni.errors import FileError, ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Assembly
 from chladni.model.ground_springs import with_ground_bushes, with_springs
 from chladni.model.properties import BeamSection, Part
-from chladni_evidence.blind_make import made_of
+from chladni_evidence.blind_make import made_of, make
 from chladni_evidence.evidence_sets import HIDDEN_IN, Order, orders
 from chladni_evidence.hidden import Site, with_lumps
-from chladni_evidence.kratos import Stretched, _shells, _springs, installed, kratos_modes
+from chladni_evidence.kratos import PYTHON, Stretched, _shells, _springs, installed, kratos_modes
 from chladni_evidence.kratos_kinds import doubler, rib, seam, soft_clamp, stretched
 from chladni_evidence.kratos_structures import ARTICLES, DECKS, STEEL, half_cylinder
 from chladni_evidence.made_case import SHIFT, _calibration_parameters
@@ -189,6 +189,23 @@ def test_what_has_no_counterpart_is_refused(square):
         _shells(square.with_parts((square.parts[0].with_section(bending_ratio=0.5),)), False)
     with pytest.raises(ModelError, match="springs from points to ground"):
         _springs(with_springs(square, [1], np.eye(3)[[2]], 1.0))
+
+
+def test_without_kratos_nothing_is_made(tmp_path, monkeypatch):
+    """The sentence says how to name a Python that has it; no folder is left."""
+    monkeypatch.setenv(PYTHON, "/no/python")
+    installed.cache_clear()
+    with pytest.raises(FileError, match="set CHLADNI_KRATOS to a Python that has both"):
+        make(
+            [Order("cantilever", "nothing", 503, "kratos")],
+            tmp_path / "a",
+            "tune",
+            "kratos",
+            1,
+            str,
+        )
+    installed.cache_clear()
+    assert not (tmp_path / "a").exists()
 
 
 def test_a_report_has_twelve_effects_and_six_nulls():

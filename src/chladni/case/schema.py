@@ -160,8 +160,9 @@ class CaseWords(TypedDict, total=False):
     position_sd: Annotated[float, Key("test", "0.003", _FIT, "0.0015", "m",
         "Standard deviation of the place of each, in each direction of the sheet, if the table of "
         "sensors gives none.", kind="number, 0 to the size of the structure")]
-    hangers: Annotated[Sequence[int], Key("test", "[101, 102]", ("diagnose", "bench"), "none", "",
-        "Grids of the cords: places of the springs of `suspension`.")]
+    hangers: Annotated[Sequence[int], Key("test", "[101, 102]", (*_FIT, "bench"), "none", "",
+        "Grids of the cords: places of the springs of `suspension`. Without them a free deck is "
+        "compared above the modes of the suspension.")]
     band: Annotated[Band, Key("band", "[26.0, 195.0]", ("identify", *_SCORE, "bench"),
         "the whole recording", "Hz", "Band that is identified, scored and fitted.",
         name="fit")]

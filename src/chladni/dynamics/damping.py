@@ -13,16 +13,12 @@ Kind = Literal["g", "crit", "q"]
 
 @dataclass(frozen=True, eq=False)
 class DampingTable:
-    """Modal damping against frequency (Nastran's TABDMP1).
+    """Modal damping against frequency (Nastran's TABDMP1)."""
 
-    Attributes
-    ----------
-    frequency : (k,)  Hz, not decreasing; a repeated frequency is a jump, with the mean value there
-    value : (k,)      structural damping g (``kind`` "g", Nastran's default when TYPE is absent),
-                      fraction of critical ("crit") or quality factor ("q")
-    """
-
+    # (k,) Hz, not decreasing; a repeated frequency is a jump, with the mean value there
     frequency: np.ndarray
+    # (k,) structural damping g (``kind`` "g", Nastran's default when TYPE is absent), fraction of
+    # critical ("crit") or quality factor ("q")
     value: np.ndarray
     kind: Kind = "g"
 

@@ -139,17 +139,11 @@ class Residual:
     """Contribution of the omitted higher modes, R(s) = R_0 - (s² + σ) R_1 [m/N].
 
     These are two terms of the series of Σ φφᵀ/(λ_r + s²) about s² = -σ, over the omitted modes.
-
-    Attributes
-    ----------
-    static : (n_out, n_in)     R_0 = Σ φφᵀ/(λ_r - σ) [m/N]
-    slope : (n_out, n_in)      R_1 = Σ φφᵀ/(λ_r - σ)² [m s²/N]
-    shift : float              σ [rad²/s²]
     """
 
-    static: np.ndarray
-    slope: np.ndarray
-    shift: float = 0.0
+    static: np.ndarray  # (n_out, n_in) R_0 = Σ φφᵀ/(λ_r - σ) [m/N]
+    slope: np.ndarray  # (n_out, n_in) R_1 = Σ φφᵀ/(λ_r - σ)² [m s²/N]
+    shift: float = 0.0  # σ [rad²/s²]
 
     def at(self, s: np.ndarray) -> np.ndarray:
         """R(s) for s (n_f,) [rad/s] -> (n_f, n_out, n_in)."""

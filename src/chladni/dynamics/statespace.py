@@ -14,22 +14,17 @@ from .modes import ModalModel
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:
-    """x' = A x + B u, y = C x + D u.
+    """x' = A x + B u, y = C x + D u."""
 
-    Attributes
-    ----------
-    A, B, C, D : (n, n), (n, n_in), (n_out, n), (n_out, n_in) real
-    outputs, inputs : tuple of str  labels as 412:+Z
-    quantity : str                  of y: receptance (displacement), mobility or accelerance
-    """
-
+    # A, B, C, D: (n, n), (n, n_in), (n_out, n), (n_out, n_in) real
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
+    # outputs, inputs: labels as 412:+Z
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
-    quantity: Quantity = "receptance"
+    quantity: Quantity = "receptance"  # of y: receptance (displacement), mobility or accelerance
 
     def __post_init__(self) -> None:
         n, o, i = len(self.A), len(self.outputs), len(self.inputs)

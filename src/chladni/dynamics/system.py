@@ -11,21 +11,14 @@ from ..errors import ShapeError
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Mass, viscous damping and stiffness over labelled degrees of freedom.
+    """Mass, viscous damping and stiffness over labelled degrees of freedom."""
 
-    Attributes
-    ----------
-    M, V, K : sparse (n, n)
-        Mass [kg], damping [N s/m], stiffness [N/m]; symmetric. K may be complex where the
-        structure has hysteretic damping.
-    dofs : (n, 2) int
-        Point id and component 1-6 of each row.
-    """
-
+    # M, V, K: (n, n) mass [kg], damping [N s/m], stiffness [N/m]; symmetric. K may be
+    # complex where the structure has hysteretic damping.
     M: sp.csr_array
     V: sp.csr_array
     K: sp.csr_array
-    dofs: np.ndarray
+    dofs: np.ndarray  # (n, 2) int: point id and component 1-6 of each row
 
     def __post_init__(self) -> None:
         n = len(self.dofs)

@@ -34,19 +34,12 @@ PIECE = 1024  # shells whose matrices are in memory at a time
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The assembled matrices and the transformation from the free dofs to the motion of points.
-
-    Attributes
-    ----------
-    assembly : Assembly
-    T : (6 n_points, n_free) csr    motion of every point in the basic frame, u = T q
-    system : System                 M, V, K over the free dofs; K real
-    loss : (n_free, n_free) csr     imaginary part of the stiffness from materials' damping [N/m]
-    """
+    """The assembled matrices and the transformation from the free dofs to the motion of points."""
 
     assembly: Assembly
-    T: sp.csr_array
-    system: System
+    T: sp.csr_array  # (6 n_points, n_free) csr: motion of every point in the basic frame, u = T q
+    system: System  # M, V, K over the free dofs; K real
+    # (n_free, n_free) csr: imaginary part of the stiffness from materials' damping [N/m]
     loss: sp.csr_array
 
     def scatter(self, matrices: np.ndarray, nodes: np.ndarray) -> sp.csr_array:

@@ -19,18 +19,11 @@ from .solve import inertia_load
 
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """Unit translations b of all supports along directions.
+    """Unit translations b of all supports along directions."""
 
-    Attributes
-    ----------
-    whole : (6 n_points, k)    R b, rigid motion of every point in the basic frame [-]
-    free : (n_free, k)         the same over the free dofs
-    force : (n_free, k)        Tᵀ M_full R b [kg]; a unit acceleration has the load minus this
-    """
-
-    whole: np.ndarray
-    free: np.ndarray
-    force: np.ndarray
+    whole: np.ndarray  # (6 n_points, k) R b, rigid motion of every point in the basic frame [-]
+    free: np.ndarray  # (n_free, k) the same over the free dofs
+    force: np.ndarray  # (n_free, k) Tᵀ M_full R b [kg]; a unit acceleration has the load minus this
 
     def extended_to(self, built: Structure) -> "BaseMotion":
         """Extend to a structure with additional dofs, whose motion is relative to the base too."""

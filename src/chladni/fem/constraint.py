@@ -9,20 +9,15 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Dependent dofs and their independent ones; dofs are 6 * row of points + component - 1.
+    """Dependent dofs and their independent ones; dofs are 6 * row of points + component - 1."""
 
-    Attributes
-    ----------
-    dof, owner : (m,) int     dependent dof and the position of its element in ``Assembly.rigid``
-    row, on : (e,) int        entries: index of the m rows, and the dof on which it depends
-    factor : (e,)             [-], [m] or [1/m]
-    """
-
+    # dof, owner: (m,) int: dependent dof and the position of its element in ``Assembly.rigid``
     dof: np.ndarray
     owner: np.ndarray
+    # row, on: (e,) int: of the entries: index of the m rows, and the dof on which it depends
     row: np.ndarray
     on: np.ndarray
-    factor: np.ndarray
+    factor: np.ndarray  # (e,) [-], [m] or [1/m]
 
     @classmethod
     def none(cls) -> Self:

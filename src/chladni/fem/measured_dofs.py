@@ -16,24 +16,14 @@ _ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
 
 @dataclass(frozen=True, eq=False)
 class MeasuredDofs:
-    """Measured or driven dofs: grids, free points on the nearest shell, or the motion of the base.
+    """Measured or driven dofs: grids, free points on the nearest shell, or motion of the base."""
 
-    Attributes
-    ----------
-    labels : (k,) text
-    grids : (k,) int       id, 0 for a place away from grids
-    points : (k, 3)        [m], basic frame; nan for the motion of the base
-    directions : (k, 3)    unit vectors, basic frame
-    sd : (k,)              uncertainty of the place [m]
-    mass : (k,)            of the sensor [kg]
-    """
-
-    labels: tuple[str, ...]
-    grids: np.ndarray
-    points: np.ndarray
-    directions: np.ndarray
-    sd: np.ndarray
-    mass: np.ndarray
+    labels: tuple[str, ...]  # (k,) text
+    grids: np.ndarray  # (k,) int: id, 0 for a place away from grids
+    points: np.ndarray  # (k, 3) [m], basic frame; nan for the motion of the base
+    directions: np.ndarray  # (k, 3) unit vectors, basic frame
+    sd: np.ndarray  # (k,) uncertainty of the place [m]
+    mass: np.ndarray  # (k,) of the sensor [kg]
 
     @property
     def base(self) -> np.ndarray:

@@ -31,18 +31,12 @@ NOTHING = 1e-12  # of the largest entry: rounding
 
 @dataclass(frozen=True, eq=False)
 class MembraneForce:
-    """Operators of a force field over some shells, all per unit of force.
+    """Operators of a force field over some shells, all per unit of force."""
 
-    Attributes
-    ----------
-    net : (n, n) csr        L over the points of the assembly [-]
-    moments : (6 n, 3) csr  K_g R, loads on the points in rigid rotations R of the whole [m]
-    turning : (3, 3)        C = Rᵀ K_g R, twice the energy of these rotations [m²]
-    """
-
-    net: sp.csr_array
+    net: sp.csr_array  # (n, n) csr: L over the points of the assembly [-]
+    # (6 n, 3) csr: K_g R, loads on the points in rigid rotations R of the whole [m]
     moments: sp.csr_array
-    turning: np.ndarray
+    turning: np.ndarray  # (3, 3) C = Rᵀ K_g R, twice the energy of these rotations [m²]
 
     @property
     def springs(self) -> tuple[np.ndarray, np.ndarray]:

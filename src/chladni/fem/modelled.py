@@ -17,18 +17,11 @@ _ROUNDING = 1e-9  # tolerance, because callers compute the same band by differen
 
 @dataclass(frozen=True, eq=False)
 class Modelled:
-    """The matrices of an assembly and all its normal modes up to ``band``, at least the first.
-
-    Attributes
-    ----------
-    structure : Structure
-    modes : ModalModel     undamped, rigid ones included
-    band : float           [Hz]
-    """
+    """The matrices of an assembly and all its normal modes up to ``band``, at least the first."""
 
     structure: Structure
-    modes: ModalModel
-    band: float
+    modes: ModalModel  # undamped, rigid ones included
+    band: float  # [Hz]
 
     @property
     def assembly(self) -> Assembly:

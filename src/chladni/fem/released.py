@@ -1,12 +1,13 @@
-"""A structure with movable supports: rigid motions of its clamps are additional dofs.
+"""A structure with movable supports: motions of its clamps are additional dofs.
 
-u = T q + N g: g (6 per clamp) translates a clamp and rotates it about its centre. N is the motion
-of the points that it holds. A matrix A of elements becomes [T N]ᵀ A [T N]. The static
+u = T q + N g: g moves supports, as rigid clamps or along their lines. N is the motion
+of the points that they hold. A matrix A of elements becomes [T N]ᵀ A [T N]. The static
 response of the structure to a motion of a clamp is then -K_qq⁻¹ K_qg (constraint modes; Craig and
 Bampton 1968, AIAA Journal 6, 1313-1319).
 """
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,18 +22,11 @@ from .sparse_assembly import congruence
 
 @dataclass(frozen=True, eq=False)
 class Clamp:
-    """Supports of points that elements connect, treated as one rigid body.
+    """Supports of points that elements connect, treated as one rigid body."""
 
-    Attributes
-    ----------
-    grids : (k,) int        ids of the points
-    held : (k, 6) bool      components of each that it holds
-    centre : (3,)           mean of the points [m]
-    """
-
-    grids: np.ndarray
-    held: np.ndarray
-    centre: np.ndarray
+    grids: np.ndarray  # (k,) int: ids of the points
+    held: np.ndarray  # (k, 6) bool: components of each that it holds
+    centre: np.ndarray  # (3,) mean of the points [m]
 
 
 def clamps(assembly: Assembly) -> tuple[Clamp, ...]:
@@ -76,13 +70,40 @@ def _elements(assembly: Assembly) -> sp.csr_array:
     return sp.csr_array((np.ones(len(at)), at, ends), shape=(len(each), len(assembly.points)))
 
 
-def motions_of(assembly: Assembly, held_by: tuple[Clamp, ...]) -> sp.csr_array:
-    """N (6 n_points, 6 clamps): motion of all points when a clamp translates or rotates."""
-    T, dofs = supported(assembly)
-    at, component = dofs[:, 0], dofs[:, 1] - 1
-    axes = np.eye(3)[component % 3]
-    if assembly.axes is not None:
-        axes = assembly.axes[at, component % 3]
+@dataclass(frozen=True, eq=False)
+class Supports:
+    """The supports of a structure, and the forces of some motions on them.
+
+    Attributes
+    ----------
+    motions : (6 n_points, k)   unit motion of each support
+    dofs : (k, 2)               row of its point, component 1-6
+    force : (k, r)              on it, of each motion of the structure
+    """
+
+    motions: sp.csr_array
+    dofs: np.ndarray
+    force: np.ndarray
+
+    @classmethod
+    def of(cls, built: Structure, shapes: np.ndarray) -> Self:
+        """The supports of a structure that moves by ``shapes`` (n, r)."""
+        motions, dofs = supported(built.assembly)
+        _, _, K, _ = over_all_motions(built.assembly)
+        return cls(motions, dofs, motions.T @ (K @ (built.T @ shapes)))
+
+    def directions(self, assembly: Assembly) -> np.ndarray:
+        """Unit vector (k, 3) along or about which each support holds, in the basic frame."""
+        at, component = self.dofs[:, 0], self.dofs[:, 1] - 1
+        if assembly.axes is None:
+            return np.asarray(np.eye(3)[component % 3])
+        return np.asarray(assembly.axes[at, component % 3])
+
+
+def rigid_moves(assembly: Assembly, supports: Supports, held_by: tuple[Clamp, ...]) -> np.ndarray:
+    """Motion (k, 6 clamps) of each support when a clamp translates or rotates."""
+    at, component = supports.dofs[:, 0], supports.dofs[:, 1] - 1
+    axes = supports.directions(assembly)
     triple = (3 * (component // 3))[:, None] + np.arange(3)
     columns = []
     for clamp in held_by:
@@ -90,40 +111,32 @@ def motions_of(assembly: Assembly, held_by: tuple[Clamp, ...]) -> sp.csr_array:
         of_clamp[assembly.rows(clamp.grids)] = clamp.held
         about = replace(assembly, points=assembly.points - clamp.centre)
         R = rigid_motions(about).reshape(-1, 6, 6)[at[:, None], triple]
-        moves = np.where(of_clamp[at, component, None], np.einsum("ka,kaj->kj", axes, R), 0.0)
-        columns.append(T @ sp.csr_array(moves))
-    return sp.csr_array(sp.hstack(columns))
+        columns.append(np.where(of_clamp[at, component, None], np.einsum("ka,kaj->kj", axes, R), 0))
+    return np.hstack(columns)
 
 
 @dataclass(frozen=True, eq=False)
 class Release:
-    """Clamps of a structure, and the springs (6 clamps,) on them that are as good as rigid."""
+    """Motions of supports that become degrees of freedom, and springs on them.
 
-    clamps: tuple[Clamp, ...]
+    Attributes
+    ----------
+    motions : (6 n_points, p)   of all points, by a unit of each
+    labels : (p, 2) int         grid and component that stand for it
+    springs : (p,)              as good as rigid [N/m, N m/rad]
+    """
+
+    motions: sp.csr_array
+    labels: np.ndarray
     springs: np.ndarray
 
     def of(self, built: Structure) -> Structure:
-        """The structure with the motions of the clamps as further degrees of freedom."""
-        return released(built, self.clamps, self.springs)
-
-
-def released(
-    built: Structure, held_by: tuple[Clamp, ...], hold: np.ndarray | float = 0.0
-) -> Structure:
-    """Add six degrees of freedom for each clamp of the structure.
-
-    They follow the existing ones, with the label of the first grid of the clamp.
-
-    Parameters
-    ----------
-    hold : (6 clamps,)    springs to ground at these dofs [N/m, N m/rad]
-    """
-    T = sp.csr_array(sp.hstack([built.T, motions_of(built.assembly, held_by)]))
-    M, V, K, loss = over_all_motions(built.assembly)
-    labels = [(int(clamp.grids[0]), c) for clamp in held_by for c in range(1, 7)]
-    dofs = np.concatenate([built.system.dofs, np.array(labels).reshape(-1, 2)])
-    springs = np.zeros(len(dofs))
-    springs[len(built.system.dofs) :] = hold
-    K_held = sp.csr_array(congruence(T, K) + sp.diags_array(springs))
-    system = System(congruence(T, M), congruence(T, V), K_held, dofs)
-    return replace(built, T=T, system=system, loss=congruence(T, loss))
+        """The structure with these degrees of freedom after its own."""
+        T = sp.csr_array(sp.hstack([built.T, self.motions]))
+        M, V, K, loss = over_all_motions(built.assembly)
+        dofs = np.concatenate([built.system.dofs, self.labels])
+        springs = np.zeros(len(dofs))
+        springs[len(built.system.dofs) :] = self.springs
+        K_held = sp.csr_array(congruence(T, K) + sp.diags_array(springs))
+        system = System(congruence(T, M), congruence(T, V), K_held, dofs)
+        return replace(built, T=T, system=system, loss=congruence(T, loss))

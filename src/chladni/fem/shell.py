@@ -35,18 +35,12 @@ Rows = np.ndarray | slice
 
 @dataclass(frozen=True, eq=False)
 class Strains:
-    """Generalised strains (ε κ γ ω-rz) of m shells of one shape at g points, from nodal motions.
+    """Generalised strains (ε κ γ ω-rz) of m shells of one shape at g points, from nodal motions."""
 
-    Attributes
-    ----------
-    B : (m, g, 9, 24)     ε [-], κ [1/m], γ [-], ω - rz [-] (see damped) in the element frame
-    weight : (m, g)       dA [m²]
-    N : (g, 4)            shape functions, for values given at corners
-    """
-
+    # (m, g, 9, 24) ε [-], κ [1/m], γ [-], ω - rz [-] (see damped) in the element frame
     B: np.ndarray
-    weight: np.ndarray
-    N: np.ndarray
+    weight: np.ndarray  # (m, g) dA [m²]
+    N: np.ndarray  # (g, 4) shape functions, for values given at corners
 
 
 def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:

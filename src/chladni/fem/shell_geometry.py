@@ -23,30 +23,17 @@ from .shell_membrane import corner_slopes
 
 @dataclass(frozen=True, eq=False)
 class ShellGeometry:
-    """Frames and flattened corners of m shells; index it with a mask, rows or a slice for a subset.
+    """Frames and flattened corners of m shells; a mask, rows or a slice as index give a subset."""
 
-    Attributes
-    ----------
-    nodes : (m, 4) int       rows of points; a triangle repeats its third
-    frames : (m, 3, 3)       rows are the unit vectors x, y, n of the element frame
-    corners : (m, 4, 2)      flattened corners from the element's middle [m]
-    warp : (m, 4)            height of each node along n above the plane [m]
-    offset : (m,)            of the mid-surface along n (Nastran's ZOFFS) [m]
-    triangle : (m,) bool
-    area : (m,)              of the flattened element [m²]
-    sides : (m, 2)           length along x and y for residual bending flexibility [m]
-    turn : (m,)              angle from the element's x to material axis 1 [rad]
-    """
-
-    nodes: np.ndarray
-    frames: np.ndarray
-    corners: np.ndarray
-    warp: np.ndarray
-    offset: np.ndarray
-    triangle: np.ndarray
-    area: np.ndarray
-    sides: np.ndarray
-    turn: np.ndarray
+    nodes: np.ndarray  # (m, 4) int: rows of points; a triangle repeats its third
+    frames: np.ndarray  # (m, 3, 3) rows are the unit vectors x, y, n of the element frame
+    corners: np.ndarray  # (m, 4, 2) flattened corners from the element's middle [m]
+    warp: np.ndarray  # (m, 4) height of each node along n above the plane [m]
+    offset: np.ndarray  # (m,) of the mid-surface along n (Nastran's ZOFFS) [m]
+    triangle: np.ndarray  # (m,) bool
+    area: np.ndarray  # (m,) of the flattened element [m²]
+    sides: np.ndarray  # (m, 2) length along x and y for residual bending flexibility [m]
+    turn: np.ndarray  # (m,) angle from the element's x to material axis 1 [rad]
 
     def __len__(self) -> int:
         return len(self.nodes)

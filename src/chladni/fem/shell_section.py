@@ -27,30 +27,22 @@ STIFF = 1e-3  # shear flexibility over 1/(5/6 G_12 t) where the deck has rigid s
 
 @dataclass(frozen=True, eq=False)
 class SectionArrays:
-    """Section values of every shell, ready for :func:`chladni.fem.shell.stiffness`.
+    """Section values of every shell, ready for :func:`chladni.fem.shell.stiffness`."""
 
-    Attributes
-    ----------
-    Qm, Qb, Qc : (m, 3, 3)      material frame, Qb times 12 I/t³, Qc in MID4's sign [Pa]
-    S : (m, 2, 2, 2)            transverse shear with residual bending, for the mean of γ and for
-                                its variation within the element, element frame [N/m]
-    drill : (m, 2)              drilling, of the field and of the corners [N/m]
-    rho, nsm : (m,)             [kg/m³], [kg/m²]
-    loss : (m,)                 loss factor of the section [-]
-    shear_flexibility : (m, 1, 2, 2)  (k_s G t)⁻¹ alone, element frame [m/N]
-    residual_flexibility : (m, 2, 2)  L²/12D along x and y, of mean and varying γ [m/N]
-    """
-
+    # Qm, Qb, Qc: (m, 3, 3) material frame, Qb times 12 I/t³, Qc in MID4's sign [Pa]
     Qm: np.ndarray
     Qb: np.ndarray
     Qc: np.ndarray
+    # (m, 2, 2, 2) transverse shear with residual bending, for the mean of γ and for its variation
+    # within the element, element frame [N/m]
     S: np.ndarray
-    drill: np.ndarray
+    drill: np.ndarray  # (m, 2) drilling, of the field and of the corners [N/m]
+    # rho, nsm: (m,) [kg/m³], [kg/m²]
     rho: np.ndarray
     nsm: np.ndarray
-    loss: np.ndarray
-    shear_flexibility: np.ndarray
-    residual_flexibility: np.ndarray
+    loss: np.ndarray  # (m,) loss factor of the section [-]
+    shear_flexibility: np.ndarray  # (m, 1, 2, 2) (k_s G t)⁻¹ alone, element frame [m/N]
+    residual_flexibility: np.ndarray  # (m, 2, 2) L²/12D along x and y, of mean and varying γ [m/N]
 
     def __len__(self) -> int:
         return len(self.rho)

@@ -17,22 +17,13 @@ INERTIA = np.kron(np.eye(2, dtype=bool), np.ones((3, 3), dtype=bool)) & (
 
 @dataclass(frozen=True, eq=False)
 class DofPairs:
-    """The b pairs of points that share an element, row by row, and their positions for elements.
+    """The b pairs of points that share an element, row by row, and their positions for elements."""
 
-    Attributes
-    ----------
-    nodes : (m, k) int
-    column : (b,) int       second point of each pair
-    width : (n,) int        pairs of each point
-    slot : (m, k, k) int    position of an element's pair among its first point's
-    before : (n,) int       pairs before each point's
-    """
-
-    nodes: np.ndarray
-    column: np.ndarray
-    width: np.ndarray
-    slot: np.ndarray
-    before: np.ndarray
+    nodes: np.ndarray  # (m, k) int
+    column: np.ndarray  # (b,) int: second point of each pair
+    width: np.ndarray  # (n,) int: pairs of each point
+    slot: np.ndarray  # (m, k, k) int: position of an element's pair among its first point's
+    before: np.ndarray  # (n,) int: pairs before each point's
 
 
 def pairs(nodes: np.ndarray, n: int) -> DofPairs:
@@ -53,20 +44,14 @@ class Pattern:
 
     Entry (r, c) of a block has the position ``start + width * above[r] + slot * along[r] +
     rank(r, c)``.
-
-    Attributes
-    ----------
-    pairs : DofPairs
-    mask : (6, 6) bool
-    along, above : (6,) int     entries of a block's row, and before it
-    start : (n,) int            entries before a point's
     """
 
     pairs: DofPairs
-    mask: np.ndarray
+    mask: np.ndarray  # (6, 6) bool
+    # along, above: (6,) int: entries of a block's row, and before it
     along: np.ndarray
     above: np.ndarray
-    start: np.ndarray
+    start: np.ndarray  # (n,) int: entries before a point's
 
     def structure(self) -> tuple[np.ndarray, np.ndarray]:
         """Column indices and row pointers of the csr."""

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dynamics.frf import FRF
-from ..dynamics.modes import rigid_modes
+from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.chain_checks import level_checks, modal_gains
 from ..ema.channel_checks import left_out
 from ..ema.finding import Check, Finding, Screening
@@ -75,11 +75,9 @@ def _supports(strong: Identified, model: Modelled) -> tuple[list[Finding], list[
 
     A free structure has none there. Cords do, and are softer than supports; both are said.
     """
-    f, rigid = model.modes.frequency, rigid_modes(model.modes)
-    count = int(rigid.sum())
-    if not count or rigid.all() or not strong.order:
+    first, count = first_elastic(model.modes), int(rigid_modes(model.modes).sum())
+    if not first or not strong.order:
         return [], []
-    first = float(f[~rigid].min())
     low = strong.frequency[strong.frequency < first / FAR_BELOW]
     said = f"{count} motions of the deck are free, {len(low)} modes of the test far below the rest"
     if not len(low):
@@ -95,6 +93,12 @@ def _supports(strong: Identified, model: Modelled) -> tuple[list[Finding], list[
     )
     found = Finding("supports", text, "warning", (), mend, float(len(low)))
     return [found], [Check("supports", said, False)]
+
+
+def first_elastic(modes: ModalModel) -> float:
+    """The first elastic frequency of a deck that is free to move [Hz]; 0 for any other deck."""
+    rigid = rigid_modes(modes)
+    return float(modes.frequency[~rigid].min()) if rigid.any() and not rigid.all() else 0.0
 
 
 _CONFIRMED = ("wrong quantity",)  # phases speak for it, and the model says whether it is so

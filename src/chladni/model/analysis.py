@@ -30,19 +30,12 @@ class Subcase:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A static load.
+    """A static load."""
 
-    Attributes
-    ----------
-    rows : (k,) int         rows of points
-    components : (k,) int   1-6, in the basic frame (1 at a scalar point)
-    values : (k,)           [N] or [N m]
-    gravity : (3,)          acceleration field on all masses [m/s²]
-    """
-
-    rows: np.ndarray
-    components: np.ndarray
-    values: np.ndarray
+    rows: np.ndarray  # (k,) int: rows of points
+    components: np.ndarray  # (k,) int: 1-6, in the basic frame (1 at a scalar point)
+    values: np.ndarray  # (k,) [N] or [N m]
+    # (3,) acceleration field on all masses [m/s²]
     gravity: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
 
@@ -83,28 +76,21 @@ class Tabulated:
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """P_k(f) = A_k g(f) exp(i (θ_k - 2π f τ_k)), one harmonic load (RLOAD1, RLOAD2).
+    """P_k(f) = A_k g(f) exp(i (θ_k - 2π f τ_k)), one harmonic load (RLOAD1, RLOAD2)."""
 
-    Attributes
-    ----------
-    kind : "force", "displacement", "velocity" or "acceleration"
-    rows, components : (k,) int   loaded dofs; forces in the basic frame, motions in the
-        displacement frame of the point
-    amplitude : (k,)              A [N, N m or m, m/s, m/s² and their rotations]
-    delay, phase : (k,)           τ [s], θ [rad]
-    first, second : Tabulated or None real and imaginary part of g, or its modulus and phase [deg]
-    polar : bool                  g = first exp(i second), as in RLOAD2
-    """
-
-    kind: str
+    kind: str  # "force", "displacement", "velocity" or "acceleration"
+    # rows, components: (k,) int: loaded dofs; forces in the basic frame, motions in the
+    # displacement frame of the point
     rows: np.ndarray
     components: np.ndarray
-    amplitude: np.ndarray
+    amplitude: np.ndarray  # (k,) A [N, N m or m, m/s, m/s² and their rotations]
+    # delay, phase: (k,) τ [s], θ [rad]
     delay: np.ndarray
     phase: np.ndarray
+    # first, second: real and imaginary part of g, or its modulus and phase [deg]
     first: Tabulated | None = None
     second: Tabulated | None = None
-    polar: bool = False
+    polar: bool = False  # g = first exp(i second), as in RLOAD2
 
     def at(self, frequency: np.ndarray) -> np.ndarray:
         """P (n_f, k) at frequencies [Hz]."""
@@ -119,30 +105,22 @@ class Excitation:
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """All data of a deck other than its structure; dictionaries by set id.
+    """All data of a deck other than its structure; dictionaries by set id."""
 
-    Attributes
-    ----------
-    solution : int              SOL number, 0 if not given
-    subcases : tuple            in order
-    loads : dict of Load        static loads, combinations (LOAD) resolved
-    prescribed : dict of Motion SPCD, and SPC with a displacement
-    frequency : dict            frequencies of response [Hz], increasing
-    following : dict            frequencies that follow the modes, by the same ids
-    damping : dict              (f (k,) [Hz], ζ (k,)) modal damping tables
-    eigen : dict                (lowest [Hz], highest [Hz], count) of eigenvalue requests, NaN or
-        0 if not limited
-    dynamic : dict              tuples of Excitation by DLOAD id
-    notes : tuple of str        approximations and omissions, one sentence each
-    """
-
-    solution: int = 0
-    subcases: tuple[Subcase, ...] = ()
+    solution: int = 0  # SOL number, 0 if not given
+    subcases: tuple[Subcase, ...] = ()  # in order
+    # static loads, combinations (LOAD) resolved
     loads: dict[int, Load] = field(default_factory=dict)
+    # SPCD, and SPC with a displacement
     prescribed: dict[int, Motion] = field(default_factory=dict)
+    # frequencies of response [Hz], increasing
     frequency: dict[int, np.ndarray] = field(default_factory=dict)
+    # frequencies that follow the modes, by the same ids
     following: dict[int, tuple[Following, ...]] = field(default_factory=dict)
+    # (f (k,) [Hz], ζ (k,)) modal damping tables
     damping: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    # (lowest [Hz], highest [Hz], count) of eigenvalue requests, NaN or 0 if not limited
     eigen: dict[int, tuple[float, float, int]] = field(default_factory=dict)
+    # tuples of Excitation by DLOAD id
     dynamic: dict[int, tuple[Excitation, ...]] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # approximations and omissions, one sentence each

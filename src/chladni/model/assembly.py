@@ -25,23 +25,15 @@ def _no_rows(*shape: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """Four- and three-node shells; a triangle repeats its third node.
+    """Four- and three-node shells; a triangle repeats its third node."""
 
-    Attributes
-    ----------
-    ids : (n,) int
-    nodes : (n, 4) int        rows of points
-    part : (n,) int           position in ``Assembly.parts``
-    thickness : (n, 4)        at the corners [m]
-    axis : (n, 3)             direction whose projection is material axis 1
-    offset : (n,)             of the mid-surface along the element normal [m]
-    """
-
-    ids: np.ndarray = field(default_factory=_no_rows)
-    nodes: np.ndarray = field(default_factory=lambda: _no_rows(4))
-    part: np.ndarray = field(default_factory=_no_rows)
-    thickness: np.ndarray = field(default_factory=lambda: _none(4))
+    ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
+    nodes: np.ndarray = field(default_factory=lambda: _no_rows(4))  # (n, 4) int: rows of points
+    part: np.ndarray = field(default_factory=_no_rows)  # (n,) int: position in ``Assembly.parts``
+    thickness: np.ndarray = field(default_factory=lambda: _none(4))  # (n, 4) at the corners [m]
+    # (n, 3) direction whose projection is material axis 1
     axis: np.ndarray = field(default_factory=lambda: _none(3))
+    # (n,) of the mid-surface along the element normal [m]
     offset: np.ndarray = field(default_factory=_none)
 
     def __len__(self) -> int:
@@ -91,22 +83,14 @@ class Beams:
 
 @dataclass(frozen=True, eq=False)
 class Scalars:
-    """Scalar springs, dampers or masses between two dofs, value (c_a q_a - c_b q_b).
+    """Scalar springs, dampers or masses between two dofs, value (c_a q_a - c_b q_b)."""
 
-    Attributes
-    ----------
-    ids : (n,) int
-    nodes : (n, 2) int        rows of points; -1: ground
-    component : (n, 2) int    1-6
-    value : (n,)              [N/m], [N s/m] or [kg]
-    damping : (n,)            loss factor (springs)
-    """
-
-    ids: np.ndarray = field(default_factory=_no_rows)
+    ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
+    # (n, 2) int: rows of points; -1: ground
     nodes: np.ndarray = field(default_factory=lambda: _no_rows(2))
-    component: np.ndarray = field(default_factory=lambda: _no_rows(2))
-    value: np.ndarray = field(default_factory=_none)
-    damping: np.ndarray = field(default_factory=_none)
+    component: np.ndarray = field(default_factory=lambda: _no_rows(2))  # (n, 2) int: 1-6
+    value: np.ndarray = field(default_factory=_none)  # (n,) [N/m], [N s/m] or [kg]
+    damping: np.ndarray = field(default_factory=_none)  # (n,) loss factor (springs)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -114,21 +98,16 @@ class Scalars:
 
 @dataclass(frozen=True, eq=False)
 class Bushes:
-    """Six-component springs with dampers (CBUSH), each in its own frame.
+    """Six-component springs with dampers (CBUSH), each in its own frame."""
 
-    Attributes
-    ----------
-    ids : (n,) int
-    nodes : (n, 2) int          rows of points; second -1: ground
-    frame : (n, 3, 3)           rows are the unit vectors of the element frame
-    place : (n, 3)              of the spring, with rigid arms from both nodes [m]
-    stiffness, viscous, loss : (n, 6)   [N/m, N m/rad], [N s/m], [-]
-    """
-
-    ids: np.ndarray = field(default_factory=_no_rows)
+    ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
+    # (n, 2) int: rows of points; second -1: ground
     nodes: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    # (n, 3, 3) rows are the unit vectors of the element frame
     frame: np.ndarray = field(default_factory=lambda: _none(3, 3))
+    # (n, 3) of the spring, with rigid arms from both nodes [m]
     place: np.ndarray = field(default_factory=lambda: _none(3))
+    # stiffness, viscous, loss: (n, 6) [N/m, N m/rad], [N s/m], [-]
     stiffness: np.ndarray = field(default_factory=lambda: _none(6))
     viscous: np.ndarray = field(default_factory=lambda: _none(6))
     loss: np.ndarray = field(default_factory=lambda: _none(6))

@@ -1,4 +1,4 @@
-"""Replacement of supports by a rigid clamp on springs."""
+"""Replacement of supports by springs: of a rigid clamp, or of each point by itself."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from .added_points import next_id, with_points
 from .assembly import Assembly, RigidBody, appended
+from .ground_springs import with_ground_bushes
 
 AN_AXIS = 1 - 1e-6  # cosine from which a direction is an axis of the basic frame
 
@@ -53,3 +54,40 @@ def with_clamp_on_springs(
         component=[[c, 1] for c in springs], value=list(springs.values()),
     )  # fmt: skip
     return replace(grown, springs=new)
+
+
+def with_springs_for_supports(
+    assembly: Assembly, rows: np.ndarray, axes: np.ndarray, k: np.ndarray, turning: bool,
+    rigid: float,
+) -> Assembly:  # fmt: skip
+    """Replace supports of points by springs to ground along, or about, an axis at each.
+
+    An axis of the point's own frame gives a CELAS2. Any other axis releases all components that it
+    has a share in, and a CBUSH holds the motions across it as good as rigid.
+
+    Parameters
+    ----------
+    rows : (n,) int     points
+    axes : (n, 3)       unit vectors in the basic frame
+    k : (n,)            [N/m], or [N m/rad] if ``turning``
+    rigid : the spring that is as good as rigid
+    """
+    own = axes if assembly.axes is None else np.einsum("kij,kj->ki", assembly.axes[rows], axes)
+    shift = 3 if turning else 0
+    straight = np.abs(own).max(axis=1) > AN_AXIS
+    component = shift + 1 + np.abs(own).argmax(axis=1)
+    gone = np.zeros((len(assembly.points), 7), bool)
+    gone[rows[straight], component[straight]] = True
+    i, c = np.nonzero(np.abs(own[~straight]) > 1e-6)
+    gone[rows[~straight][i], shift + 1 + c] = True
+    stay = assembly.supports[~gone[assembly.supports[:, 0], assembly.supports[:, 1]]]
+    n = int(straight.sum())
+    new = appended(
+        assembly.springs, ids=next_id(assembly) + np.arange(n),
+        nodes=np.column_stack([rows[straight], np.full(n, -1)]),
+        component=np.column_stack([component[straight], np.ones(n, int)]), value=k[straight],
+    )  # fmt: skip
+    made = replace(assembly, supports=stay, springs=new)
+    about = np.zeros((len(rows) - n, 6))
+    about[:, shift : shift + 3] = np.column_stack([k[~straight]] + 2 * [np.full(len(about), rigid)])
+    return with_ground_bushes(made, rows[~straight], axes[~straight], about)

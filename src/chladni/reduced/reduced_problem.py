@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -102,13 +103,22 @@ class ReducedProblem:
         """
         if self.model.following is not None:
             return self.model
+        if (known := self._known.get(id(release))) is not None:
+            return known[1]
         built, K = release.of(self.structure), self.structure.system.elastic
         n = len(self.structure.system.dofs)
         force = -built.system.elastic[:n, n:].toarray()
         R = self.factor.solve(force)
         for _ in range(FOLLOWED):
             R = R + self.factor.solve(force - K @ R)
-        return self.model.released(built, R)
+        model = self.model.released(built, R)
+        self._known[id(release)] = release, model
+        return model
+
+    @cached_property
+    def _known(self) -> dict[int, tuple[Release, Reduced]]:
+        """Models with clamps released; each release is kept, so that its id stays its own."""
+        return {}
 
 
 def _pieces(rows: sp.csr_array) -> Iterator[sp.csr_array]:

@@ -164,18 +164,12 @@ class Section:
 
 @dataclass(frozen=True)
 class PageParts:
-    """Contents of a result for the page of its command.
+    """Contents of a result for the page of its command."""
 
-    Attributes
-    ----------
-    lead : the result in one sentence
-    files : (name, description) of the files written with the page
-    """
-
-    lead: str
+    lead: str  # the result in one sentence
     sections: Sequence[Section] = ()
     notes: Sequence[str] = ()
-    files: Sequence[tuple[str, str]] = ()
+    files: Sequence[tuple[str, str]] = ()  # (name, description) of the files written with the page
 
 
 def drawings(sections: Sequence[Section]) -> Iterator[Drawing]:

@@ -22,19 +22,13 @@ class Paged:
     """A result whose command writes one page of sections.
 
     ``show_by(kind, Paged(...).view)`` shows results of a type of another package.
-
-    Attributes
-    ----------
-    module : with ``in_words`` and a function that draws the page; ``.name``: one of this room
-    page : (module, folder, result) -> PageParts
-    json : name of the file with the result as plain data; "": none
-    files : writes more files into the folder and returns (name, what it is) of each
     """
 
     command: str
-    module: str
-    page: Callable[[ModuleType, Path, Any], PageParts]
-    json: str = ""
+    module: str  # with ``in_words`` and a function that draws the page; ``.name``: one of this room
+    page: Callable[[ModuleType, Path, Any], PageParts]  # (module, folder, result) -> PageParts
+    json: str = ""  # name of the file with the result as plain data; "": none
+    # writes more files into the folder and returns (name, what it is) of each
     files: Callable[[Any, Path], Sequence[tuple[str, str]]] = lambda *_: ()
     needs_origin: bool = True
 

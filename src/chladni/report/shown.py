@@ -19,27 +19,19 @@ Bands = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Data for the pictures of a result that its numbers do not contain.
+    """Data for the pictures of a result that its numbers do not contain."""
 
-    Attributes
-    ----------
-    seen : Surface                 of the model
-    parts : names, by the numbers in ``seen.part``; ids of the points of ``seen``
-    curves : {"test", "before", "after"} or {"test", "model"} to FRF, same channels and lines
-    held_out : labels of outputs that were not fitted
-    compared : False if frequencies were compared, so that responses are only shown
-    fitted, excluded : bands [Hz]
-    outputs, inputs, cords : sensors, shakers and hangers as markers
-    """
-
-    seen: Surface
-    parts: Sequence[str] = ()
-    ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    seen: Surface  # of the model
+    parts: Sequence[str] = ()  # names, by the numbers in ``seen.part``
+    ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # of the points of ``seen``
+    # {"test", "before", "after"} or {"test", "model"} to FRF, same channels and lines
     curves: Mapping[str, FRF] = field(default_factory=dict)
-    held_out: Sequence[str] = ()
-    compared: bool = True
+    held_out: Sequence[str] = ()  # labels of outputs that were not fitted
+    compared: bool = True  # False if frequencies were compared, so that responses are only shown
+    # fitted, excluded: bands [Hz]
     fitted: Bands = ()
     excluded: Bands = ()
+    # outputs, inputs, cords: sensors, shakers and hangers as markers
     outputs: Sequence[Marker] = ()
     inputs: Sequence[Marker] = ()
     cords: Sequence[Marker] = ()

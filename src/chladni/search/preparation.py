@@ -23,6 +23,7 @@ from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
 from ..ema.level_words import level_notes
 from ..ema.recording_noise import equalised_noise, sample_noise
+from ..ema.recording_screening import strong_modes
 from ..ema.response_variance import noise_source
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -46,6 +47,7 @@ from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .question import Prepared, Question
 from .silent_dofs import refuse_silent
+from .suspension_range import suspended_below, suspension_note
 
 ZETA = 0.08  # equalised damping for comparing hypotheses: it widens the basins of convergence
 ZETA_Q = 0.02  # equalised damping for the reported Q
@@ -108,6 +110,9 @@ def _by_responses(
     progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
+    above = suspended_below(question, nominal, strong_modes(found).frequency, fit_max)
+    question = replace(question, exclude=(*question.exclude, (0.0, above)))
+    lines, low = [f[f > above] for f in lines], max(low, above)
     refuse_silent(nominal, question.outputs, question.inputs)
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
@@ -160,7 +165,7 @@ def _by_responses(
     if unseen.choosing.any():
         notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
     notes.append(_sensor_note(question))
-    notes += _mass_note(question, problem)
+    notes += [*_mass_note(question, problem), *suspension_note(above)]
     known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
     setup = replace(problem.setup, damping=known)
     problem = replace(problem, damping=known, coupling=coupling, setup=setup)
@@ -174,7 +179,7 @@ def _by_responses(
     size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
         problem, data[1], held, unseen, what, tuple(notes), nominal, floor, found,
-        too_little(*size), numbers(*size), others=tuple(others), levels=studied,
+        too_little(*size), numbers(*size), others=tuple(others), levels=studied, above=above,
     )  # fmt: skip
 
 
@@ -208,6 +213,8 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     f_max = float(frequency[-1]) * 1.15
     highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
     nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))
+    above = suspended_below(question, nominal, frequency, float(frequency[-1]))
+    frequency, sd, strength = (v[frequency > above] for v in (frequency, sd, strength))
     if question.frf is not None:
         refuse_silent(nominal, question.outputs, question.inputs)
     built, mesh = nominal.structure, mesh_hidden(nominal, f_max) if fitted else []
@@ -221,6 +228,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     rows_o = question.outputs.around(built) if len(question.outputs.labels) else None
     rows_i = question.driven_around(built) if len(question.inputs.labels) else None
     band = question.band if question.frf is None else band_of(question, question.frf)
+    band = max(band[0], above), band[1]
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
         spurious=SPURIOUS_LISTED if question.frf is None else share_spurious(strength),
@@ -230,7 +238,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     left_out = of_poles(held)
     n = int(left_out.reporting.sum())
     what = f"{n} of {len(held)} frequencies" if n else "nothing"
-    notes = (*notes, *_unscored(question), *_mass_note(question, problem))
+    notes = (*notes, *_unscored(question), *_mass_note(question, problem), *suspension_note(above))
     few = too_little(len(frequency), 0), numbers(len(frequency), 0)
     return Prepared(
         problem, data, left_out, left_out, what, notes, nominal, None, found, *few, ~held

@@ -149,3 +149,4 @@ class Prepared:
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     others: tuple[OtherTest, ...] = ()
     levels: LevelStudy = field(default_factory=LevelStudy)
+    above: float = 0.0  # [Hz]: a free deck is compared above the modes of the suspension

@@ -34,20 +34,13 @@ _Below = list[list[int]]
 
 @dataclass(frozen=True, eq=False)
 class Fronts:
-    """Elimination order by fronts, children before parents.
+    """Elimination order by fronts, children before parents."""
 
-    Attributes
-    ----------
-    order : (n,)         rows of the matrix in the order of elimination
-    start : (f + 1,)     first pivot of each front, in the new numbering
-    boundary : f arrays  rows (new numbers, increasing) that a front updates beyond its own
-    children : f tuples  fronts whose updates a front receives
-    """
-
-    order: np.ndarray
-    start: np.ndarray
+    order: np.ndarray  # (n,) rows of the matrix in the order of elimination
+    start: np.ndarray  # (f + 1,) first pivot of each front, in the new numbering
+    # f arrays: rows (new numbers, increasing) that a front updates beyond its own
     boundary: tuple[np.ndarray, ...]
-    children: tuple[tuple[int, ...], ...]
+    children: tuple[tuple[int, ...], ...]  # f tuples: fronts whose updates a front receives
 
     def ordered(self) -> Self:
         """Fronts for a matrix whose rows are already in this order."""

@@ -19,20 +19,12 @@ _UNEVEN = 1e-2  # ratio of columns of a block, whose square is lost in digits of
 
 @dataclass(frozen=True, eq=False)
 class Ritz:
-    """Approximate eigenpairs, best first.
+    """Approximate eigenpairs, best first."""
 
-    Attributes
-    ----------
-    theta : (m,)      Ritz values of A⁻¹M, decreasing
-    error : (m,)      |A⁻¹M x - θ x|_M / θ from the recurrence
-    basis : (n, m)    M-orthonormal Q
-    weights : (m, m)  S; the vectors are Q S
-    """
-
-    theta: np.ndarray
-    error: np.ndarray
-    basis: np.ndarray
-    weights: np.ndarray
+    theta: np.ndarray  # (m,) Ritz values of A⁻¹M, decreasing
+    error: np.ndarray  # (m,) |A⁻¹M x - θ x|_M / θ from the recurrence
+    basis: np.ndarray  # (n, m) M-orthonormal Q
+    weights: np.ndarray  # (m, m) S; the vectors are Q S
 
     def vectors(self, k: int) -> np.ndarray:
         """The first k Ritz vectors (n, k), M-orthonormal."""

@@ -24,24 +24,15 @@ _KEY = 0.6  # share of the light over the shoulder; the rest comes from the eye
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """Colours of a surface.
+    """Colours of a surface."""
 
-    Attributes
-    ----------
-    values : (n,) per point, (m,) per face or None   quantity shown by the colours
-    limits : (low, high)                             values at the ends of the colour map
-    cmap : str
-    edges : bool                                     True to draw element edges
-    ghost : (k, 2, 3) or None                        segments of an undeformed outline [m]
-    tiles : int or None                              of the painter; None: VTK where it works
-    """
-
+    # (n,) per point, (m,) per face or None: quantity shown by the colours
     values: np.ndarray | None = None
-    limits: tuple[float, float] = (0.0, 1.0)
+    limits: tuple[float, float] = (0.0, 1.0)  # (low, high) values at the ends of the colour map
     cmap: str = "viridis"
-    edges: bool = True
-    ghost: np.ndarray | None = None
-    tiles: int | None = None
+    edges: bool = True  # True to draw element edges
+    ghost: np.ndarray | None = None  # (k, 2, 3) or None: segments of an undeformed outline [m]
+    tiles: int | None = None  # of the painter; None: VTK where it works
 
 
 def draw(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:

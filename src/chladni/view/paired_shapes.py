@@ -8,27 +8,20 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class PairedShapes:
-    """Paired modes at the sensors, each scaled to its largest entry, and the model's whole shape.
+    """Paired modes at the sensors, each of largest entry 1, and the model's whole shape."""
 
-    Attributes
-    ----------
-    points, directions : (k, 3)  of the sensors [m], unit vectors
-    test, model : (k, r)         real, of the same sign and scale
-    motion : (n, 3, r)           of every point of the model
-    f_test, f_model : (r,)       [Hz]
-    numbers : model's mode numbers
-    mac : (r,)
-    """
-
+    # points, directions: (k, 3) of the sensors [m], unit vectors
     points: np.ndarray
     directions: np.ndarray
+    # test, model: (k, r) real, of the same sign and scale
     test: np.ndarray
     model: np.ndarray
-    motion: np.ndarray
+    motion: np.ndarray  # (n, 3, r) of every point of the model
+    # f_test, f_model: (r,) [Hz]
     f_test: np.ndarray
     f_model: np.ndarray
-    numbers: Sequence[int]
-    mac: np.ndarray
+    numbers: Sequence[int]  # model's mode numbers
+    mac: np.ndarray  # (r,)
 
     def first(self, count: int) -> "PairedShapes":
         """The pairs lowest in frequency."""

@@ -21,23 +21,17 @@ def _no_rows(columns: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Faces and lines over points.
+    """Faces and lines over points."""
 
-    Attributes
-    ----------
-    points : (n, 3)        [m]
-    faces : (m, 4) int     rows of points; a triangle repeats its third node
-    lines : (k, 2) int     beams, bars, springs
-    part : (m,) int        part of each face; outlines are drawn where parts meet
-    unit : str             "m"; "" where the deck's own unit of length is not known
-    joint : (m,) bool      faces of welds and adhesive, which lie between or within sheets
-    """
-
-    points: np.ndarray
+    points: np.ndarray  # (n, 3) [m]
+    # (m, 4) int: rows of points; a triangle repeats its third node
     faces: np.ndarray = field(default_factory=lambda: _no_rows(4))
+    # (k, 2) int: beams, bars, springs
     lines: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    # (m,) int: part of each face; outlines are drawn where parts meet
     part: np.ndarray | None = None
-    unit: str = "m"
+    unit: str = "m"  # "m"; "" where the deck's own unit of length is not known
+    # (m,) bool: faces of welds and adhesive, which lie between or within sheets
     joint: np.ndarray | None = None
 
     def __post_init__(self) -> None:

@@ -35,8 +35,9 @@ class RecordingAtFault(ChladniError):
 
 
 def screened_by_model(
-    case: Case, found: Identified | None, model: Modelled, use: np.ndarray | None = None
-) -> Screening:
+    case: Case, found: Identified | None, model: Modelled, use: np.ndarray | None = None,
+    above: float = 0.0,
+) -> Screening:  # fmt: skip
     """All checks of the first recording, and of the masses that the case gives.
 
     Parameters
@@ -44,9 +45,10 @@ def screened_by_model(
     found : identified from its FRFs; None where nothing could be
     model : of the deck as it was tested
     use : (n_f,) bool, lines it was identified from, default all
+    above : frequency from which on responses are compared with the model [Hz]
     """
     frf = case.frfs[0]
-    lines = case.lines(frf.frequency) if use is None else use
+    lines = (case.lines(frf.frequency) if use is None else use) & (frf.frequency > above)
     places = dict(zip(case.outputs.labels, case.outputs.points, strict=True))
     alone = screened(case.recordings[0], found, case.recordings[1:], places, use, alone=False)
     if masses := _masses(case, frf, lines, model):
@@ -105,7 +107,7 @@ def screened_prepared(
     """
     if not case.frfs or prepared.identified is None:
         return None
-    return screened_by_model(case, prepared.identified, prepared.nominal, use)
+    return screened_by_model(case, prepared.identified, prepared.nominal, use, prepared.above)
 
 
 def screened_unprepared(case: Case) -> Screening | None:

@@ -28,22 +28,13 @@ SOFT_ADHESIVE = Isotropic(6e6, 0.4, 1000.0, id=2)
 
 @dataclass(frozen=True)
 class Joint:
-    """A connection made by a builder.
+    """A connection made by a builder."""
 
-    Attributes
-    ----------
-    kind : str              "spot weld", "adhesive", "screw", "hem", "tied hole", "grip"
-    place : (3,)            middle [m]
-    sheets : (str, str)     names of the joined sheets
-    elements : tuple of int ids of the solids, bars or springs
-    distance : float        farthest corner from its sheet [m]
-    """
-
-    kind: str
-    place: tuple[float, float, float]
-    sheets: tuple[str, str]
-    elements: tuple[int, ...]
-    distance: float
+    kind: str  # "spot weld", "adhesive", "screw", "hem", "tied hole", "grip"
+    place: tuple[float, float, float]  # (3,) middle [m]
+    sheets: tuple[str, str]  # names of the joined sheets
+    elements: tuple[int, ...]  # ids of the solids, bars or springs
+    distance: float  # farthest corner from its sheet [m]
 
 
 Joined = tuple[Assembly, tuple[Joint, ...]]

@@ -1,0 +1,114 @@
+"""What a further measurement would show, under each of several explanations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
+
+from chladni.fem.energy import mass_properties
+from chladni.inference.expected_information import chosen
+from chladni.reduced.reduced_model import evaluate
+from chladni.search import next_measurement
+from chladni.search.next_measurement import Rival, _new, _responses, outlook
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few():
+    """A sample of places and lines."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, n in (("PLACES", 12), ("MASSES", 3), ("LINES", 16)):
+            patch.setattr(next_measurement, name, n)
+        yield
+
+
+@pytest.fixture(scope="module")
+def problem(reduced):
+    """A plate with a lump."""
+    weight = 0.03 * mass_properties(reduced.structure.assembly)[0]
+    return problem_of(reduced, [lump(reduced, HERE, 1.0)], weight)
+
+
+@pytest.fixture(scope="module")
+def tied(reduced, problem):
+    """The lump at its place, and at another one."""
+    base = null_of(problem).fit.x
+    out = []
+    for where in (HERE, THERE):
+        of, x = lump(reduced, where, 1.0)
+        out.append(problem.fitted_with(of(problem.where), x, base))
+    return out
+
+
+@pytest.fixture(scope="module")
+def found(problem, tied):
+    return outlook(problem, tied, ("here", "there"), np.ones(2))
+
+
+def test_candidates_of_every_kind_have_a_gram_matrix(found):
+    kinds = {c.kind for c in found.candidates}
+    assert kinds == {"sensor", "drive", "mass", "band", "weighing"}
+    assert len(found.grams) == len(found.candidates)
+    for G in found.grams:
+        assert_allclose(G, G.T)
+        assert np.linalg.eigvalsh(G)[0] > -1e-9 * max(np.trace(G), 1.0)
+
+
+def test_prediction_is_linear_about_the_fit(problem, tied):
+    """A step of each parameter moves the prediction as its slope says; so it does the mass."""
+    rival, data = Rival(problem, tied[0]), tied[0].data
+    fit, row = tied[0].fit, problem.reduced.grids.rows[[7]]
+    given = _responses(rival, data.s[::4], row, data.inputs)
+    given = replace(given, values=given.model(rival.state))
+    J = rival.slopes(given, rival.state)[:, : len(fit.x)]
+    h = 1e-3 * np.sqrt(np.diag(fit.covariance))
+    for k in range(len(fit.x)):
+        step = h[k] * (np.arange(len(fit.x)) == k)
+        moved = [
+            given.scaled(evaluate(rival.model, fit.effects, fit.x + sign * step, False), False)[0]
+            for sign in (1, -1)
+        ]
+        due = (moved[0] - moved[1]) / (2 * h[k])
+        assert_allclose(J[:, k], due, atol=1e-3 * max(np.abs(due).max(), 1.0))
+
+
+def test_what_was_measured_tells_less_a_second_time(problem, tied, reduced):
+    """The posterior knows it: its variance at the sensors is below that of the prior."""
+    rival, data = Rival(problem, tied[0]), tied[0].data
+    _, L = rival.posterior
+    given = _responses(rival, data.s[data.use.any(axis=1)], data.outputs, data.inputs)
+    given = replace(given, values=given.model(rival.state))
+    A = rival.slopes(given, rival.state)
+    prior = np.array([p.sd for e in tied[0].fit.effects for p in e.parameters])
+    before = np.concatenate([prior, np.ones(A.shape[1] - len(prior))])
+    assert ((A @ L) ** 2).sum() < 0.5 * ((A * before) ** 2).sum()
+    assert ((A @ L) ** 2).sum(axis=1).max() < 2.0  # about what its own noise leaves
+
+
+def test_a_sensor_sees_no_difference_between_twins(problem, tied):
+    """Two rivals that are one predict the same, so that nothing tells them apart."""
+    twins = outlook(problem, [tied[0], tied[0]], ("a", "b"), np.ones(2))
+    for G in twins.grams[::10]:
+        assert_allclose(twins.rivals.forecast(G).information, 0.0, atol=1e-6)
+
+
+def test_the_best_measurements_settle_what_is_tied(found):
+    """Two lumps far apart: what tells most is better than weighing, and enough to settle it."""
+    cost = np.array([c.cost for c in found.candidates])
+    best = chosen(found.rivals, found.grams, cost, 2)
+    every = [found.rivals.forecast(G).information for G in found.grams]
+    weighing = next(k for k, c in enumerate(found.candidates) if c.kind == "weighing")
+    assert every[best[0]] > 10 * max(every[weighing], 1e-6)
+    assert found.rivals.forecast(found.grams[best].sum(axis=0)).settled(10.0) > 0.8
+
+
+def test_a_mass_put_on_is_that_of_the_changed_structure(problem, tied):
+    """Frequencies fall, as M grows; the prediction is that of the loaded model."""
+    rival, places = Rival(problem, tied[0]), problem.reduced.candidates
+    loaded = rival.with_mass(places, 3, 0.05)
+    assert (loaded.lam[6:] <= rival.state.lam[6:] * (1 + 1e-9)).all()
+    data = tied[0].data
+    mean, F = _new(rival, rival, data.s[:4], data.outputs, data.inputs, loaded, rival.state).seen
+    assert np.abs(mean).max() > 1.0
+    assert F.shape[0] == len(mean)
