@@ -39,6 +39,8 @@ def as_written(
     numbers = [calibrated_family(e) if is_strained(e, found.of(e)) else e for e in kept]
     data, fits = hypothesis.data, list[Fit]()
     made = fitted if isinstance(data, Poles) else fit  # poles have the spread of the deck itself
+    if isinstance(data, Poles) and data.listed:
+        data = data.all_paired()
     for given in (False, True):
         x = [_given(e) if given and e.kind == "calibration" else found.of(e) for e in kept]
         start = np.concatenate([np.zeros(0), *x])

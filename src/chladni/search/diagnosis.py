@@ -22,7 +22,7 @@ from ..decision.hypotheses import Hypotheses, Numbers
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
-from ..inference.adequacy import FitTest, adequacy
+from ..inference.adequacy import FitTest, adequacy, of_poles
 from ..inference.discrepancy import MEDIAN
 from ..inference.hypothesis_fit import (
     CLOSE,
@@ -206,9 +206,19 @@ def hypotheses_of(
     singles = tuple(hypothesis_of(t, numbers(t, k > 0)) for k, t in enumerate(found.hypotheses))
     return Hypotheses(
         hypothesis_of(found.null, numbers(found.null, False)), singles,
-        nominal=found.nominal.neg2_log_evidence, poles=isinstance(found.null.data, Poles),
-        families=len(problem.families),
+        nominal=np.inf if _misfits(found.nominal) else found.nominal.neg2_log_evidence,
+        poles=isinstance(found.null.data, Poles), families=len(problem.families),
     )  # fmt: skip
+
+
+def _misfits(deck: HypothesisFit) -> bool:
+    """True for a given deck whose natural frequencies are farther off than those of any model.
+
+    No rule of evidence keeps such a deck: wide priors would charge its calibration more than it
+    gains on few frequencies.
+    """
+    data = deck.data
+    return isinstance(data, Poles) and not of_poles(data, deck.fit.state).passes
 
 
 def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:

@@ -37,9 +37,9 @@ def left_frequencies(rows: Sequence[FrequencyRow], model: Modelled) -> Iterator[
     yield (
         f"the frequencies of the deck are {rms:.2g} % (rms) from those of the test over "
         f"{len(paired)} modes{f', and {alone} have no partner' * bool(alone)}; the one at "
-        f"{test[worst]:.4g} Hz is {off[worst]:+.2g} % off; a careful model of "
-        f"{'shells' if most == SHELLS else 'bars or solids'} leaves {most:g} % at most, so physics "
-        "is missing, or modes are paired wrongly"
+        f"{test[worst]:.4g} Hz is {100 * (f[worst] / test[worst] - 1):+.2g} % off; a careful model "
+        f"of {'shells' if most == SHELLS else 'bars or solids'} leaves {most:g} % at most, so "
+        "physics is missing, or modes are paired wrongly"
     )
     if len(model.assembly.shells):
         yield from _folds(f, test, model)

@@ -57,6 +57,7 @@ from ..search.result_parts import (
     named_effects,
     otherwise,
     remainder,
+    values_kept,
 )
 from ..search.verdict_models import models, of_channels, real_poles, scores_of
 from ..search.written_scores import noise_Q, written_Q
@@ -323,6 +324,7 @@ def _result(
             *found.notes,
             *laid_on_sheets(found, weighed, mass_properties(question.assembly)[0]),
             *otherwise(found),
+            *values_kept(found),
             *away,
             left.sentence,
             *blind_note(spot),
