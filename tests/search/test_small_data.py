@@ -20,6 +20,7 @@ from chladni.fem.modelled import modelled
 from chladni.inference.least_data import too_little
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.write_tables import write_npz
+from chladni.progress import silent
 from chladni.reduced.real_modes import real_modes
 from chladni.search.measured_frequencies import widened
 from chladni.search.preparation import _own_modes, equalised_lines
@@ -28,6 +29,7 @@ from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
 from chladni.workflows.diagnose import diagnose
 from chladni.workflows.identify import identify
+from chladni.workflows.ready_case import ready
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -165,6 +167,26 @@ def test_a_written_deck_reaches_what_least_squares_reaches(tmp_path: Path) -> No
     assert written == pytest.approx([1.0, 0.2], rel=0.02)
     for profile in found.study.profiles:
         assert min(profile.neg2_log_likelihood) > 0
+
+
+KNOWN = """
+[[parameter]]
+parts = ["PBARL 1"]
+field = "E"
+sd = 0.01
+"""
+
+
+@pytest.mark.parametrize(("sd", "taken"), [(0.01, 0.3), (1.0, 1.0)])
+def test_a_known_modulus_takes_no_number_from_two_modes(tmp_path: Path, sd, taken) -> None:
+    """Two frequencies to 1 % know E to 1.4 %: 0.01² / (0.01² + 0.014²) = 0.33 of a prior of 1 %."""
+    flexible = first_of(tmp_path)[:2]
+    folder = with_poles(tmp_path, bar_deck(), *flexible)
+    with (folder / "case.toml").open("a") as case:
+        case.write(KNOWN.replace("0.01", str(sd)))
+    prepared = ready(load_case(folder), True, silent)[1]
+    assert 2 - prepared.numbers == pytest.approx(taken, abs=0.06)
+    assert f"take {2 - prepared.numbers:.2g} in effect" in prepared.too_little
 
 
 def first_of(folder: Path, held: bool = True) -> np.ndarray:

@@ -86,6 +86,11 @@ class OrthotropicMaterial(Effect):
         G12 = self.E / (2 * (1 + self.nu)) * np.exp(x[2])
         return float(E1), float(E2), float(G12), float(_mean_ratio(x[3]) * np.sqrt(E1 / E2))
 
+    @property
+    def axis_1(self) -> np.ndarray:
+        """Material axis 1, along which the components of the plane stiffness act."""
+        return self.axis
+
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """E1, E2, G12 and nu12."""
         nu12 = self.estimate(x, sd, lambda y: self.moduli(y)[3], "nu12", k=3)

@@ -1,10 +1,10 @@
-"""Data so few that they bear a name only if all other explanations are far behind, or none at all.
+"""Data so few that they support a name only if all other explanations are far behind.
 
-The calibration parameters take the numbers that their priors do not know: three at most for E, rho
-and t of one sheet, none of a part whose values are known. An effect adds up to three (strength and
-place).  Two further numbers must be able to contradict it. A mode gives its frequency and, with
-responses in absolute scale, one further number for every channel.  Fewer bear a name by odds alone,
-if calibration leaves a number over.
+The calibration parameters take the numbers that their priors do not know. These are three at most
+for E, rho and t of one sheet, and none of a part whose values are known. An effect adds up to three
+(strength and place).  Two further numbers must be able to contradict it. A mode gives its frequency
+and, with responses in absolute scale, one further number for every channel.  Fewer support a name
+by odds alone, if calibration leaves a number over.
 """
 
 import numpy as np

@@ -48,8 +48,8 @@ def left_frequencies(rows: Sequence[FrequencyRow], model: Modelled) -> Iterator[
 def _folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> Iterator[str]:
     """Sentence on folds of another stiffness, where the deviations are in proportion to theirs.
 
-    A fold in series with the sheet, κ times as stiff as in the deck, has (f / f_test)² = C (1 + s
-    (1/κ - 1)), with s the share of bending at folds in the strain energy and C common to all.
+    A fold is in series with the sheet. If it is κ times as stiff as in the deck, (f / f_test)² =
+    C (1 + s (1/κ - 1)). s is the share of bending at folds in the strain energy, C common to all.
     """
     from scipy.stats import f as fisher
 

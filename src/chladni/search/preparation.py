@@ -247,7 +247,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
 
 
 def _few(problem: UpdatingProblem, modes: int, channels: int) -> tuple[str, float]:
-    """Reason why the data bear no name as a rule, or "", and the numbers that calibration leaves.
+    """Reason why the data support no name as a rule, or "", and numbers that calibration leaves.
 
     Many numbers need no count of the parameters, which takes the slopes of the whole problem.
     """
