@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.builders.decks import flat_sheet
 
-from chladni.effects.orthotropy import orthotropic
+from chladni.effects.orthotropy import _extents, orthotropic
 from chladni.fem.modelled import modelled
 from chladni.io.nastran import assembly, read_deck
 from chladni.reduced.reduced_model import evaluate
@@ -27,3 +27,13 @@ def test_the_reduced_model_has_the_axis_of_the_deck(tmp_path, angle):
     f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
     due = modelled(effect.apply(made, x), 400.0).modes.frequency
     np.testing.assert_allclose(f[f > 1][:6], due[due > 1][:6], rtol=0.01)
+
+
+def test_a_square_has_the_axes_of_the_frame(tmp_path):
+    """Its extents are equal: their principal directions are those of rounding errors."""
+    cards = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,25.+9,,.3,2900.", "PSHELL,1,1,.0013,1,,1"]
+    cards += [*flat_sheet(8, 8, 0.25, 0.25), "ENDDATA"]
+    (tmp_path / "deck.bdf").write_text("\n".join(cards) + "\n")
+    made = assembly(read_deck(tmp_path / "deck.bdf"), UNITS["SI"])
+    groups = reduced_problem(modelled(made, 1000.0), 200.0, groups=20).groups
+    assert np.array_equal(_extents(groups, groups.sheet)[0], [1.0, 0.0, 0.0])
