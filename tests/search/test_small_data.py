@@ -124,6 +124,18 @@ def test_a_deck_of_bars_is_calibrated(tmp_path: Path, held: bool) -> None:
     assert not held or not diagnose(case).effects
 
 
+def test_listed_modes_have_the_same_partners_in_every_command(tmp_path: Path) -> None:
+    """Frequencies up to 30 % off, one of them nearer to another mode of the deck."""
+    flexible = first_of(tmp_path) * [1.3, 1.02, 0.9, 1.2]
+    case = load_case(with_poles(tmp_path, bar_deck(), *np.sort(flexible)))
+    found = correlate(case)
+    pairs = dict(zip(found.f_test[found.pairs.test], found.f_model[found.pairs.model], strict=True))
+    rows = {r.test_hz: r.before_hz for r in calibrate(case).frequencies}
+    assert len(pairs) == 4
+    for test, model in pairs.items():
+        assert rows[test] == pytest.approx(model, rel=1e-9)
+
+
 def two_parts(soft: float = 1.0) -> str:
     """A steel plate of 120 quads; its middle is a part of its own, ``soft`` times as stiff."""
     cards = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,210.+9,,.3,7850.", "PSHELL,1,1,.001,1,,1"]
