@@ -100,6 +100,9 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
         return []
     if result.distrust:
         return [f"Do not use {deck} before the reasons for doubt are settled."]
+    error = result.frequency_error
+    if result.compared == "frequencies" and error and (error.after or 0) >= (error.before or 0):
+        return [f"Do not use {deck}: its frequencies are no nearer to the test."]
     return [f"Use {deck}: it contains the change."]
 
 

@@ -6,7 +6,14 @@ from pathlib import Path
 
 from ..effects.estimate import Estimate, Location
 from ..inference.calibration_result import ParameterKnowledge
-from ..inference.result import Adequacy, Agreement, LeftPlace, NamedEffect, NextMeasurement
+from ..inference.result import (
+    Adequacy,
+    Agreement,
+    CalibratedParameter,
+    LeftPlace,
+    NamedEffect,
+    NextMeasurement,
+)
 from ..search.next_measurement import ODDS
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Drawing, Facts, Items, Links, Picture, Section, Table, Text
@@ -43,6 +50,7 @@ PLACES = {  # section: pictures of a run that stand there where the page does no
     "test": ("setup",),
     "found": ("where_2", "where_3"),
 }
+APART = 0.01  # relative difference of a written value from the found one that is explained
 LEVELS = "levels_"  # pictures of modes over levels: with the number of the mode
 _FILES = {
     "deck": "the updated deck",
@@ -265,7 +273,7 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
             quantity(c.deck_value, c.estimate.unit),
             _interval(c.estimate),
             percent(c.estimate.value, c.deck_value),
-            quantity(c.written_value, c.estimate.unit),
+            _written(c, result),
         )
         for c in result.calibrated
     ]
@@ -277,6 +285,18 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
     ]  # fmt: skip
     heads = ("parameter", "deck", "found (95 % interval)", "change", "updated deck")
     return [Table(heads, rows, ("parameter",), _REACHED)]
+
+
+def _written(c: CalibratedParameter, result: DiagnosisResult) -> str:
+    """The value of the updated deck, with the reason where it is not the one that was found."""
+    written, found = c.written_value, c.estimate.value
+    value = quantity(written, c.estimate.unit)
+    if not result.deck_changed:
+        return f"{value} (kept: the found value gains too little)"
+    if written is None or not found or abs(written / found - 1) < APART:
+        return value
+    change = percent(written, found)
+    return f"{value} ({change}: fitted without these errors)"
 
 
 def _range(p: ParameterKnowledge) -> str:

@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
+from ..decision.decision_rules import RULES
 from ..decision.hypotheses import EffectSet, Explanation, Hypotheses
 from ..decision.reasons import ALONE, Decision, Reason, Step
 from ..effects.registry import family
-from ..ema.odds import evidence_in_words
 from ..inference.adequacy import FitTest
 from .deciding import Evaluated
 from .diagnosis import Diagnosis
@@ -91,8 +91,8 @@ class DecisionWords:
         if decision.one_of and gain > decision.due:
             yield (
                 f"all data together give {lead.name} {gain:.0f} in -2 ln evidence over "
-                f"calibration alone, but {REFUSED[decision.reason]}: a cause outside the catalogue "
-                "may imitate it"
+                f"calibration alone, but {self.refusal(lead, decision.reason)}: a cause outside "
+                "the catalogue may imitate it"
             )
 
     def settled(self) -> str:
@@ -200,10 +200,11 @@ class DecisionWords:
         each = {h.name: h for h in self.decision.order}
         first, *others = step.names
         gap = {n: each[n].neg2_log_evidence - best.neg2_log_evidence for n in others}
-        odds = "; ".join(f"{evidence_in_words(gap[n] / 2)} against {n}" for n in others)
+        odds = "; ".join(f"2 ln B = {gap[n]:.1f} against {n}" for n in others)
         known = [(n, _of(h).fit) for n, h in each.items() if n in step.names]
         odd = [(n, t.effect.remarks(t.fit.of(t.effect)).implausible) for n, t in known]
-        note = f"these data do not distinguish {first} from the others: {odds}"
+        due = f"{RULES.tied:.0f} are required to separate two explanations"
+        note = f"these data do not distinguish {first} from the others: {odds}; {due}"
         impossible = [needs_impossible(n, why) for n, why in odd if why]
         return _with_check("; ".join([note, *impossible]), step.names)
 

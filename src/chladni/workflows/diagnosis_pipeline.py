@@ -41,6 +41,7 @@ from ..search.decision_in_words import concluded
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
 from ..search.frequency_table import frequency_error, frequency_rows
+from ..search.left_frequencies import left_frequencies
 from ..search.measured_modes import MeasuredModes, measured_modes
 from ..search.next_measurement import Outlook, advised, outlook
 from ..search.other_recordings import scored_others
@@ -57,6 +58,7 @@ from ..search.result_parts import (
     named_effects,
     otherwise,
     remainder,
+    values_kept,
 )
 from ..search.verdict_models import models, of_channels, real_poles, scores_of
 from ..search.written_scores import noise_Q, written_Q
@@ -174,6 +176,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*foretells_worse(result.agreement, bool(result.effects)), *distrust)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
+    if result.compared == "frequencies":
+        distrust = (*left_frequencies(result.frequencies, stages.final.model), *distrust)
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
@@ -327,6 +331,7 @@ def _result(
             *found.notes,
             *laid_on_sheets(found, weighed, mass_properties(question.assembly)[0]),
             *otherwise(found),
+            *values_kept(found),
             *away,
             left.sentence,
             *blind_note(spot),
