@@ -14,7 +14,8 @@ distance from the mid-surface the covariant strains, zero for rigid motions, are
 Transverse shear is tied: MITC8 (Bathe, Dvorkin, Int. J. Num. Meth. Eng. 22 (1986) 697-722) and
 MITC6 (Lee, Bathe, Computers and Structures 82 (2004) 945-962). The membrane strain is projected on
 1, r, s (and rs), with ``VARYING_MEMBRANE`` of the rest. A curved element can then bend without
-stretching. Constant strains and their forces stay as they are. A mid-side node that an element lacks leaves a straight edge (:func:`.solid_shapes.with_middles`).
+stretching. Constant strains and their forces stay as they are. A mid-side node that an element
+lacks leaves a straight edge (:func:`.solid_shapes.with_middles`).
 """
 
 from dataclasses import dataclass
