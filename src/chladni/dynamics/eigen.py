@@ -273,14 +273,17 @@ def _sparse(
     k = min(k, len(theta))
     lam, phi = sigma + 1 / theta[:k], ritz.vectors(k)
     del ritz  # half as large as the factor
+    _check_residual(problem, factor, sigma, lam, phi)
     if proof and len(theta) > k:
+        del factor  # a count takes as much memory
         s, known = _gap_above(sigma + 1 / theta, error, k)
         if due is not None:  # the k modes are those below the limit, or some are missing
             s, known = limit, int(np.sum(lam < limit))
         due = problem.below(s) if due is None else due
         if due != known:
+            factor = problem.factor(sigma)
             lam, phi = _completed(problem, factor, sigma, lam, phi, s, due)
-    _check_residual(problem, factor, sigma, lam, phi)
+            _check_residual(problem, factor, sigma, lam, phi)
     return lam[:k], phi[:, :k]
 
 

@@ -123,7 +123,8 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     T, dofs = _transformation(assembly)
     held = _held(assembly, dofs)
     T, dofs = sp.csr_array(T[:, ~held]), dofs[~held]
-    K, M = congruence(T, K), congruence(T, M)
+    K = congruence(T, K)  # one after the other: K of all motions is freed first
+    M = congruence(T, M)
     idle = _without_stiffness(K, M, dofs, assembly.auto_spc)
     kept = np.flatnonzero(~idle)
     if not len(kept):
