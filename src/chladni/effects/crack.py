@@ -259,26 +259,29 @@ def _at_rest(
 
     def scores(drawn: Sequence[Line]) -> np.ndarray:
         """Score of each line; a line that would gain stiffness explains nothing."""
-        fresh = [line.shells for line in drawn if line.shells.tobytes() not in known]
-        amount, score = scan.bending_scores(about, fresh)
+        keys = [line.shells.tobytes() for line in drawn]
+        fresh = {key: line.shells for key, line in zip(keys, drawn, strict=True)}
+        fresh = {key: shells for key, shells in fresh.items() if key not in known}
+        amount, score = scan.bending_scores(about, list(fresh.values()))
         score = np.where(amount < 0, score, np.inf)
-        known.update((s.tobytes(), float(v)) for s, v in zip(fresh, score, strict=True))
-        return np.array([known[line.shells.tobytes()] for line in drawn])
-
-    def at_rest(line: Line) -> Line:
-        """Move a line until no neighbour explains more."""
-        while near := lines.moved(line):
-            score = scores([line, *near])
-            best = int(np.argmin(score))
-            if not score[best] < score[0] - WORTH:
-                break
-            line = near[best - 1]
-        return line
+        known.update(zip(fresh, map(float, score), strict=True))
+        return np.array([known[key] for key in keys])
 
     score = scores(first)
     begun = far_apart(score, np.array([line.centre for line in first]), BEGUN)
-    ends = _different([at_rest(first[k]) for k in begun if np.isfinite(score[k])])
-    return ends, len(known)
+    ends = [first[k] for k in begun if np.isfinite(score[k])]
+    moving = list(range(len(ends)))
+    while moving:
+        near = {k: [ends[k], *lines.moved(ends[k])] for k in moving}
+        every = iter(scores([line for each in near.values() for line in each]))
+        moving = []
+        for k, each in near.items():
+            own = [next(every) for _ in each]
+            best = int(np.argmin(own))
+            if own[best] < own[0] - WORTH:
+                ends[k] = each[best]
+                moving.append(k)
+    return _different(ends), len(known)
 
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
