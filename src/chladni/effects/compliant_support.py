@@ -30,12 +30,13 @@ from .search_context import Candidate, SearchContext, best_starts
 RIGID = 2e4  # times the spring on which all mass resonates at the highest line: as good as rigid
 SD = 2.0  # of its prior: fixtures differ as much as foundations do
 STARTS = (-4.0, -2.0, 0.0)
+BY_GRID = (-3.0, 0.0, 3.0)  # of a clamp that gives by each grid: often only turns, or only moves
 SEEN = 1e-11  # of a rigid spring: smaller modal reactions are rounding
 TYPICAL = 0.01  # prior median: share of stiffness lost by the mode with the largest reaction
 NEAR_AXIS = 0.999  # cosine from which a direction counts as an axis of the basic frame
 TOGETHER = 0.01  # correlation of moment and force below which they come from different modes
 MOST_DIRECTIONS = 12  # ways tried: those with the largest loss of stiffness
-FOLLOWED = 1  # ways of each kind, as a rigid body or by each grid, that are fitted
+FOLLOWED = 1  # ways of each kind, as a rigid body, by each grid or by some, that are fitted
 MOST_CLAMPS = 2  # clamps tried that give by each grid: those with the largest loss of stiffness
 DRAWN = 8  # modes of an article that set the reactions at its clamp
 TAKEN = 0.05, 0.25  # share of stiffness lost by that mode, for each spring of a concealed clamp
@@ -215,7 +216,10 @@ def candidates(context: SearchContext) -> list[Candidate]:
     stiff = rigid_springs(built.assembly, every, where.setup.weight, where.setup.f_max)
     supports = modal_supports(built, where.frequency[elastic], where.shapes[:, elastic])
     out = []
-    for effects in _effects(built, every, supports, stiff):
+    rigid, by_grid = _effects(built, every, supports, stiff)
+    whole = [e for e in by_grid if isinstance(e.direction, HeldStretch) and e.direction.whole]
+    some = [e for e in by_grid if e not in whole]
+    for effects in (rigid, whole, some):
         best = sorted(
             best_starts(context, effects), key=lambda c: context.scores(c.effect, [c.start]).min()
         )
@@ -268,9 +272,10 @@ def _effect(
     owner: np.ndarray, tried: int,
 ) -> CompliantSupport:  # fmt: skip
     units = {"K": "N/m", "K_rot": "N m/rad"}
+    starts = BY_GRID if isinstance(direction, HeldStretch) else STARTS
     unknown = tuple(
         Parameter(
-            name, units[name], 0.0, SD, k, step=1.0, starts=STARTS, nominal=float(np.log(most / k))
+            name, units[name], 0.0, SD, k, step=1.0, starts=starts, nominal=float(np.log(most / k))
         )
         for name, k, most in zip(
             direction.names, scale_of(direction.pull).tolist(), direction.rigid, strict=True

@@ -92,6 +92,7 @@ class HeldStretch:
     springs : of the translations, then of the rotation about a line
     rigid : (k,)    springs that are as good as rigid [N/m, N m/rad]
     pull : (k, r)   f²/λ of each mode
+    whole : it is all of the clamp
     """
 
     grids: np.ndarray
@@ -100,6 +101,7 @@ class HeldStretch:
     springs: tuple[Springs, ...]
     rigid: np.ndarray
     pull: np.ndarray
+    whole: bool
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -154,7 +156,7 @@ def stretches(
                 f"{text}, each giving by itself {how}"
             )
             pull = np.array([p for _, p in found])
-            made = HeldStretch(grids, centre, said, tuple(springs), rigid, pull)
+            made = HeldStretch(grids, centre, said, tuple(springs), rigid, pull, not text)
             yield made, [moves for moves, _ in found]
 
 

@@ -32,7 +32,8 @@ STRAIGHT = 0.8  # least cosine of an edge to the line: no zigzag along diagonals
 BEGUN = 6  # lines of shells whose grids are tried
 FEW = 16  # middles of lines that are tried if only natural frequencies are known
 FOLLOWED = 2  # lines that are fitted
-STEPS = 4  # moves of the best line while it explains more
+STEPS = 6  # moves of a line while it explains more
+LONGER = (1, 3)  # edges by which a move lengthens a line
 BETTER = 0.5  # least gain of a move in -2 ln posterior
 
 
@@ -174,9 +175,10 @@ class GridLines:
         size = float(np.linalg.norm(X[rows[1]] - X[rows[0]]))
         found = [grids[1:], grids[:-1]] if len(grids) > 3 else []
         for end, d in ((-1, ahead), (0, -ahead)):
-            more = self.walk(int(rows[end]), d, 0.5 * size)[1:]
-            more = self.assembly.ids[more].tolist()
-            found.append((*grids, *more) if end else (*more[::-1], *grids))
+            for edges in LONGER:
+                more = self.walk(int(rows[end]), d, (edges - 0.5) * size)[1:]
+                more = self.assembly.ids[more].tolist()
+                found.append((*grids, *more) if end else (*more[::-1], *grids))
         middle = int(rows[len(rows) // 2])
         half = 0.5 * float(np.linalg.norm(X[rows[-1]] - X[rows[0]])) - 0.4 * size
         for near in self.edges[self.first[middle] : self.first[middle + 1], 1].tolist():
@@ -216,13 +218,14 @@ def candidates(context: SearchContext) -> list[Candidate]:
     ])  # fmt: skip
     effects = [e for path in every if (e := Stiffener.along(where, path, tried)) is not None]
     best = best_places(context, effects, FOLLOWED, extended=True)
-    return [_moved(context, grids, best[0]), *best[1:]] if best else []
+    return [closer(context, best[0].effect, best[0].start) or best[0], *best[1:]] if best else []
 
 
-def _moved(context: SearchContext, grids: GridLines, best: Candidate) -> Candidate:
-    """Move a candidate to neighbouring lines of grids while it explains more."""
-    effect, start = best.effect, best.start
+def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
+    """Move a stiffener at x to neighbouring lines of grids while it explains more."""
     assert isinstance(effect, Stiffener)
+    start, first = x, effect
+    grids = GridLines.of(context.where.groups.structure.assembly)
     least = float(context.scores(effect, [start], True).min())
     for _ in range(STEPS):
         near = [
@@ -233,7 +236,7 @@ def _moved(context: SearchContext, grids: GridLines, best: Candidate) -> Candida
         if not scores or min(scores) > least - BETTER:
             break
         least, effect = min(scores), near[int(np.argmin(scores))]
-    return Candidate(effect, start, best.base)
+    return None if effect is first else Candidate(effect, start, context.bases[-1])
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
@@ -260,6 +263,7 @@ FAMILY = Family(
     Stiffener,
     conceal,
     candidates=candidates,
+    closer=closer,
     cards=("CBAR", "PBAR", "MAT1"),
     settled_by="look at the sheet from both sides, and weigh what is fixed to it",
     on_sheets=True,
