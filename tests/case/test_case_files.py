@@ -175,13 +175,13 @@ def test_a_way_that_comes_back_is_within(folder, tmp_path):
 
 def test_what_a_case_allows_of_its_deck_is_noted(folder, tmp_path):
     case = moved(folder, tmp_path, "softer.bdf")
-    text = deck().replace("ENDDATA", "CELAS2,99,0.1,17,3\nCWELD,900,1\nENDDATA")
+    text = deck().replace("ENDDATA", "CELAS2,99,0.1,17,3\nCSEAM,900,1\nENDDATA")
     (case / "plate.bdf").write_text(text)
-    (case / "case.toml").write_text(CASE.replace('allow = ["CWELD"]\n', ""))
-    with pytest.raises(FileError, match=r"CWELD .*\[model\] allow = \[\"CWELD\"\]"):
+    (case / "case.toml").write_text(CASE.replace('allow = ["CSEAM"]\n', ""))
+    with pytest.raises(FileError, match=r"CSEAM .*\[model\] allow = \[\"CSEAM\"\]"):
         load_case(case)
     (case / "case.toml").write_text(CASE)
-    assert any("ignored" in n and "CWELD" in n for n in load_case(case).notes)
+    assert any("ignored" in n and "CSEAM" in n for n in load_case(case).notes)
 
 
 def test_init_allows_what_it_points_to(tmp_path):

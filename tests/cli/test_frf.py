@@ -100,11 +100,11 @@ def test_supports_are_those_of_the_subcase_that_seeks_modes(tmp_path):
 
 
 def test_a_card_is_left_out_on_request_only(tmp_path):
-    deck, out = two(tmp_path, ENDDATA="CWELD,77,1\nENDDATA")
+    deck, out = two(tmp_path, ENDDATA="CSEAM,77,1\nENDDATA")
     said = refused("modes", deck, "--out", out)
-    assert "CWELD" in said
-    assert "--allow CWELD" in said
-    ran("modes", deck, "--allow", "CWELD", "--out", out)
+    assert "CSEAM" in said
+    assert "--allow CSEAM" in said
+    ran("modes", deck, "--allow", "CSEAM", "--out", out)
 
 
 def test_what_modes_do_not_need_does_not_stop_them(tmp_path):

@@ -19,7 +19,7 @@ DESVAR,1,A,1.
 RFORCE,1,1,,2.
 NSM1,1,PSHELL,NSM,1.
 """
-STRANGE = "CWELD,1,2\nCWELD,2,2\n"
+STRANGE = "CSEAM,1,2\nCSEAM,2,2\n"
 
 
 @pytest.fixture
@@ -46,14 +46,14 @@ def test_what_is_not_understood_stands_first_with_its_meaning(deck, tmp_path):
     ran("check", path, "--out", tmp_path / "out", code=3)
     rows = json.loads((tmp_path / "out" / "check.json").read_text())["cards"]
     assert [(r["name"], r["count"], r["use"]) for r in rows[:3]] == [
-        ("CWELD", 2, "not understood"),
+        ("CSEAM", 2, "not understood"),
         ("STATSUB", 1, "not understood"),
         ("RFORCE", 1, "left out"),
     ]
     assert "spot welds" in rows[0]["meaning"]
     assert "2 kinds of cards and commands are not" in (tmp_path / "out/report.html").read_text()
-    assert "CWELD (2 cards" in check_deck(path).refused
-    found = check_deck(path, ("CWELD", "STATSUB"))
+    assert "CSEAM (2 cards" in check_deck(path).refused
+    found = check_deck(path, ("CSEAM", "STATSUB"))
     assert not found.refused
     assert found.cards[0].use == "allowed"
 

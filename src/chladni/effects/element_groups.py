@@ -132,14 +132,22 @@ class ElementGroups:
         ).tocsr()
         return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
 
-    def components(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
+    def components(
+        self, axis: np.ndarray | None = None
+    ) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
         """``linear`` and ``cubic`` for each component of the plane stiffness; beams go with Q66.
+
+        Axis 1 of the components is that of the deck, or the projection of ``axis`` (3,).
 
         They come one at a time, because all of them together would double the memory of a large
         model.
         """
-        m = len(self.structure.assembly.shells)
-        for name, pair in component_matrices(self.structure.assembly):
+        made = self.structure.assembly
+        m = len(made.shells)
+        if axis is not None:
+            along = np.broadcast_to(axis, made.shells.axis.shape)
+            made = replace(made, shells=replace(made.shells, axis=along))
+        for name, pair in component_matrices(made):
             beams = [A[m:] if name == "Q66" else 0 * A[m:] for A in (self.linear, self.cubic)]
             A, B = (_stacked(*both) for both in zip(pair, beams, strict=True))
             yield name, (A, B)
@@ -172,7 +180,7 @@ class ElementGroups:
     @cached_property
     def _places(self) -> list["_Place"]:
         """The elements and dofs of every group."""
-        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), 24)
+        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), -1)
         return [_Place.of(on, dofs[on], self.structure.T) for on in alike(self.group)]
 
 
@@ -243,7 +251,8 @@ def element_groups(structure: Structure, most: int = 64) -> ElementGroups:
     Transverse shear with residual bending flexibility grows with a power of t between one and
     three. Its matrix is split so that value and first derivative are exact.
     """
-    shells, beams = _shells(structure.assembly), _beams(structure.assembly)
+    shells = _shells(structure.assembly)
+    beams = _beams(structure.assembly, shells.nodes.shape[1])
     linear, cubic, mass, nodes, centre, area, of = (
         _stacked(*pair) for pair in zip(shells, beams, strict=True)
     )
@@ -255,7 +264,7 @@ def element_groups(structure: Structure, most: int = 64) -> ElementGroups:
     middle = np.stack(
         [np.bincount(group, area * centre[:, k], minlength=n) / extent for k in range(3)], axis=1
     )
-    weight = np.einsum("eij,i,j->e", mass, _along_x(), _along_x())
+    weight = mass[:, ::6, ::6].sum(axis=(1, 2))  # of a unit translation along x
     part = np.zeros(n, dtype=int)
     part[group] = of
     return ElementGroups(
@@ -282,17 +291,24 @@ class _Elements(NamedTuple):
 
 
 def _shells(assembly: Assembly) -> _Elements:
-    shells = assembly.shells
+    shells, none = assembly.shells, np.zeros((0, 24, 24))
+    if not len(shells):  # nor perhaps any part
+        return _Elements(
+            none, none, none, shells.nodes, np.zeros((0, 3)), none[:, 0, 0], shells.part
+        )
     geo = shell.geometry(assembly.points, shells)
     arrays = section_arrays(assembly, geo)
     linear, cubic = thickness_split(assembly, geo, arrays)
     mass = shell.mass(geo, shells.thickness, arrays.rho, arrays.nsm, assembly.coupled_mass)
     centre = assembly.points[shells.nodes].mean(axis=1)
-    return _Elements(linear, cubic, mass, shells.nodes, centre, geo.area, shells.part)
+    return _Elements(linear, cubic, mass, geo.nodes, centre, geo.area, shells.part)
 
 
-def _beams(assembly: Assembly) -> _Elements:
-    """Member beams without their non-structural mass, which stays in the rest of the model."""
+def _beams(assembly: Assembly, k: int) -> _Elements:
+    """Member beams, of k nodes as the shells, without their non-structural mass.
+
+    It stays in the rest of the model.
+    """
     beams = picked(assembly.beams, member_beams(assembly))
     plain = tuple(
         part.with_section(nonstructural=0.0, nonstructural_inertia=0.0)
@@ -301,16 +317,11 @@ def _beams(assembly: Assembly) -> _Elements:
     )  # fmt: skip
     alone = replace(assembly.with_parts(plain), beams=beams)
     nodes, K, M = beam.stiffness_and_mass(alone)
-    K, M = (np.pad(A, ((0, 0), (0, 12), (0, 12))) for A in (K, M))
+    K, M = (np.pad(A, ((0, 0), *2 * [(0, 6 * (k - 2))])) for A in (K, M))
     ends = assembly.points[nodes]
     areas = np.array([getattr(p.section, "area", 0.0) for p in plain])[beams.part]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     return _Elements(
-        K, np.zeros_like(K), M, nodes[:, [0, 1, 1, 1]], ends.mean(axis=1),
+        K, np.zeros_like(K), M, nodes[:, [0, *[1] * (k - 1)]], ends.mean(axis=1),
         length * np.sqrt(areas), beams.part,
     )  # fmt: skip
-
-
-def _along_x() -> np.ndarray:
-    """Unit rigid translation of an element's 24 dofs."""
-    return np.tile([1.0, 0, 0, 0, 0, 0], 4)

@@ -17,7 +17,7 @@ from ..fem import shell
 from ..fem.assemble import Structure
 from ..fem.derivative import by_part, of_lumps
 from ..fem.sparse_assembly import blocks, congruence
-from ..model.assembly import Assembly, Shells
+from ..model.assembly import Assembly, Shells, picked
 from ..model.properties import Isotropic, ShellSection, SolidSection
 from .effect import Effect, MatrixTerm, Parameter, Traits, Within
 from .element_groups import shear_matrices
@@ -169,7 +169,8 @@ def _shear(built: Structure) -> Iterator[ModelFamily]:
         if not isinstance(assembly.parts[k].section, ShellSection):
             continue
         mine, text = np.flatnonzero(shells.part == k), f"shear of {assembly.parts[k].name}"
-        A, nodes = shear_matrices(assembly, mine), shells.nodes[mine]
+        A = shear_matrices(assembly, mine)
+        nodes = shell.geometry(assembly.points, picked(shells, mine)).nodes
         K = congruence(built.T, blocks(A.sum(axis=0), nodes, len(assembly.points)))
         if K.nnz:
             yield ModelFamily(

@@ -14,22 +14,22 @@ import scipy.sparse as sp
 from ..dofs import rows as label_rows
 from ..dynamics.system import System
 from ..errors import LabelError, ModelError
-from ..model.assembly import Assembly
+from ..model.assembly import Assembly, picked
 from . import shell
 from .negative_springs import refuse_unstable
 from .shell_section import SectionArrays, section_arrays
 from .sparse_assembly import (
     EVERY,
     INERTIA,
+    TRANSLATIONS,
     accumulate,
     blocks,
     congruence,
     narrowed,
-    with_rotations,
 )
 
 EMPTY = 1e-8  # of the stiffest direction of a point: Nastran's EPZERO of AUTOSPC
-PIECE = 1024  # shells whose matrices are in memory at a time
+PIECE = 1024  # elements whose matrices are in memory at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,15 +155,13 @@ Matrices = tuple[sp.csr_array, sp.csr_array | None, sp.csr_array, sp.csr_array |
 def _each_family(assembly: Assembly, residual_bending: bool) -> Iterator[Matrices]:
     """(M, V, K, loss) of each family that has members."""
     n = len(assembly.points)
-    if len(assembly.shells):
-        yield _shells(assembly, residual_bending)
-    if any(map(len, assembly.solids)):
-        from . import solid
-
-        losses = solid.loss_factors(assembly)
-        for eta, (nodes, K_e, M_e) in zip(losses, solid.stiffness_and_mass(assembly), strict=True):
-            K, M = (blocks(with_rotations(A), nodes, n) for A in (K_e, M_e))
-            yield M, None, K, _lossy(eta, with_rotations(K_e), nodes, n)
+    for which in (~assembly.shells.curved, assembly.shells.curved):
+        if which.any():
+            some = assembly.shells if which.all() else picked(assembly.shells, which)
+            yield _shells(replace(assembly, shells=some), residual_bending)
+    for group in assembly.solids:
+        if len(group):
+            yield _solids(replace(assembly, solids=(group,)))
     if len(assembly.beams):
         from . import beam
 
@@ -206,6 +204,24 @@ def _pieces(
         K = shell.stiffness(part, t, **s.stiffness)
         M = shell.mass(part, t, s.rho, s.nsm, coupled=assembly.coupled_mass)
         yield rows, (M, K, s.loss[:, None, None] * K)[: 3 if lossy else 2]
+
+
+def _solids(assembly: Assembly) -> Matrices:
+    """Matrices of one group of solids, computed in pieces."""
+    from . import solid
+
+    (group,), (eta,) = assembly.solids, solid.loss_factors(assembly)
+
+    def pieces() -> Iterator[tuple[slice, tuple[np.ndarray, ...]]]:
+        for start in range(0, len(group), PIECE):
+            rows = slice(start, start + PIECE)
+            part = replace(assembly, solids=(picked(group, rows),))
+            ((_, K, M),) = solid.stiffness_and_mass(part)
+            yield rows, (M, K, eta[rows, None, None] * K)[:kinds]
+
+    kinds = 3 if eta.any() else 2
+    found = accumulate(group.nodes, len(assembly.points), pieces(), (TRANSLATIONS,) * kinds)
+    return found[0], None, found[1], found[2] if eta.any() else None
 
 
 def _transformation(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:

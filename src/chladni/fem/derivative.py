@@ -21,7 +21,7 @@ from . import shell, solid, spring
 from .assemble import Structure, over_all_motions
 from .energy import bare, only
 from .shell_section import modulus_derivative, section_arrays
-from .sparse_assembly import blocks, congruence, with_rotations
+from .sparse_assembly import blocks, congruence
 
 SHELL = ("t", "E", "nu", "rho", "E1", "E2", "G12", "nu12")
 SOLID = ("E", "nu", "rho")
@@ -111,14 +111,14 @@ def _solid(structure: Structure, a: Assembly, section: SolidSection, name: str) 
         if name == "rho":
             one = np.ones(len(group))
             A = solid.mass(X, one) if a.coupled_mass else solid.lumped_mass(X, one)
-            out = replace(out, M=out.M + _assembled(structure, with_rotations(A), group.nodes))
+            out = replace(out, M=out.M + _assembled(structure, A, group.nodes))
             continue
         C, dC = (
             np.broadcast_to(c, (len(group), 6, 6))
             for c in (solid.elasticity(material), solid.elasticity_derivative(material, name))
         )
         A = solid.stiffness_derivative(X, C, dC, 0 if section.full else section.modes)
-        out = replace(out, K=out.K + _assembled(structure, with_rotations(A), group.nodes))
+        out = replace(out, K=out.K + _assembled(structure, A, group.nodes))
     return out
 
 

@@ -1,7 +1,8 @@
 """Shell elements as matrices: K = ∫ t εᵀQ_m ε + t³/12 κᵀQ_b κ + γᵀS γ + s (ω - rz)² dA.
 
 Every matrix here is (m, 24, 24) in the basic frame, nodal order ux uy uz rx ry rz; a triangle's
-fourth node has empty rows. ε, κ, γ, ω depend on geometry only. The incompatible bubbles of the
+fourth node has empty rows. It is (m, 48, 48) where some of the shells have nodes on their edges
+(:mod:`.curved_shell`). ε, κ, γ, ω depend on geometry only. The incompatible bubbles of the
 quadrilateral also depend on the *shape* of the membrane material. Hence the stiffness is **linear**
 in Q_m, Q_b, Q_c, S and s for a constant ``reference``:
 
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import triangle
+from . import curved_shell, triangle
 from .shell_drilling import corner_twist, damped
 from .shell_geometry import ShellGeometry as ShellGeometry
 from .shell_geometry import geometry as geometry
@@ -52,6 +53,8 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     reference : (m, 3, 3) or (3, 3)
         Membrane stiffness in the material frame, any scale, for which the bubbles are condensed.
     """
+    if geo.curved.any():
+        return Strains(*curved_shell.strains(geo))
     if geo.triangle.any():
         epsilon, omega = triangle.membrane(geo.corners)
         kappa, gamma = triangle.plate(geo.corners)
@@ -69,8 +72,13 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     B[:, :, DRILL, :, :2] = omega.reshape(len(geo), -1, 1, 4, 2)
     B[:, :, 8, :, 5] = -N
     B[:, :, DRILL] = damped(B[:, :, DRILL], weight)
-    B = B.reshape(len(geo), -1, 24) @ to_element(geo)
-    return Strains(B.reshape(len(geo), len(N), 9, 24), weight, N)
+    B = _widened(B.reshape(len(geo), -1, 24) @ to_element(geo), geo)
+    return Strains(B.reshape(len(geo), len(N), 9, -1), weight, N)
+
+
+def _widened(B: np.ndarray, geo: ShellGeometry) -> np.ndarray:
+    """Rows (m, r, 24) with empty columns for nodes on edges that these shells lack."""
+    return np.pad(B, ((0, 0), (0, 0), (0, geo.motions - 24)))
 
 
 def _regular(sheet: np.ndarray) -> np.ndarray:
@@ -189,7 +197,7 @@ def mass(
     (m, 24, 24)             basic frame; the mass of an offset shell sits on its mid-surface
     """
     nsm = np.zeros(len(geo)) if nsm is None else nsm
-    M = np.zeros((len(geo), 24, 24))
+    M = np.zeros((len(geo), geo.motions, geo.motions))
     for rows in _chunks(geo):
         part = geo[rows]
         weight, N = _quadrature(part)
@@ -204,7 +212,7 @@ def mass_by_thickness(
     geo: ShellGeometry, t: np.ndarray, change: np.ndarray, rho: np.ndarray, coupled: bool = True
 ) -> np.ndarray:
     """dM_e = ∫ ρδt N Nᵀ ⊗ 1 + ρt²δt/4 N Nᵀ ⊗ (1 - n nᵀ) dA for a change δt (m, 4) of t."""
-    M, change = np.zeros((len(geo), 24, 24)), np.broadcast_to(change, t.shape)
+    M, change = np.zeros((len(geo), geo.motions, geo.motions)), np.broadcast_to(change, t.shape)
     for rows in _chunks(geo):
         part = geo[rows]
         weight, N = _quadrature(part)
@@ -230,11 +238,12 @@ def turned(Q: np.ndarray, turn: np.ndarray) -> np.ndarray:
 
 def _chunks(geo: ShellGeometry) -> Iterator[Rows]:
     """Rows of one shape, in pieces that fit the cache."""
-    mixed = geo.triangle.any() and not geo.triangle.all()
-    for kind in (False, True) if mixed else (None,):
-        rows = np.arange(len(geo)) if kind is None else np.flatnonzero(geo.triangle == kind)
+    kinds = geo.triangle + 2 * geo.curved
+    found = np.unique(kinds)
+    for kind in found:
+        rows = np.flatnonzero(kinds == kind)
         for start in range(0, len(rows), CHUNK):
-            if kind is None:
+            if len(found) == 1:
                 yield slice(start, min(start + CHUNK, len(geo)))
             else:
                 yield rows[start : start + CHUNK]
@@ -242,6 +251,8 @@ def _chunks(geo: ShellGeometry) -> Iterator[Rows]:
 
 def _quadrature(geo: ShellGeometry) -> tuple[np.ndarray, np.ndarray]:
     """dA (m, g) and N (g, 4)."""
+    if geo.curved.any():
+        return curved_shell.quadrature(geo)
     if geo.triangle.any():
         return np.repeat(geo.area[:, None] / 3, 3, axis=1), triangle.N
     return jacobians(geo.corners)[0], QUAD_N
@@ -258,20 +269,22 @@ def _integrated(
 
     Here dS is the excess of shear stiffness and s the drilling stiffness of the corners.
     """
-    K = np.zeros((len(geo), 24, 24))
+    n = geo.motions
+    K = np.zeros((len(geo), n, n))
     for rows in _chunks(geo):
         part = geo[rows]
         e = strains(part, *_of(rows, reference))
         C = section(rows, part, e.N) * e.weight[:, :, None, None]
         m = len(part)
-        K[rows] = e.B.reshape(m, -1, 24).swapaxes(1, 2) @ (C @ e.B).reshape(m, -1, 24)
+        K[rows] = e.B.reshape(m, -1, n).swapaxes(1, 2) @ (C @ e.B).reshape(m, -1, n)
         if excess is not None:
             share = e.weight / part.area[:, None]
             mean = (share[:, :, None, None] * e.B[:, :, SHEAR]).sum(axis=1)
             stress = excess[rows] * part.area[:, None, None] @ mean
             K[rows] += mean.swapaxes(1, 2) @ stress
         if corners is not None:
-            b = corner_twist(part)
+            curved = part.curved.any()
+            b = curved_shell.corner_twist(part) if curved else _widened(corner_twist(part), part)
             K[rows] += b.swapaxes(1, 2) @ (corners[rows, None, None] * b)
     return K
 
@@ -331,7 +344,9 @@ def _of(rows: Rows, *arrays: np.ndarray | None) -> Iterator[np.ndarray | None]:
 def _mass(
     geo: ShellGeometry, N: np.ndarray, areal: np.ndarray, rotary: np.ndarray, coupled: bool
 ) -> np.ndarray:
-    """Nodal mass and inertia with the rigid link of an offset, but not of warp: (m, 24, 24)."""
+    """Nodal mass and inertia with the rigid link of an offset, but not of warp."""
+    if geo.curved.any():
+        return curved_shell.mass(geo, areal, rotary, coupled)
     NN = N[:, :, None] * (N[:, None, :] if coupled else np.eye(4))
     m_ij, j_ij = ((w @ NN.reshape(-1, 16)).reshape(-1, 4, 4) for w in (areal, rotary))
     n = geo.frames[:, 2]
@@ -342,7 +357,8 @@ def _mass(
     M[:, :, 3:, :, 3:] = j_ij[:, :, None, :, None] * plane[:, None, :, None, :]
     if geo.offset.any():
         _carry_offset(M, m_ij, geo.offset, n)
-    return M.reshape(len(geo), 24, 24)
+    more = geo.motions - 24
+    return np.pad(M.reshape(len(geo), 24, 24), ((0, 0), (0, more), (0, more)))
 
 
 def _carry_offset(M: np.ndarray, m_ij: np.ndarray, offset: np.ndarray, n: np.ndarray) -> None:

@@ -25,7 +25,10 @@ from .shell_membrane import corner_slopes
 class ShellGeometry:
     """Frames and flattened corners of m shells; a mask, rows or a slice as index give a subset."""
 
-    nodes: np.ndarray  # (m, 4) int: rows of points; a triangle repeats its third
+    # (m, 4 or 8) int: rows of points; a triangle repeats its third; 8 where some shells have nodes
+    # on edges, of which an absent one repeats the edge's first end
+    nodes: np.ndarray
+    places: np.ndarray  # (m, 4 or 8, 3) of the nodes [m]
     frames: np.ndarray  # (m, 3, 3) rows are the unit vectors x, y, n of the element frame
     corners: np.ndarray  # (m, 4, 2) flattened corners from the element's middle [m]
     warp: np.ndarray  # (m, 4) height of each node along n above the plane [m]
@@ -41,6 +44,16 @@ class ShellGeometry:
     def __getitem__(self, which: np.ndarray | slice) -> Self:
         return replace(self, **{name: value[which] for name, value in vars(self).items()})
 
+    @property
+    def curved(self) -> np.ndarray:
+        """(m,) bool, True where the shell has nodes on its edges."""
+        return (self.nodes[:, 4:] != self.nodes[:, : self.nodes.shape[1] - 4]).any(axis=1)
+
+    @property
+    def motions(self) -> int:
+        """Columns of an element matrix: six a node."""
+        return 6 * self.nodes.shape[1]
+
 
 def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
     """Frames, flattened corners and warp of every shell.
@@ -55,7 +68,9 @@ def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
     ModelError
         If a shell has no area or an inner angle beyond 180 degrees; the sentence names it.
     """
-    x, triangle = points[shells.nodes], shells.triangle
+    x, triangle, nodes = points[shells.nodes], shells.triangle, shells.nodes
+    if shells.curved.any():
+        nodes = np.hstack([nodes, np.where(shells.middle >= 0, shells.middle, nodes)])
     frames = _frames(x, triangle)
     middle = np.where(triangle[:, None], x[:, :3].mean(axis=1), x.mean(axis=1))
     local = (x - middle[:, None]) @ frames.swapaxes(1, 2)
@@ -64,7 +79,8 @@ def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
     _check(shells.ids, corners, triangle)
     axis = np.einsum("mij,mj->mi", frames[:, :2], shells.axis)
     return ShellGeometry(
-        nodes=shells.nodes,
+        nodes=nodes,
+        places=points[nodes],
         frames=frames,
         corners=corners,
         warp=np.ascontiguousarray(local[:, :, 2]),

@@ -1,4 +1,4 @@
-"""Solids: hexahedron, wedge and tetrahedron with linear shape functions (SI).
+"""Solids: hexahedron, wedge, tetrahedron and pyramid, with and without nodes on edges (SI).
 
 Element dofs are translations in the basic frame, ordered node by node. Either handedness of the
 node order is accepted: the volume is |det J|.
@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import ModelError, named
-from ..geometry.solid_shapes import FAMILIES, SolidFamily, jacobians
+from ..geometry.solid_shapes import CORNERS, FAMILIES, ShapeFamily, jacobians, with_middles
 from ..model.assembly import Assembly, Solids
 from ..model.properties import Isotropic, SolidSection
 
@@ -119,7 +119,8 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     X : (m, k, 3)        corners [m]
     C : (m, 6, 6)        elasticity [Pa]
     modes : (m,) or int  internal strains of a hexahedron: 21, 9 (incompatible modes) or 0 (plain);
-                         any value but 0 gives a wedge three, and tied shear
+                         any value but 0 gives a wedge three, and tied shear, and elements with
+                         mid-side nodes reduced shear
 
     Notes
     -----
@@ -128,6 +129,11 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     They prevent locking of a brick in bending and of nearly incompressible material. On a box, 21
     reproduce NX Nastran's hexahedron to its printed digits; plain is its ISOP=FULL. Where C has no
     stiffness in some direction (G = 0), they follow as if it had ``LEAST`` of its trace.
+    Hexahedra and wedges with mid-side nodes have no internal strains. Their energy of shear is
+    integrated by 2 x 2 x 2 and 3 x 2 points, the rest by 3 x 3 x 3 and 7 x 3 (reduced shear, PSOLID
+    of the MSC Nastran Quick Reference Guide); plain integrates all by the latter. Tetrahedra have 5
+    points, with which MSC Nastran's displacements of two curved ones come out to the printed
+    digits. Pyramids have the Gauss points of their collapsed hexahedron.
     """
     modes = np.broadcast_to(np.asarray(modes), len(X))
     K = np.empty((len(X), 3 * X.shape[1], 3 * X.shape[1]))
@@ -139,7 +145,7 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
         K[singular] = stiffness_derivative(X[singular], regular, C[singular], modes[singular])
     for n in np.unique(modes[~singular]):
         at = (modes == n) & ~singular
-        K[at] = _integrated(FAMILIES[X.shape[1]], X[at], C[at], int(n))
+        K[at] = _condensed(_whole(X[at], C[at], int(n)), 3 * X.shape[1])
     return K
 
 
@@ -156,37 +162,52 @@ def stiffness_derivative(
     out = np.empty((len(X), n, n))
     for kind in np.unique(modes):
         at = modes == kind
-        K, dK = (_whole(FAMILIES[X.shape[1]], X[at], A[at], int(kind)) for A in (C, dC))
+        K, dK = (_whole(X[at], A[at], int(kind)) for A in (C, dC))
         follow = np.linalg.solve(K[:, n:, n:], -K[:, n:, :n])
         carry = np.concatenate([np.broadcast_to(np.eye(n), (len(K), n, n)), follow], axis=1)
         out[at] = carry.swapaxes(1, 2) @ dK @ carry
     return out
 
 
-def _integrated(family: SolidFamily, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
-    """Σ w |det J| Bᵀ C B with the internal strains condensed out."""
-    return _condensed(_whole(family, X, C, modes), 3 * X.shape[1])
-
-
-def _whole(family: SolidFamily, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
+def _whole(X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
     """Σ w |det J| Bᵀ C B over displacements and the first ``modes`` internal strains."""
+    family, n = FAMILIES[X.shape[1]], 3 * X.shape[1]
+    X, straight = with_middles(X)
     J0 = family.gradients(family.centre) @ X
     turn = _to_basic(np.linalg.inv(J0)) * np.linalg.det(J0)[:, None, None]
     tie = _tied(X) if modes and X.shape[1] == 6 else None
+    rules = [(family.rule, C)]
+    if modes and family.shear_rule is not None:
+        shear = _shear_part(J0, C)
+        rules = [(family.rule, C - shear), (family.shear_rule, shear)]
     K: np.ndarray | float = 0.0
-    for k, (xi, w) in enumerate(zip(family.points, family.weights, strict=True)):
-        B, dV = _compatible(family, X, xi)
-        if tie is not None:
-            B = tie(B, k % 3)
-        if modes and family.enhanced is not None:
-            inner = turn @ family.enhanced(xi)[:, :modes] / dV[:, None, None]
-            B = np.concatenate([B, inner], axis=2)
-        K = K + (w * np.abs(dV))[:, None, None] * (B.transpose(0, 2, 1) @ C @ B)
+    for rule, A in rules:
+        for k, (xi, w) in enumerate(zip(*rule, strict=True)):
+            B, dV = _compatible(family, X, xi)
+            if tie is not None:
+                B = tie(B, k % 3)
+            if modes and family.enhanced is not None:
+                inner = turn @ family.enhanced(xi)[:, :modes] / dV[:, None, None]
+                B = np.concatenate([B, inner], axis=2)
+            K = K + (w * np.abs(dV))[:, None, None] * (B.transpose(0, 2, 1) @ A @ B)
+    if straight is not None:
+        T = np.einsum("mab,ij->maibj", straight, np.eye(3)).reshape(-1, n, n)
+        K = T.transpose(0, 2, 1) @ K @ T
     return np.asarray(K)
 
 
+def _shear_part(J0: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """C (m, 6, 6) of the shears alone, in the axes nearest to the element's (J0 = S R)."""
+    left, _, right = np.linalg.svd(J0)
+    local = _to_basic(left @ right)
+    back = np.linalg.inv(local)
+    own = back.transpose(0, 2, 1) @ C @ back
+    own[:, :3] = own[:, :, :3] = 0
+    return local.transpose(0, 2, 1) @ own @ local
+
+
 def _compatible(
-    family: SolidFamily, X: np.ndarray, xi: np.ndarray
+    family: ShapeFamily, X: np.ndarray, xi: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """B (m, 6, 3k) and det J (m,) at a point."""
     J = family.gradients(xi) @ X
@@ -203,7 +224,7 @@ def _tied(X: np.ndarray) -> Callable[[np.ndarray, int], np.ndarray]:
     reproduces to the printed digits on a right prism.
     """
     R, t, n, length = _walls(X)
-    middle = [np.array([a, b, 0.0]) for a, b, _ in FAMILIES[6].points[:3]]
+    middle = [np.array([a, b, 0.0]) for a, b, _ in FAMILIES[6].rule[0][:3]]
     local = _to_basic(R)
     e = []
     for k in range(3):
@@ -257,12 +278,14 @@ def _condensed(K: np.ndarray, n: int) -> np.ndarray:
 
 def _shares(X: np.ndarray) -> np.ndarray:
     """∫ N_i N_j dV (m, k, k) [m³]."""
-    family = FAMILIES[X.shape[1]]
+    family, (X, straight) = FAMILIES[X.shape[1]], with_middles(X)
     shares: np.ndarray | float = 0.0
-    for xi, w in zip(family.mass_points, family.mass_weights, strict=True):
+    for xi, w in zip(*family.mass_rule, strict=True):
         N = family.values(xi)
         dV = w * np.abs(np.linalg.det(family.gradients(xi) @ X))
         shares = shares + dV[:, None, None] * np.outer(N, N)
+    if straight is not None:
+        shares = straight.transpose(0, 2, 1) @ shares @ straight
     return np.asarray(shares)
 
 
@@ -274,10 +297,19 @@ def mass(X: np.ndarray, rho: np.ndarray) -> np.ndarray:
 
 
 def lumped_mass(X: np.ndarray, rho: np.ndarray) -> np.ndarray:
-    """Row sums of the consistent mass: ∫ ρ N_i dV on the diagonal (m, 3k, 3k) [kg]."""
+    """Row sums of the consistent mass, ∫ ρ N_i dV on the diagonal (m, 3k, 3k) [kg].
+
+    With mid-side nodes row sums are negative at corners. There the diagonal of the consistent mass
+    is scaled to ρ V (Hinton, Rock, Zienkiewicz, Earthquake Eng. Struct. Dyn. 4 (1976) 245-249).
+    """
     m, k, _ = X.shape
-    corner = rho[:, None] * _shares(X).sum(axis=2)
-    return np.einsum("ma,ab,ij->maibj", corner, np.eye(k), np.eye(3)).reshape(m, 3 * k, 3 * k)
+    shares = _shares(X)
+    node = shares.sum(axis=2)
+    if k > CORNERS[k]:
+        total, node = node.sum(axis=1), np.einsum("maa->ma", shares)
+        node = node * (total / node.sum(axis=1))[:, None]
+    node = rho[:, None] * node
+    return np.einsum("ma,ab,ij->maibj", node, np.eye(k), np.eye(3)).reshape(m, 3 * k, 3 * k)
 
 
 def volume(X: np.ndarray) -> np.ndarray:

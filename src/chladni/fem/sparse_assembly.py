@@ -10,6 +10,7 @@ Rows = np.ndarray | slice
 
 
 EVERY = np.ones((6, 6), dtype=bool)
+TRANSLATIONS = np.kron(np.diag([True, False]), np.ones((3, 3), dtype=bool))  # of solids
 INERTIA = np.kron(np.eye(2, dtype=bool), np.ones((3, 3), dtype=bool)) & (
     np.eye(6, dtype=bool) | (np.arange(6) > 2)
 )  # a mass without offset: translations uncoupled, rotations full
@@ -72,7 +73,10 @@ class Pattern:
         return indices, np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
 
     def add(self, data: np.ndarray, matrices: np.ndarray, rows: Rows = slice(None)) -> None:
-        """Add element matrices (r, 6k, 6k) of these rows of elements to the csr's values."""
+        """Add element matrices of these rows of elements to the csr's values.
+
+        They are (r, 6k, 6k), or (r, 3k, 3k) of translations where the mask has no others.
+        """
         nodes, slot = self.pairs.nodes[rows], self.pairs.slot[rows]
         m, k = nodes.shape
         r, c = np.nonzero(self.mask)
@@ -80,7 +84,8 @@ class Pattern:
         first = self.start[nodes][..., None] + self.pairs.width[nodes][..., None] * self.above[r]
         at = slot[..., None] * self.along[r]
         at += (first + rank)[:, :, None]
-        A = matrices.reshape(m, k, 6, k, 6).swapaxes(2, 3)
+        motions = matrices.shape[1] // k
+        A = matrices.reshape(m, k, motions, k, motions).swapaxes(2, 3)
         values = np.ascontiguousarray(A) if self.mask.all() else A[..., r, c]
         np.add.at(data, at.ravel(), values.ravel())
 
@@ -104,7 +109,7 @@ def accumulate(
     ----------
     nodes : (m, k) int
     n : int                 points
-    parts : pairs of (rows of elements, one (r, 6k, 6k) of each kind)
+    parts : pairs of (rows of elements, their matrices of each kind as :meth:`Pattern.add` has them)
     masks : (6, 6) bool of each kind, where a block between two points may be nonzero
 
     Returns
@@ -129,18 +134,11 @@ def _csr(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> sp.csr_ar
 
 
 def blocks(matrices: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_array:
-    """Sum of element matrices (m, 6k, 6k) over n points: csr (6n, 6n)."""
+    """Sum of element matrices (m, 6k, 6k), or (m, 3k, 3k) of translations: csr (6n, 6n)."""
     if not len(nodes):
         return sp.csr_array((6 * n, 6 * n))
-    return accumulate(nodes, n, [(slice(None), (np.asarray(matrices),))])[0]
-
-
-def with_rotations(matrices: np.ndarray) -> np.ndarray:
-    """Expand (m, 3k, 3k) of translations to (m, 6k, 6k) with empty rotations."""
-    m, k = len(matrices), matrices.shape[1] // 3
-    wide = np.zeros((m, k, 6, k, 6))
-    wide[:, :, :3, :, :3] = matrices.reshape(m, k, 3, k, 3)
-    return wide.reshape(m, 6 * k, 6 * k)
+    mask = EVERY if matrices.shape[1] == 6 * nodes.shape[1] else TRANSLATIONS
+    return accumulate(nodes, n, [(slice(None), (np.asarray(matrices),))], (mask,))[0]
 
 
 def narrowed(A: sp.csr_array) -> sp.csr_array:

@@ -25,7 +25,8 @@ def components(model: Assembly) -> np.ndarray:
 
 def _pairs(model: Assembly) -> Iterator[np.ndarray]:
     """Pairs of points (k, 2) that something joins."""
-    groups = [model.shells.nodes, model.beams.nodes, *(s.nodes for s in model.solids)]
+    shells = np.hstack([model.shells.nodes, model.shells.middle])
+    groups = [shells, model.beams.nodes, *(s.nodes for s in model.solids)]
     for nodes in groups:
         yield np.concatenate([nodes[:, [0, k]] for k in range(1, nodes.shape[1])])
     for joints in (model.springs, model.dampers, model.scalar_masses, model.bushes):

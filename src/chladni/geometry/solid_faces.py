@@ -2,16 +2,19 @@
 
 import numpy as np
 
-_SIDES = {  # faces of a solid by its number of nodes; a triangle repeats its last node
+from .solid_shapes import CORNERS
+
+SIDES = {  # faces of a solid by its number of corners; a triangle repeats its last node
     8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
     6: ((0, 2, 1, 1), (3, 4, 5, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    5: ((0, 3, 2, 1), (0, 1, 4, 4), (1, 2, 4, 4), (2, 3, 4, 4), (3, 0, 4, 4)),
     4: ((0, 2, 1, 1), (0, 1, 3, 3), (1, 2, 3, 3), (2, 0, 3, 3)),
 }
 
 
 def skin(nodes: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Outer faces (m, 4), their part (m,) and their solid (m,) of solids with 8, 6 or 4 nodes."""
-    sides = np.array(_SIDES[nodes.shape[1]])
+    """Corners of outer faces (m, 4), their part (m,) and their solid (m,) of solids of one kind."""
+    sides = np.array(SIDES[CORNERS[nodes.shape[1]]])
     faces = nodes[:, sides].reshape(-1, 4)
     owner = np.repeat(np.arange(len(nodes)), len(sides))
     _, at, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
@@ -29,7 +32,7 @@ def least_warp_cosine(X: np.ndarray) -> np.ndarray:
     ----------
     X : (m, 8 or 6, 3)   corners of solids
     """
-    sides = np.array([s for s in _SIDES[X.shape[1]] if s[2] != s[3]])
+    sides = np.array([s for s in SIDES[X.shape[1]] if s[2] != s[3]])
     face = X[:, sides]
     ahead, back = (np.roll(face, shift, axis=2) - face for shift in (-1, 1))
     n = np.cross(ahead, back)

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import checked
+from ..geometry.solid_shapes import CORNERS
 from ..model.assembly import Assembly
 from ..output import atomic
 
-_KINDS = {8: "hexahedron", 6: "wedge", 4: "tetra"}
+_KINDS = {8: "hexahedron", 6: "wedge", 5: "pyramid", 4: "tetra"}  # by corners
 
 
 @checked
@@ -50,8 +51,9 @@ def _blocks(assembly: Assembly) -> list[tuple[str, np.ndarray, np.ndarray, np.nd
         thickness = shells.thickness[which].mean(axis=1)
         found.append((kind, shells.nodes[which][:, :corners], shells.part[which], thickness))
     for solids in assembly.solids:
-        kind = _KINDS[solids.nodes.shape[1]]
-        found.append((kind, solids.nodes, solids.part, np.zeros(len(solids))))
+        corners = CORNERS[solids.nodes.shape[1]]
+        nodes = solids.nodes[:, :corners]
+        found.append((_KINDS[corners], nodes, solids.part, np.zeros(len(solids))))
     found.append(("line", beams.nodes, beams.part, np.zeros(len(beams))))
     ids = np.array([p.id for p in assembly.parts], dtype=np.int64)
     return [(kind, nodes, ids[part], t) for kind, nodes, part, t in found if len(nodes)]

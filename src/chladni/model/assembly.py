@@ -35,9 +35,20 @@ class Shells:
     axis: np.ndarray = field(default_factory=lambda: _none(3))
     # (n,) of the mid-surface along the element normal [m]
     offset: np.ndarray = field(default_factory=_none)
+    # (n, 4) int: rows of the nodes on the edges, from that of corners 1 and 2 on; -1: none
+    middle: np.ndarray = field(default_factory=lambda: _no_rows(4))
+
+    def __post_init__(self) -> None:
+        if len(self.middle) != len(self.nodes):
+            object.__setattr__(self, "middle", np.full(np.shape(self.nodes), -1))
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    @property
+    def curved(self) -> np.ndarray:
+        """(n,) bool, True where the shell has nodes on its edges."""
+        return np.asarray((self.middle >= 0).any(axis=1))
 
     @property
     def triangle(self) -> np.ndarray:
@@ -47,7 +58,11 @@ class Shells:
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Solids of one kind: 8 (hexahedron), 6 (wedge) or 4 (tetrahedron) nodes a row."""
+    """Solids of one kind: hexahedra (8 or 20 nodes), wedges (6, 15), pyramids (5, 13), tetrahedra.
+
+    A row holds the corners, then the nodes on the edges (``EDGES`` of geometry.solid_shapes). An
+    element that lacks one of them repeats the first end of that edge.
+    """
 
     ids: np.ndarray
     nodes: np.ndarray

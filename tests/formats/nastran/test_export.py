@@ -73,7 +73,7 @@ def everything():
     points = rng.normal(size=(10, 3))
     points[:4] = [[0, 0, 0], [1, 0.1, 0], [1.1, 0.9, 0], [0, 1, 0]]
     points[4:8] = points[:4] + np.array([0, 0.1, 1.3])
-    points[9] = 0
+    points[8], points[9] = points[:2].mean(axis=0) - [0, 0.05, 0], 0  # on the edge of a tetrahedron
     axes = np.linalg.qr(rng.normal(size=(10, 3, 3)))[0]
     axes *= np.linalg.det(axes)[:, None, None]
     axes[[0, 9]] = np.eye(3)
@@ -103,7 +103,10 @@ def everything():
         points=points,
         parts=parts,
         shells=shells,
-        solids=(Solids(np.array([10]), np.arange(8)[None], np.array([2])),),
+        solids=(
+            Solids(np.array([10]), np.arange(8)[None], np.array([2])),
+            Solids(np.array([29]), np.array([[0, 1, 3, 4, 8, 1, 3, 0, 1, 3]]), np.array([2])),
+        ),
         beams=Beams(np.array([11, 12, 13]), np.array([[0, 8], [2, 5], [3, 8]]), np.array([3, 5, 4]),
                     np.array([[0, 0, 1.0], [1, 0.2, 0], [0, 0, 0]]),
                     np.array([[[0.1, 0.2, 0.3]] * 2, [[0, 0, 0]] * 2, [[0, 0, 0]] * 2]),

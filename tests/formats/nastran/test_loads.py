@@ -89,7 +89,9 @@ def test_pressure_on_a_solid_points_inwards(bulk):
              (2, 7): (-15, 0, 0), (4, 7): (0, -10, 0), (1, 8): (15, 0, 0)}  # fmt: skip
     tetra = {(1, 5): (0, 0, 3), (1, 4): (0, 5, 0)}
     other = CUBE.replace("CHEXA,9,1,1,2,3,4,5,6,7,8", "CTETRA,9,1,1,2,4,5")
-    for text, faces in ((CUBE, brick), (other, tetra)):
+    hut = CUBE.replace("CHEXA,9,1,1,2,3,4,5,6,7,8", "CPYRAM,9,1,1,2,3,4,5")
+    roof = {(1, 3): (0, 0, 6), (1, 2): (0, 5, 0), (2, 3): (-7.5, 0, -3), (4, 1): (5 * 1.5, 0, 0)}
+    for text, faces in ((CUBE, brick), (other, tetra), (hut, roof)):
         marks = enumerate(faces, start=1)
         cards = "".join(f"PLOAD4,{k},9,1.,,,,{a},{b}\n" for k, (a, b) in marks)
         found = [force for force, _ in resultants(bulk(text + cards)).values()]

@@ -11,6 +11,7 @@ from ....units import Units
 from .. import Add, Deck, Replace, SetColumns, SetField, units_of
 from ..export.numbering import Systems
 from ..export.part_cards import material_card
+from ..text.cards import SHELL_CARDS
 from .added_elements import added_elements
 from .beam_changes import with_sections
 from .changes import Change
@@ -177,8 +178,8 @@ def _axes(before: Assembly, after: Assembly, free: FreeIds) -> list[Change]:
 
 
 def _by_kind(shells: Shells, rows: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    tri = shells.triangle[rows]
-    return [("CQUAD4", rows[~tri]), ("CTRIA3", rows[tri])]
+    kind = (shells.triangle + 2 * shells.curved)[rows]
+    return [(name, rows[kind == k]) for k, name in enumerate(SHELL_CARDS)]
 
 
 def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[Change]:
@@ -203,7 +204,7 @@ def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
             continue
         touched = mine[np.abs(ratio[mine] - 1).max(axis=1) > 1e-9]
         for kind, rows in _by_kind(after.shells, touched):
-            n = 4 if kind == "CQUAD4" else 3
+            n = 3 if kind.startswith("CTRIA") else 4
             if len(rows):
                 fields = tuple(f"T{c + 1}" for c in range(n))
                 t = after.shells.thickness[rows, :n] / units.length

@@ -17,8 +17,8 @@ from ..text.table import Cards
 from .changes import Change
 
 Split = dict[int, int]  # id of a new property: id of the one it is a copy of
-SHEETS = ("CQUAD4", "CTRIA3")
-SOLIDS = ("CHEXA", "CPENTA", "CTETRA")
+SHEETS = ("CQUAD4", "CTRIA3", "CQUADR", "CTRIAR", "CQUAD8", "CTRIA6")
+SOLIDS = ("CHEXA", "CPENTA", "CPYRAM", "CPYRA", "CTETRA")
 BEAMS = ("CBAR", "CBEAM", "CROD", "CTUBE")
 PROPERTIES = ("PSHELL", "PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PTUBE")
 
@@ -114,7 +114,7 @@ def taken_out(deck: Deck, before: Assembly, after: Assembly) -> tuple[Assembly, 
         kept(was, now, SOLIDS) for was, now in zip(before.solids, after.solids, strict=True)
     )
     beams = kept(before.beams, after.beams, (*BEAMS, "CONROD"))
-    bushes = kept(before.bushes, after.bushes, ("CBUSH",))
+    bushes = kept(before.bushes, after.bushes, ("CBUSH", "CBUSH1D", "CWELD", "CFAST"))
     return replace(before, solids=solids, beams=beams, bushes=bushes), changes
 
 

@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
+from ....geometry.solid_shapes import CORNERS
 from ....model.assembly import Assembly, Equation, Scalars, picked
 from ....output import write_text
 from ....units import UNITS, Units
 from ....units import units as unit_system
+from ..text.cards import SHELL_CARDS
 from ..text.deck import Deck
 from ..text.format import Card, Value, card, texts
 from . import part_cards, tie_cards
 from .numbering import Ids, Systems
 
 _EXACT = 1e-11  # relative loss at which a card changes to wide fields
-_SHELL = ("CQUAD4", "CTRIA3")
 _UNITS, _CONTROL = "$ units: ", ("SOL 103", "CEND", "ECHO = NONE")
 
 
@@ -92,28 +93,39 @@ def _joints(assembly: Assembly, units: Units, ids: Ids, systems: Systems) -> Ite
 
 
 def _shells(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
-    """CQUAD4 and CTRIA3, corner thickness where it is not the property's."""
+    """CQUAD4, CTRIA3, CQUAD8 and CTRIA6, corner thickness where it is not the property's."""
     s = assembly.shells
     nodes = assembly.ids[s.nodes].tolist()
     nominal = np.array([part_cards.thickness(p) for p in assembly.parts])
     t = s.thickness / units.length
     own = ~np.isclose(s.thickness, nominal[s.part][:, None], rtol=1e-12, atol=0).all(axis=1)
-    angle = part_cards.material_direction(assembly)
+    angle, curved = part_cards.material_direction(assembly), s.curved.tolist()
     for k, three in enumerate(s.triangle.tolist()):
         n = 3 if three else 4
         values: list[Value] = [ids.shell[k], ids.part[s.part[k]], *nodes[k][:n]]
-        values += [angle[k], s.offset[k] / units.length or None, *[None] * (6 - n)]
-        if own[k]:
-            values += t[k, :n].tolist()
+        turn, corner = [angle[k], s.offset[k] / units.length or None], t[k, :n].tolist()
+        corner = corner if own[k] else [None] * n
+        if curved[k]:
+            values += [int(assembly.ids[r]) if r >= 0 else None for r in s.middle[k, :n]]
+            values += [*turn, *corner] if three else [*corner, *turn]
+        else:
+            values += [*turn, *[None] * (6 - n), *corner]
         # reals as floats, so that none is written as an integer
-        yield [_SHELL[three], *(float(v) if isinstance(v, np.floating) else v for v in values)]
+        yield [
+            SHELL_CARDS[three + 2 * curved[k]],
+            *(float(v) if isinstance(v, np.floating) else v for v in values),
+        ]
 
 
 def _solids(assembly: Assembly, ids: Ids) -> Iterator[Card]:
-    names = {8: "CHEXA", 6: "CPENTA", 4: "CTETRA"}
+    """CHEXA, CPENTA, CPYRAM, CTETRA; a mid-side node that is absent stays blank."""
+    names = {8: "CHEXA", 6: "CPENTA", 5: "CPYRAM", 4: "CTETRA"}
     for block, mine in zip(assembly.solids, ids.solids, strict=True):
-        for k, nodes in enumerate(assembly.ids[block.nodes].tolist()):
-            yield [names[len(nodes)], mine[k], ids.part[block.part[k]], *nodes]
+        corners = CORNERS[block.nodes.shape[1]]
+        for k, rows in enumerate(assembly.ids[block.nodes].tolist()):
+            nodes = rows[:corners]
+            middle = [None if id in nodes else id for id in rows[corners:]]
+            yield [names[corners], mine[k], ids.part[block.part[k]], *nodes, *middle]
 
 
 def _beams(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:

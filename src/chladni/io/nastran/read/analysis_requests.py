@@ -10,7 +10,8 @@ from . import excitation, response_frequencies
 from .context import context, parameter
 from .materials import lone_moduli, unlike_moduli
 from .rigid_elements import partial_bars
-from .shell_elements import second_axes, warped_solids
+from .shell_elements import second_axes
+from .solid_elements import warped_solids
 from .springs_and_masses import one_sided_inertia
 from .static_loads import loads, motions
 from .supports import selection_notes

@@ -13,16 +13,17 @@ from ..text.deck import Deck
 from . import springs_and_masses
 from .beam_elements import beams
 from .connected import refuse_loose
+from .connectors import CONNECTORS, with_connectors
 from .context import Context, context, parameter, real_parameter
 from .rigid_elements import ties
 from .sections import Parts
-from .shell_elements import filled_thickness, shells, solids
+from .shell_elements import SHEETS, filled_thickness, shells
+from .solid_elements import SOLIDS, solids
 from .supports import selected, supports
 
-_STIFF = """CQUAD4 CQUADR CQUAD1 CQUAD2 CTRIA3 CTRIAR CTRIA1 CTRIA2 CHEXA CPENTA CTETRA CBAR
-    CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH""".split()
+_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D".split()
 _ELEMENTS = (  # those of one kind have no id in common
-    _STIFF,
+    (*SHEETS, *SOLIDS, *_STIFF, *CONNECTORS),
     "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),
     "CMASS1 CMASS2 CMASS3 CMASS4".split(),
     ["CONM1", "CONM2"],
@@ -64,7 +65,7 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
     filled_thickness(parts, made_shells)
     order = parts.order()
     at = np.argsort(order)
-    return Assembly(
+    made = Assembly(
         ids=ctx.ids,
         points=ctx.places * ctx.scale.length,
         parts=tuple(parts.made[k] for k in order),
@@ -85,6 +86,7 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         auto_spc=parameter(deck, "AUTOSPC") != "NO",
         k6rot=_k6rot(deck),
     )
+    return with_connectors(ctx, made)
 
 
 def _k6rot(deck: Deck) -> float | None:

@@ -176,6 +176,56 @@ def _hat(h: float, t: float, top: float, brim: float) -> Profile:
     )
 
 
+def _hat1(plate: float, h: float, top: float, t: float, t_plate: float) -> Profile:
+    """A hat closed by a plate below; Bredt."""
+    z, side, brim = (top - t) / 2, h - t - t_plate, (plate - top) / 2
+    foot = (plate + top) / 4
+    bm, hm = top - t, h - (t + t_plate) / 2
+    if not min(t, t_plate) > 0:
+        raise ModelError("a closed hat without one of its walls is not a closed section")
+    walls = [
+        (0, t_plate / 2, plate, t_plate),
+        (0, h - t / 2, top, t),
+        (-z, t_plate + side / 2, t, side),
+        (z, t_plate + side / 2, t, side),
+        (-foot, t_plate + t / 2, brim, t),
+        (foot, t_plate + t / 2, brim, t),
+    ]
+    return _built_up(walls, 4 * (bm * hm) ** 2 / (bm / t + 2 * hm / t + bm / t_plate))
+
+
+def _dbox(b: float, h: float, middle: float, *t: float) -> Profile:
+    """Two cells; t: upright left, middle, right, then top and bottom of the left and right cell.
+
+    The shear flows q of unit G θ' solve ∮ q/t ds = 2 A_i over each cell, and J = 2 Σ q_i A_i.
+    """
+    left, web, right, *plates = t
+    if not min(t) > 0:
+        raise ModelError("a box without one of its walls is not a closed section")
+    clear = (middle - left - web / 2, b - middle - right - web / 2)
+    at = (left + clear[0] / 2, b - right - clear[1] / 2)
+    walls = [(x, 0.0, w, h) for x, w in ((left / 2, left), (middle, web), (b - right / 2, right))]
+    area, around = np.zeros(2), np.zeros(2)
+    for k, (upright, wide) in enumerate(zip((left, right), clear, strict=True)):
+        top, bottom = plates[2 * k : 2 * k + 2]
+        walls += [(at[k], (h - top) / 2, wide, top), (at[k], (bottom - h) / 2, wide, bottom)]
+        bm, hm = wide + (upright + web) / 2, h - (top + bottom) / 2
+        area[k], around[k] = bm * hm, bm / top + bm / bottom + hm / upright + hm / web
+    shared = (h - sum(plates) / 4) / web
+    q = np.linalg.solve([[around[0], -shared], [-shared, around[1]]], 2 * area)
+    return _built_up(walls, float(2 * q @ area))
+
+
+def _hexa(a: float, b: float, h: float) -> Profile:
+    """Hexagon of width b and height h with corners a outside its flats; J = A⁴/40 I_p (Roark)."""
+    flat = b - 2 * a
+    if not flat >= 0:
+        raise ModelError("its sloped sides overlap")
+    area, I1 = h * (b - a), b * h**3 / 12 - a * h**3 / 8
+    I2 = (b + flat) * (b**2 + flat**2) * h / 48
+    return Profile(area, I1, I2, 0.0, area**4 / (40 * (I1 + I2)), (5 / 6, 5 / 6))
+
+
 def _tube2(ro: float, t: float) -> Profile:
     return tube(ro, ro - t)
 
@@ -185,4 +235,5 @@ SHAPES: Final[dict[str, tuple[Callable[..., Profile], int]]] = {
     "BOX": (_box, 4), "BOX1": (_box1, 6), "I": (_i, 6), "I1": (_i1, 4), "H": (_h, 4),
     "CHAN": (_chan, 4), "CHAN1": (_chan1, 4), "CHAN2": (_chan2, 4), "T": (_t, 4), "T2": (_t, 4),
     "T1": (_t1, 4), "L": (_l, 4), "Z": (_z, 4), "CROSS": (_cross, 4), "HAT": (_hat, 4),
+    "HAT1": (_hat1, 5), "DBOX": (_dbox, 10), "HEXA": (_hexa, 3),
 }  # fmt: skip

@@ -4,16 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ....geometry.solid_faces import SIDES
 from ..text.table import Cards
 from .context import Context, id_list
+from .solid_elements import SOLIDS
 
-_FACES = {
-    "CHEXA": ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-    "CPENTA": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    "CTETRA": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
-}
-_SHELLS = {"CQUAD4": 4, "CQUADR": 4, "CTRIA3": 3, "CTRIAR": 3}
-_CORNERS = {**_SHELLS, "CHEXA": 8, "CPENTA": 6, "CTETRA": 4}
+_SHELLS = {"CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4, "CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3}
+_CORNERS = {**_SHELLS, **SOLIDS}  # which alone carry a pressure, also where edges have nodes
 
 Nodal = tuple[int, np.ndarray, np.ndarray]  # load set, rows (k,), forces (k, 3) [N]
 
@@ -126,7 +123,7 @@ def _pload2(
         ids = [e for e in ids if e in elements]
     for id in ids:
         name, rows = _known(cards, i, id, elements)
-        if name in _FACES:
+        if name in SOLIDS:
             raise cards.refuse(i, f"element {id} is a {name}, PLOAD2 loads shells")
         yield cards.integer(i, 1), rows, on_face(ctx.places[rows], np.full(len(rows), p))
 
@@ -146,7 +143,7 @@ def _pload4(
     p = np.where(np.isnan(p), 0.0 if np.isnan(p[0]) else p[0], p)
     for id in ids:
         name, rows = _known(cards, i, id, elements)
-        if name in _FACES:
+        if name in SOLIDS:
             rows = _face(ctx, cards, i, name, rows, marks)
         X = ctx.places[rows]
         load_axis = _direction(ctx, cards, i, X.mean(axis=0))
@@ -168,13 +165,13 @@ def _face(
 ) -> np.ndarray:
     """Corners of a solid's face, its normal inwards, beginning at G1.
 
-    G1 and G3 are opposite corners; a triangle of a CPENTA needs G1 only, and of a CTETRA G4 is
-    the node that is not on the face.
+    G1 and G3 are opposite corners. A triangle of a CPENTA needs G1 only, one of a CPYRAM both its
+    corners of the base. G4 of a CTETRA is the node that is not on the face.
     """
     a = ctx.row(cards, i, marks[0])
     b = ctx.row(cards, i, marks[1]) if marks[1] else -1
-    for corners in _FACES[name]:
-        face = rows[list(corners)]
+    for side in SIDES[SOLIDS[name]]:
+        face = rows[list(dict.fromkeys(side))]
         if a not in face or not _marked(name, face, a, b):
             continue
         X = ctx.places[face]
@@ -190,6 +187,6 @@ def _marked(name: str, face: np.ndarray, a: int, b: int) -> bool:
     if name == "CTETRA":
         return b >= 0 and b not in face
     if len(face) == 3:
-        return b < 0
+        return b < 0 if name == "CPENTA" else b in face[:2] and a in face[:2]
     opposite = face[(int(np.flatnonzero(face == a)[0]) + 2) % 4]
     return bool(b == opposite)

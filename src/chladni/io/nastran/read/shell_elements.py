@@ -2,12 +2,11 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from ....geometry.solid_faces import least_warp_cosine
-from ....geometry.solid_shapes import jacobians
-from ....model.assembly import Shells, Solids, concatenated
+from ....model.assembly import Shells, concatenated
 from ....model.properties import ShellSection
 from ..text.table import Cards
 from .context import Context
@@ -16,6 +15,7 @@ from .sections import Parts
 _QUADS = ("CQUAD4", "CQUADR", "CQUAD1", "CQUAD2")
 _WHOLE = re.compile(rb"[+-]?[0-9]+")
 _TRIANGLES = ("CTRIA3", "CTRIAR", "CTRIA1", "CTRIA2")
+SHEETS = (*_QUADS, *_TRIANGLES, "CQUAD8", "CTRIA6")
 _ORDER = "check the order and place of its grids"
 NORMAL = 1e-6  # length of what is left of a unit vector laid on an element: it stands normal to it
 
@@ -24,34 +24,52 @@ def shells(ctx: Context, parts: Parts) -> Shells:
     """All shells, quadrilaterals first."""
     found = [_quads(ctx, parts, c) for c in ctx.deck.present(*_QUADS)]
     found += [_triangles(ctx, parts, c) for c in ctx.deck.present(*_TRIANGLES)]
+    found += [_with_middles(ctx, parts, c) for c in ctx.deck.present("CQUAD8", "CTRIA6")]
     return concatenated(*(found or [Shells()]))
 
 
 def _quads(ctx: Context, parts: Parts, cards: Cards) -> Shells:
     nodes = ctx.rows(cards, cards.ids(3, 4))
-    legacy = cards.name in ("CQUAD1", "CQUAD2")
-    return _made(ctx, parts, cards, nodes, 7, None if legacy else 8, None if legacy else 10)
+    return _made(ctx, parts, cards, nodes, (7, *_LEGACY) if _old(cards) else (7, 8, 10, 11))
 
 
 def _triangles(ctx: Context, parts: Parts, cards: Cards) -> Shells:
     nodes = ctx.rows(cards, cards.ids(3, 3))
     nodes = nodes[:, [0, 1, 2, 2]]
-    legacy = cards.name in ("CTRIA1", "CTRIA2")
-    return _made(ctx, parts, cards, nodes, 6, None if legacy else 7, None if legacy else 10)
+    return _made(ctx, parts, cards, nodes, (6, *_LEGACY) if _old(cards) else (6, 7, 10, 11))
 
 
-def _made(
-    ctx: Context,
-    parts: Parts,
-    cards: Cards,
-    nodes: np.ndarray,
-    theta: int,
-    zoffs: int | None,
-    tflag: int | None,
-) -> Shells:
-    """Elements of one kind; the fields that hold THETA, ZOFFS and TFLAG."""
+def _with_middles(ctx: Context, parts: Parts, cards: Cards) -> Shells:
+    """CQUAD8 and CTRIA6; a node on an edge may be blank or 0."""
+    corners, places = (4, (15, 16, 17, 11)) if cards.name == "CQUAD8" else (3, (9, 10, 14, 11))
+    ids, between = cards.ids(3, corners), cards.ids(3 + corners, corners, 0)
+    there = between != 0
+    nodes = ctx.rows(cards, np.hstack([ids, np.where(there, between, ids)]))
+    own = np.where(there, nodes[:, corners:], -1 - np.arange(corners))
+    same = (np.diff(np.sort(np.hstack([nodes[:, :corners], own]), axis=1), axis=1) == 0).any(axis=1)
+    if np.any(same):
+        i = int(np.argmax(same))
+        raise cards.refuse(i, "a node is named twice")
+    middle = np.full((len(cards), 4), -1)
+    middle[:, :corners] = np.where(there, nodes[:, corners:], -1)
+    square = nodes[:, [0, 1, 2, corners - 1]]
+    return replace(_made(ctx, parts, cards, square, places), middle=middle)
+
+
+Places = tuple[int, int | None, int | None, int]  # fields of THETA, ZOFFS, TFLAG and T1
+_LEGACY = (None, None, 0)
+
+
+def _old(cards: Cards) -> bool:
+    """True for cards of the COSMIC release, whose elements have no offset and thickness."""
+    return cards.name.endswith(("1", "2"))
+
+
+def _made(ctx: Context, parts: Parts, cards: Cards, nodes: np.ndarray, places: Places) -> Shells:
+    """Elements of one kind."""
+    theta, zoffs, tflag, first = places
     X = ctx.places[nodes]
-    corners = 3 if cards.name in _TRIANGLES else 4
+    corners = 3 if cards.name.startswith("CTRIA") else 4
     normal = _normals(ctx, cards, nodes[:, :corners])
     pid = cards.properties()
     part = parts.of("shell", cards, pid)
@@ -60,7 +78,7 @@ def _made(
         cards.integers(1),
         nodes,
         part,
-        _thickness(ctx, parts, cards, part, tflag, corners),
+        _thickness(ctx, parts, cards, part, tflag, first, corners),
         _axis(ctx, cards, X, normal, theta),
         offset + np.array(parts.shift)[part],
     )
@@ -95,13 +113,19 @@ def _normals(ctx: Context, cards: Cards, corners: np.ndarray) -> np.ndarray:
 
 
 def _thickness(
-    ctx: Context, parts: Parts, cards: Cards, part: np.ndarray, tflag: int | None, corners: int
+    ctx: Context,
+    parts: Parts,
+    cards: Cards,
+    part: np.ndarray,
+    tflag: int | None,
+    first: int,
+    corners: int,
 ) -> np.ndarray:
     """Corner thickness (n, 4): Ti, or T of the property; TFLAG 1: Ti are fractions of T."""
     nominal = np.array([getattr(p.section, "thickness", np.nan) for p in parts.made])[part]
     if tflag is None:
         return np.repeat(nominal[:, None], 4, axis=1)
-    own = cards.block(tflag + 1, corners, np.nan)
+    own = cards.block(first, corners, np.nan)
     laminate = np.isin(part, [k for k, p in enumerate(parts.made) if _smeared(p.section)])
     own[laminate] = np.nan
     fraction = (cards.integers(tflag, 0) == 1)[:, None]
@@ -205,67 +229,3 @@ def filled_thickness(parts: Parts, shells: Shells) -> None:
         if isinstance(part.section, ShellSection) and np.isnan(part.section.thickness):
             mean = float(shells.thickness[shells.part == k].mean())
             parts.made[k] = part.with_section(thickness=mean)
-
-
-_SOLIDS = {"CHEXA": 8, "CPENTA": 6, "CTETRA": 4}
-
-
-def solids(ctx: Context, parts: Parts) -> tuple[Solids, ...]:
-    """Solids by kind; those with nodes on their edges are refused."""
-    out = []
-    for name, count in _SOLIDS.items():
-        for cards in ctx.deck.present(name):
-            more = [cards.words(k) != b"" for k in range(count + 3, cards.width() + 1)]
-            if more and np.any(many := np.any(more, axis=0)):
-                i = int(np.argmax(many))
-                raise cards.refuse(
-                    i, f"has more than {count} nodes; mid-side nodes are not supported"
-                )
-            nodes = ctx.rows(cards, cards.ids(3, count))
-            _check_solid(ctx, cards, nodes)
-            part = parts.of("solid", cards, cards.integers(2))
-            out.append(Solids(cards.integers(1), nodes, part))
-    return tuple(out)
-
-
-def _check_solid(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
-    """Refuse a node named twice, a body without volume, and det J <= 0 at a point of integration.
-
-    Solvers stop there; a body that is merely distorted is computed, see :func:`warped_solids`.
-    """
-    same = (np.diff(np.sort(nodes, axis=1), axis=1) == 0).any(axis=1)
-    if np.any(same):
-        i = int(np.argmax(same))
-        raise cards.refuse(i, f"a node is named twice, grids {ctx.ids[nodes[i]].tolist()}")
-    X = ctx.places[nodes]
-    dV = jacobians(X)
-    size = np.abs(dV).max(axis=1)
-    if np.any(bad := ~(size > _NO_VOLUME * np.ptp(X, axis=1).max(axis=1) ** 3)):
-        i = int(np.argmax(bad))
-        raise cards.refuse(i, f"its volume is zero; grids {ctx.ids[nodes[i]].tolist()}")
-    least = (dV * np.sign(dV.sum(axis=1))[:, None]).min(axis=1)
-    if np.any(bad := ~(least > _NO_VOLUME * size)):
-        i = int(np.argmax(bad))
-        raise cards.refuse(
-            i,
-            "it turns inside out: det J vanishes or changes its sign from one point of integration "
-            f"to another; check the order and place of grids {ctx.ids[nodes[i]].tolist()}",
-        )
-
-
-_NO_VOLUME = 1e-12  # det J over the cube of the size, or over the largest det J: rounding
-_WARPED = 0.707  # HEX_WARP of Nastran's GEOMCHECK, 45 degrees
-
-
-def warped_solids(ctx: Context) -> Iterator[str]:
-    """Solids with a face warped by more than 45 degrees, one sentence a kind of card."""
-    for name in ("CHEXA", "CPENTA"):
-        for cards in ctx.deck.present(name):
-            X = ctx.places[ctx.rows(cards, cards.ids(3, _SOLIDS[name]))]
-            if len(found := np.flatnonzero(least_warp_cosine(X) < _WARPED)):
-                i, more = int(found[0]), len(found) - 1
-                others = f" and {more} others have" if more else " has"
-                yield (
-                    f"{cards.where(i)}: {name} {cards.integers(1)[i]}{others} a face warped by "
-                    "more than 45 degrees; check the order of the grids"
-                )
