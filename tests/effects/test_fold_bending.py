@@ -43,6 +43,17 @@ def test_a_curved_sheet_has_none_once_its_mesh_is_fine_enough():
     assert share_at_folds(*strip([10.0] * 9)).max() == 0
 
 
+@pytest.mark.parametrize("angle", [22.5, 30.0, 45.0])
+def test_a_coarse_cylinder_has_none_but_one_that_stands_out(angle):
+    """A factor on its bending would be one on E of the part."""
+    phi = np.radians(angle) * np.arange(9)
+    points, cells = grid(phi, np.linspace(0.0, 1.0, 3))
+    bent = np.column_stack([np.cos(points[:, 0]), points[:, 1], np.sin(points[:, 0])])
+    assert share_at_folds(bent, cells).max() == 0
+    dented = np.where((points[:, 0] == phi[4])[:, None], bent * [0.6, 1.0, 0.6], bent)
+    assert share_at_folds(dented, cells).max() > 0
+
+
 def test_flat_parts_have_no_factor_and_folded_ones_one_each():
     flat, bent, closed = (
         plate(0.4, 0.3, 8, 6, 1e-3), folded_panel(0.3, 0.2, 0.02, 0.004, 0.02, 1e-3), box(),

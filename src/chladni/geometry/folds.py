@@ -5,6 +5,7 @@ import scipy.sparse as sp
 
 from ..model.assembly import Assembly
 from .facets import cell_normals, point_normals
+from .smooth_sides import fans
 
 SMOOTH = np.cos(np.radians(35.0))  # a point is at a fold if a facet is farther from their mean
 FOLDED = np.cos(np.radians(20.0))  # a fold is where normals of shells at one grid differ by more
@@ -13,7 +14,8 @@ FOLDED = np.cos(np.radians(20.0))  # a fold is where normals of shells at one gr
 def share_at_folds(points: np.ndarray, cells: np.ndarray, folded: float = FOLDED) -> np.ndarray:
     """Share of the corners of each shell at a fold, with a shell of another direction (m,).
 
-    The share is from 0 to 1. The orientation of a shell makes no difference.
+    The share is from 0 to 1. The orientation of a shell makes no difference. Shells of one smooth
+    surface, however coarse, have no fold between them (:mod:`.smooth_sides`).
 
     Parameters
     ----------
@@ -27,8 +29,11 @@ def share_at_folds(points: np.ndarray, cells: np.ndarray, folded: float = FOLDED
     meet = sp.triu(holds.T @ holds, 1).tocoo()
     cosine = np.abs(np.einsum("ij,ij->i", normal[meet.row], normal[meet.col]))
     at = cosine < folded
-    both = holds[:, meet.row[at]].multiply(holds[:, meet.col[at]])
-    fold = np.asarray(both.sum(axis=1)).ravel() > 0
+    (a, b), fan = (meet.row[at], meet.col[at]), fans(points, cells)
+    both = cells[a][:, :, None] == cells[b][:, None, :]
+    both &= fan[a][:, :, None] != fan[b][:, None, :]
+    fold = np.zeros(len(points), bool)
+    fold[cells[a][both.any(axis=2)]] = True
     return np.asarray(fold[cells].mean(axis=1))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Shells, concatenated, picked
 from .beam_lines import member_beams
-from .smooth_sides import bulges
+from .smooth_sides import bulges, shell_edges
 
 SAME_AXES = 1e-6  # of unit vectors: frames of neighbours that count as equal for supports
 
@@ -35,7 +35,7 @@ def _finer_shells(assembly: Assembly) -> tuple[Assembly, Middles]:
     if not len(shells):
         return assembly, (np.zeros((0, 2), int), 0)
     tri = shells.triangle
-    edges, of = _edges(shells.nodes)
+    edges, of = shell_edges(shells.nodes)
     rise = bulges(assembly.points, shells.nodes, edges, of)
     n, m = len(assembly.points), len(edges)
     quads = shells.nodes[~tri]
@@ -91,18 +91,6 @@ def _finer_beams(assembly: Assembly, sides: Middles) -> Assembly:
         ids = half.ids + end * int(beams.ids.max())
         halves.append(replace(half, ids=ids, nodes=nodes, offset=offset, pins=pins))
     return replace(grown, beams=concatenated(others, *halves))
-
-
-def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unique edges (k, 2) and, per shell, the edge after each corner (m, 4)."""
-    pairs = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2)
-    tri = nodes[:, 2] == nodes[:, 3]
-    pairs[tri, 2] = pairs[
-        tri, 3
-    ]  # a triangle's third edge leads from its third corner to the first
-    flat = np.sort(pairs.reshape(-1, 2), axis=1)
-    edges, of = np.unique(flat, axis=0, return_inverse=True)
-    return edges, of.reshape(-1, 4)
 
 
 def parents(shells: Shells) -> np.ndarray:

@@ -41,6 +41,18 @@ class _Sides:
         ]
 
 
+def shell_edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unique edges (k, 2) and, per shell, the edge after each corner (m, 4)."""
+    pairs = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2)
+    tri = nodes[:, 2] == nodes[:, 3]
+    pairs[tri, 2] = pairs[
+        tri, 3
+    ]  # a triangle's third edge leads from its third corner to the first
+    flat = np.sort(pairs.reshape(-1, 2), axis=1)
+    edges, of = np.unique(flat, axis=0, return_inverse=True)
+    return edges, of.reshape(-1, 4)
+
+
 def bulges(points: np.ndarray, cells: np.ndarray, edges: np.ndarray, of: np.ndarray) -> np.ndarray:
     """Vectors from the middle of each edge to the smooth surface (k, 3) [m].
 
@@ -51,15 +63,11 @@ def bulges(points: np.ndarray, cells: np.ndarray, edges: np.ndarray, of: np.ndar
     edges : (k, 2) int     unique edges
     of : (m, 4) int        edge after each corner of each shell
     """
-    count = np.where(cells[:, 2] == cells[:, 3], 3, 4)
-    cell, corner = np.nonzero(np.arange(4) < count[:, None])
-    sides = _Sides(cell, corner, of[cell, corner], count, of)
-    facet = cell_normals(points, cells)
+    sides, smooth = _sides(points, cells, edges, of)
     start, end = sides.ends()
     rows = cells.ravel()
     d = points[rows[end]] - points[rows[start]]
-    smooth = _smooth(sides, facet, rows, d, len(edges))
-    N = _fan_normals(points, cells, sides, facet, smooth)
+    N = _fan_normals(points, cells, sides, _fans(cells, sides, smooth))
     N1, N2 = N[start], N[end]
     N2 = N2 * np.where(np.einsum("ij,ij->i", N1, N2) < 0, -1.0, 1.0)[:, None]
     w1, w2 = np.einsum("ij,ij->i", d, N1), -np.einsum("ij,ij->i", d, N2)
@@ -71,6 +79,28 @@ def bulges(points: np.ndarray, cells: np.ndarray, edges: np.ndarray, of: np.ndar
     np.add.at(A, sides.edge, n[:, :, None] * n[:, None])
     np.add.at(b, sides.edge, rise[:, None] * n)
     return np.einsum("kij,kj->ki", np.linalg.pinv(A, rcond=APART, hermitian=True), b)
+
+
+def fans(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Number of the fan of shells without a fold between them, at each corner (m, 4)."""
+    sides, smooth = _sides(points, cells, *shell_edges(cells))
+    fan = _fans(cells, sides, smooth).reshape(-1, 4)
+    triangle = sides.count == 3
+    fan[triangle, 3] = fan[triangle, 2]
+    return fan
+
+
+def _sides(
+    points: np.ndarray, cells: np.ndarray, edges: np.ndarray, of: np.ndarray
+) -> tuple[_Sides, np.ndarray]:
+    """All sides of all shells, and the edges (k,) across which they are one smooth surface."""
+    count = np.where(cells[:, 2] == cells[:, 3], 3, 4)
+    cell, corner = np.nonzero(np.arange(4) < count[:, None])
+    sides = _Sides(cell, corner, of[cell, corner], count, of)
+    start, end = sides.ends()
+    rows = cells.ravel()
+    d = points[rows[end]] - points[rows[start]]
+    return sides, _smooth(sides, cell_normals(points, cells), rows, d, len(edges))
 
 
 def _smooth(
@@ -108,10 +138,22 @@ def _smooth(
     return smooth
 
 
+def _fans(cells: np.ndarray, sides: _Sides, smooth: np.ndarray) -> np.ndarray:
+    """Number of the fan of each corner (4 m,): shells joined at smooth edges around one point."""
+    start, end = sides.ends()
+    rows, m = cells.ravel(), len(cells)
+    edge, row = np.concatenate([sides.edge] * 2), np.concatenate([rows[start], rows[end]])
+    at, on = np.concatenate([start, end]), smooth[np.concatenate([sides.edge] * 2)]
+    order = np.flatnonzero(on)[np.lexsort((row[on], edge[on]))]
+    pairs = at[order].reshape(-1, 2)  # both corners of two shells at one end of one edge
+    joined = sp.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (4 * m, 4 * m))
+    return np.asarray(connected_components(joined, directed=False)[1])
+
+
 def _fan_normals(
-    points: np.ndarray, cells: np.ndarray, sides: _Sides, facet: np.ndarray, smooth: np.ndarray
+    points: np.ndarray, cells: np.ndarray, sides: _Sides, fan: np.ndarray
 ) -> np.ndarray:
-    """Unit normal at every corner (4 m, 3), common to the shells around it without a fold between.
+    """Unit normal at every corner (4 m, 3), common to the shells of its fan.
 
     The principal axis of Σ w n nᵀ, which no numbering of the shells changes, with the weights of
     Max (1999), J. Graphics Tools 4(2), 1-6: |u x v| / (|u|² |v|²) of the sides u, v at the corner.
@@ -119,13 +161,6 @@ def _fan_normals(
     """
     start, end = sides.ends()
     rows, m = cells.ravel(), len(cells)
-    key = np.concatenate([sides.edge, sides.edge]), np.concatenate([rows[start], rows[end]])
-    at = np.concatenate([start, end])
-    on = smooth[key[0]]
-    order = np.flatnonzero(on)[np.lexsort((key[1][on], key[0][on]))]
-    pairs = at[order].reshape(-1, 2)  # both corners of two shells at one end of one edge
-    joined = sp.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (4 * m, 4 * m))
-    _, fan = connected_components(joined, directed=False)
     v = points[rows[end]] - points[rows[start]]
     length2 = np.einsum("ij,ij->i", v, v)
     before = np.zeros((4 * m, 3))
@@ -133,7 +168,7 @@ def _fan_normals(
     u = before[start]
     area = np.linalg.norm(np.cross(u, v), axis=1)
     weight = area / np.maximum(length2 * np.einsum("ij,ij->i", u, u), 1e-300)
-    n = facet[sides.cell]
+    n = cell_normals(points, cells)[sides.cell]
     T = np.zeros((4 * m, 3, 3))
     np.add.at(T, fan[start], weight[:, None, None] * n[:, :, None] * n[:, None])
     return np.linalg.eigh(T)[1][:, :, -1][fan]
