@@ -1,18 +1,21 @@
 """Shell with nodes on its edges: quadrilateral of eight nodes, triangle of six, curved.
 
-Mid-surface, director and motion are x = Σ N_i (x_i + d V_i), n = Σ N_i V_i, u = Σ N_i (u_i + d β_i)
-and β = Σ N_i β_i with β_i = θ_i x V_i, V_i the surface's normal at node i and d the offset (Ahmad,
-Irons, Zienkiewicz, Int. J. Num. Meth. Eng. 2 (1970) 419-451). To first order in the distance z from
-the mid-surface the covariant strains are
+V_i is the surface's normal at node i, β_i = θ_i x V_i, and d the offset:
 
-    ε_ab = ½ (x,a · u,b + x,b · u,a)    κ_ab = ½ (x,a · β,b + x,b · β,a + n,a · u,b + n,b · u,a)
-    γ_a = x,a · β + n · u,a             which vanish for every rigid motion.
+    x = Σ N_i (x_i + d V_i)    n = Σ N_i V_i    u = Σ N_i (u_i + d β_i)    β = Σ N_i β_i
+
+(Ahmad, Irons, Zienkiewicz, Int. J. Num. Meth. Eng. 2 (1970) 419-451). To first order in the
+distance from the mid-surface the covariant strains, zero for rigid motions, are
+
+    ε_ab = ½ (x,a · u,b + x,b · u,a)
+    κ_ab = ½ (x,a · β,b + x,b · β,a + n,a · u,b + n,b · u,a)
+    γ_a = x,a · β + n · u,a
 
 Transverse shear is tied: MITC8 (Bathe, Dvorkin, Int. J. Num. Meth. Eng. 22 (1986) 697-722) and
 MITC6 (Lee, Bathe, Computers and Structures 82 (2004) 945-962). The membrane strain is projected on
-1, r, s (and rs), with ``VARYING_MEMBRANE`` of the rest, so that a curved element bends without
-stretching; the projection leaves constant strains and their forces as they are. A mid-side node
-that an element lacks leaves a straight edge (:func:`.solid_shapes.with_middles`).
+1, r, s (and rs), with ``VARYING_MEMBRANE`` of the rest. A curved element can then bend without
+stretching. Constant strains and their forces stay as they are. A mid-side node that an element
+lacks leaves a straight edge (:func:`.solid_shapes.with_middles`).
 """
 
 from dataclasses import dataclass

@@ -108,3 +108,17 @@ def test_the_end_of_a_patch_is_the_mean_of_the_square_of_its_area(bulk):
 ])  # fmt: skip
 def test_a_connector_that_joins_nothing_is_refused(bulk, card, said):
     says(said, assembly, bulk(sheets(card)), "mm-t-s")
+
+
+def test_a_bush_of_one_direction_acts_along_it(bulk):
+    """K and C act along the line of its grids, or along x of CID where they coincide."""
+    text = (
+        "GRID,1,,0.,0.,0.\nGRID,2,,3.,4.,0.\nGRID,3,,0.,0.,0.\nCBUSH1D,8,5,1,2\nCBUSH1D,9,5,1,3,7\n"
+        "PBUSH1D,5,100.,2.\nCORD2R,7,,0.,0.,0.,1.,0.,0.,0.,0.,1.\n"
+    )
+    bushes = assembly(bulk(text), "mm-t-s", loose=True).bushes
+    np.testing.assert_allclose(bushes.frame[:, 0], [[0.6, 0.8, 0], [0, 0, 1]], atol=1e-12)
+    np.testing.assert_allclose(bushes.stiffness, [[1e5, 0, 0, 0, 0, 0]] * 2)
+    np.testing.assert_allclose(bushes.viscous, [[2e3, 0, 0, 0, 0, 0]] * 2)
+    says("PBUSH1D 6", assembly, bulk(text.replace("CBUSH1D,8,5", "CBUSH1D,8,6")), loose=True)
+    says("needs a coordinate system", assembly, bulk(text.replace("1,3,7", "1,3")), loose=True)

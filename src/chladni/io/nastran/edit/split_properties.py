@@ -114,7 +114,7 @@ def taken_out(deck: Deck, before: Assembly, after: Assembly) -> tuple[Assembly, 
         kept(was, now, SOLIDS) for was, now in zip(before.solids, after.solids, strict=True)
     )
     beams = kept(before.beams, after.beams, (*BEAMS, "CONROD"))
-    bushes = kept(before.bushes, after.bushes, ("CBUSH", "CWELD", "CFAST"))
+    bushes = kept(before.bushes, after.bushes, ("CBUSH", "CBUSH1D", "CWELD", "CFAST"))
     return replace(before, solids=solids, beams=beams, bushes=bushes), changes
 
 

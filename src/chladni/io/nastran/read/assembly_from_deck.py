@@ -21,7 +21,7 @@ from .shell_elements import SHEETS, filled_thickness, shells
 from .solid_elements import SOLIDS, solids
 from .supports import selected, supports
 
-_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH".split()
+_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D".split()
 _ELEMENTS = (  # those of one kind have no id in common
     (*SHEETS, *SOLIDS, *_STIFF, *CONNECTORS),
     "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),

@@ -2,7 +2,7 @@
 
 An end of a connector is the point at which it pierces its patch. It moves as the weighted mean of
 the patch (RBE3). The weights are those of four points of the shells around it, at the corners of a
-square of the connector's area (MSC Nastran Quick Reference Guide, CWELD and CFAST), or equal ones
+square of the connector's area (MSC Nastran Quick Reference Guide, CWELD and CFAST). They are equal
 where the card names a single shell or grids. A weld is a round beam with shear. About its middle
 that beam is a bush:
 

@@ -165,8 +165,8 @@ def _face(
 ) -> np.ndarray:
     """Corners of a solid's face, its normal inwards, beginning at G1.
 
-    G1 and G3 are opposite corners; a triangle of a CPENTA needs G1 only, of a CPYRAM both its
-    corners of the base, and of a CTETRA G4 is the node that is not on the face.
+    G1 and G3 are opposite corners. A triangle of a CPENTA needs G1 only, one of a CPYRAM both its
+    corners of the base. G4 of a CTETRA is the node that is not on the face.
     """
     a = ctx.row(cards, i, marks[0])
     b = ctx.row(cards, i, marks[1]) if marks[1] else -1
