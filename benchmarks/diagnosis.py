@@ -4,7 +4,7 @@
 
 A row a stage: seconds on the clock, processor seconds, the highest resident memory within it and
 what is left after it, all of the process, with the pictures and the page of the command. As many
-threads as a user has; OMP_NUM_THREADS says otherwise. ``--candidates`` gives every candidate a row
+threads as a user has; OMP_NUM_THREADS says otherwise. ``--candidates`` gives every family a row
 of its own, ``--profile`` writes what cProfile sees (of the thread that asks: run it on one). Peaks
 are those that Linux keeps in /proc/self. A tailgate: ``chladni blind make --set tailgate --seeds
 560 --kinds nothing --out runs/tailgate``, its cases/case-1.

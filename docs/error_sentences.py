@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from chladni import errors
@@ -60,6 +61,7 @@ class Sentence:
         return _ROOMS.get(self.room) or _ROOMS.get(self.room.split(".")[0], _REST)
 
 
+@cache
 def sentences(*sources: Path) -> list[Sentence]:
     """Every refusal of the sources (default: ours), by room and text, equal ones once."""
     found = {

@@ -28,6 +28,7 @@ MOST = {  # modules of ours and of SciPy that a command loads for its --help, a 
     "map": (265, 180),
     "modes": (130, 180),
     "render": (140, 180),
+    "next": (270, 207),
     "report": (270, 207),
     "test": (335, 207),
     "bench": (415, 207),

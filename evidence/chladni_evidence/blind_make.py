@@ -7,7 +7,6 @@ import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,6 @@ from . import kratos
 from .blind_folder import BlindFolder, Seals, hash_of, hash_of_case, published, read_json
 from .evidence_sets import MEANT, Order, Purpose, purpose
 from .interval_evidence import of_prior
-from .kratos_structures import TOLERANCE
 from .leash import leash_to_parent
 from .made_case import MadeCase, made_case, write_case
 
@@ -128,7 +126,7 @@ def _made(name: str, order: Order, place: BlindFolder) -> bool:
 
 def made_of(order: Order, cache: Path | None = None) -> MadeCase:
     """The case of an order, made on one thread so that it is the same on every machine."""
-    draw = partial(of_prior, spread=TOLERANCE) if order.mesh == "kratos" else scattered_parts
+    draw = of_prior if order.mesh == "kratos" else scattered_parts
     with one_blas_thread():
         return made_case(
             order.bench(), order.kind, order.seed, order.mesh, cache, order.recorder, order.times,

@@ -8,7 +8,7 @@ too often.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass
 from itertools import product
 from pathlib import Path
@@ -19,9 +19,9 @@ import numpy as np
 
 from chladni.case import load_case
 from chladni.effects.calibration_parameters import (
-    SPREAD,
     PartScale,
     material_of,
+    prior_sd,
     thickness_of,
     with_scaled,
 )
@@ -69,21 +69,15 @@ class CalibratedArticle:
     residual: float = float("nan")  # rms over the median of what right models leave
 
 
-def of_prior(
-    assembly: Assembly, rng: np.random.Generator, spread: Mapping[str, float] = SPREAD
-) -> tuple[Assembly, Scales]:
-    """An article with E and t of every sheet and rho of its material drawn; the factors.
-
-    Parameters
-    ----------
-    spread : standard deviations of ln E, rho and t; those of the priors unless given
-    """
+def of_prior(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
+    """An article with E and t of every sheet and rho of its material from the priors; factors."""
     scales: Scales = {}
     rho: dict[int, float] = {}
     for k, part in enumerate(assembly.parts):
         if thickness_of(part) != "t":
             continue
-        drawn = {q: float(np.exp(spread[q] * rng.normal())) for q in ("E", "rho", "t")}
+        sd = {q: prior_sd(assembly.parts, q, [k]) for q in ("E", "rho", "t")}
+        drawn = {q: float(np.exp(s * rng.normal())) for q, s in sd.items()}
         drawn["rho"] = rho.setdefault(getattr(material_of(part), "id", 0), drawn["rho"])
         scales[part.name] = drawn
         for quantity, factor in drawn.items():

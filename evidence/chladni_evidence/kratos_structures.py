@@ -188,8 +188,3 @@ ARTICLES = {  # a spot at one point acts as one of radius h/5, so h is 15 mm for
     "covered trough": replace(DECKS["covered trough"], size=0.033),
 }
 FINER = 2.2  # refinement of an article over its deck
-TOLERANCE = {
-    "E": 0.025,
-    "rho": 0.005,
-    "t": 0.03,
-}  # sd of ln of a value, for alloys and rolled sheet

@@ -29,7 +29,7 @@ from chladni.model.assembly import Assembly
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import ReducedProblem, reduced_problem
 from chladni.search.candidates import UpdatingContext
-from chladni_specimens import bushed_plates, jointed_plates, plate, tied_plates
+from chladni_specimens import bushed_plates, jointed_plates, plate, tied_plates, tube_frame
 
 TOP = 300.0  # Hz; six flexible modes of the generated plates lie below
 MODES = 6  # flexible modes that are compared
@@ -157,9 +157,25 @@ def _of_plates(deck: Assembly, fine: Assembly) -> EffectGround:
     return ground(deck, fine, deck.ids[spread].tolist())
 
 
+def tubes(times: int = 1) -> Assembly:
+    """A free ladder of steel tubes of 700 x 300 mm, its beams 50 mm long or shorter."""
+    d = dict(
+        length=0.7, width=0.3, height=0.2, bay=0.45, narrow=0.8, rail=0.02, brace=0.016
+    ) | {"t rail": 1.5e-3, "t brace": 1.5e-3}  # fmt: skip
+    return spaced(tube_frame(d, 0.06 / times))
+
+
+def _of_frame() -> EffectGround:
+    """Ground on a frame of tubes, with sensors far from each other."""
+    deck = tubes()
+    spread = deck.ids[farthest_point_sample(deck.points, SENSORS)]
+    return ground(deck, tubes(2), spread.tolist(), 900.0)
+
+
 GROUNDS: Mapping[str, Callable[[], EffectGround]] = {
     "plate": lambda: ground(plain_plate(), plain_plate(2), CORNERS),
     "clamped plate": lambda: ground(clamped_plate(), clamped_plate(2), HELD),
+    "frame": _of_frame,
     "two plates with joints": lambda: _of_plates(jointed_plates(), jointed_plates(0.03)),
     "two plates with joints and a rigid element": lambda: _of_plates(
         tied_plates(), tied_plates(0.03)
@@ -170,7 +186,9 @@ GROUNDS: Mapping[str, Callable[[], EffectGround]] = {
 
 def usual_grounds(family: Family) -> tuple[str, ...]:
     """Names of generated structures that may have what a family needs, the most likely first."""
-    known = {"": "plate", "a shaker": "plate", "supports": "clamped plate"}
+    known = {
+        "": "plate", "a shaker": "plate", "supports": "clamped plate", "beams that meet": "frame",
+    }  # fmt: skip
     if family.needs in known:
         return (known[family.needs],)
     joined = [name for name in GROUNDS if name.startswith("two plates")]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -166,28 +167,9 @@ class _Every:
     weights: np.ndarray
     points: np.ndarray
 
-    def taken(
-        self,
-        at: np.ndarray,
-        normals: np.ndarray,
-        side: np.ndarray,
-        straight: np.ndarray,
-        refused: Mapping[str, int],
-        foot: float,
-    ) -> SensorCandidates:
-        """The sensor candidates at some of these places, with their properties."""
-        return SensorCandidates(
-            self.ids[at],
-            self.is_grid[at],
-            self.nodes[at],
-            self.weights[at],
-            self.points[at],
-            normals,
-            side,
-            straight,
-            refused,
-            foot,
-        )
+    def taken(self, at: np.ndarray, *given: Any) -> SensorCandidates:
+        """The sensor candidates at some of these places, with their own properties."""
+        return SensorCandidates(*(value[at] for value in vars(self).values()), *given)
 
 
 def _every(assembly: Assembly, seen: Surface, sheet: np.ndarray) -> _Every:

@@ -7,6 +7,7 @@ from .forms.mesh_pieces import Piece as Piece
 from .forms.mesh_pieces import of_pieces as of_pieces
 from .forms.mesh_pieces import rectangle as rectangle
 from .forms.mesh_pieces import stops as stops
+from .forms.tube_frame import tube_frame as tube_frame
 from .holed_plate import holed_plate as holed_plate
 from .jointed_plates import bushed_plates as bushed_plates
 from .jointed_plates import jointed_plates as jointed_plates
@@ -52,4 +53,5 @@ __all__ = [
     "tailgate",
     "tailgate_specimen",
     "tied_plates",
+    "tube_frame",
 ]

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from chladni.decision.decide import decide
-from chladni.decision.hypotheses import EffectSet, Hypotheses, Hypothesis, Left
+from chladni.decision.hypotheses import EffectSet, Explanation, Hypotheses, Left
 from chladni.effects.estimate import Remarks
 from chladni.inference.adequacy import FitTest
 
@@ -24,7 +24,7 @@ class Known:
     p_damping: float = 1.0
     after_lead: float = 1.0
     then: dict[str, Any] = field(default_factory=dict)
-    of: Hypothesis | None = None
+    of: Explanation | None = None
 
     @cached_property
     def refined(self):
@@ -66,7 +66,7 @@ def on(made, numbers):
 def row(name, gain, p=0.5, news=FOR, left=SERVES, p_damping=1.0, **more):
     """A hypothesis that gains so much, and that nothing refuses unless it is said."""
     names = tuple(name.split(" and ")) if name else ()
-    return on(Hypothesis(names, -gain, **more), Known(p, news, left, p_damping))
+    return on(Explanation(names, -gain, **more), Known(p, news, left, p_damping))
 
 
 def table(*rows, null=None, then=None, sets=(), after_lead=1.0, **more):

@@ -50,7 +50,8 @@ from .conftest import EXAMPLES, FLEXIBLE, full, installed_examples
 NAMES = (*(family.name for family in registry.BUILT_IN), *EXAMPLES.values())
 CONTRACT = {  # names that issue texts, cases and other programs may use
     *("global-stiffness", "global-density", "part-stiffness", "stiffness-patch"),
-    *("thickness-scale", "thickness-distribution", "orthotropic-material", "membrane-prestress"),
+    *("doubler", "stiffener", "open-joint", "thickness-scale", "thickness-distribution"),
+    *("orthotropic-material", "membrane-prestress"),
     *("adhesive-stiffness", "viscoelastic-joint", "hem-contact", "weld-missing"),
     *("weld-compliance", "over-constraint", "contact-stiffness", "rattle", "joint-friction"),
     *("point-mass", "mass-patch", "sensor-mass", "local-resonator", "suspension"),

@@ -1,15 +1,22 @@
 """The mesh error where a mesh is far too coarse for what was measured, and where it is not."""
 
+from functools import partial
+
 import numpy as np
 from numpy.testing import assert_allclose
 
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.reduction import iterated
+from chladni.effects import model_errors
 from chladni.effects.model_errors import LIMIT, mesh_errors
+from chladni.fem.assemble import Structure, structure
 from chladni.fem.modelled import modelled
+from chladni.geometry.refine import refined
 from chladni.io.nastran import assembly, read_deck
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni.units import UNITS
-from chladni_specimens.plates import plate
+from chladni_specimens.plates import folded_panel, plate
 
 TOP = 450.0  # [Hz]; eight flexible modes on eight shells
 
@@ -51,3 +58,28 @@ def test_the_softest_mode_of_a_row_of_bars_goes_to_its_limit(tmp_path):
 
     assert away(LIMIT) < 0.1 * away(0.0)
     assert away(2.0) < away(0.0)
+
+
+def test_two_steps_from_the_modes_of_the_deck_reach_those_of_the_finer_mesh(monkeypatch):
+    """Frequencies come from above, by a small part of the mesh error; L and shapes are those."""
+    coarse = modelled(folded_panel(0.6, 0.3, 0.04, 0.01, 0.03, 1e-3), 1.6 * 300.0)
+    places = partial(Structure.rows, dofs=coarse.structure.system.dofs[2:200:12])
+    near = mesh_errors(coarse, 300.0, places)[0]
+    made = structure(refined(coarse.assembly))
+    loads = made.rows(coarse.structure.system.dofs).T @ (
+        coarse.structure.system.M @ coarse.modes.shapes
+    )
+    whole = normal_modes(made.system, band=300.0).frequency[6:]
+    once, twice = (iterated(made.system, loads, 10.0, k).frequency[6:] for k in (1, 2))
+    once, twice = once[: len(whole)], twice[: len(whole)]
+    off = coarse.modes.frequency[6:][: len(whole)] / whole - 1
+    assert (twice > whole * (1 - 1e-9)).all()
+    assert (twice - whole < 0.1 * (once - whole) + 1e-9 * whole).all()
+    assert (twice / whole - 1).max() < 0.02 * np.abs(off).max()
+    monkeypatch.setattr(model_errors, "FAR", -1.0)
+    full = mesh_errors(coarse, 300.0, places)[0]
+    own = full.omega < 2 * np.pi * 300.0
+    here, there = near.log[np.ix_(own, own)], full.log[np.ix_(own, own)]
+    assert np.linalg.norm(here - there) < 0.01 * np.linalg.norm(there)
+    here, there = near.shapes[:, own], full.shapes[:, own]
+    assert np.linalg.norm(here - there) < 0.15 * np.linalg.norm(there)

@@ -80,6 +80,21 @@ def test_the_centre_stays_on_a_curved_sheet():
     assert np.array([own.at(v) for v in u]) == pytest.approx(near, abs=1e-3)
 
 
+def test_a_place_lies_on_the_sheet_and_is_as_uncertain_as_its_centre(panel):
+    """A centre 9 mm beyond the edge is reported on the edge; R is no uncertainty of the place."""
+    group = int(np.argmin(((panel.centre - [0.05, 0.15, 0.0]) ** 2).sum(axis=1)))
+    effect = ThicknessDistribution.on(panel, group, 1)
+    away = (np.array([-0.009, 0.15, 0.0]) - effect.surface.origin) @ effect.surface.axes.T
+    x = np.array([0.0, np.log(0.01 / effect.size), *(away / effect.size), 0.3])
+    place = effect.location(x, np.array([0.1, 0.1, 0.15, 0.02, 0.1]))
+    edge = effect.points[effect.points[:, 0] == 0.0]
+    sag = np.interp(0.15, edge[:, 1], edge[:, 2])
+    np.testing.assert_allclose(place.point_m, [0.0, 0.15, sag], atol=2e-4)
+    far = 1.96 * effect.size * effect.widened(np.array([0.1, 0.1, 0.15, 0.02, 0.1]))[2]
+    assert place.radius_m == pytest.approx(far)
+    assert effect.location(x).radius_m is None
+
+
 def test_a_centre_off_the_sheet_is_reported_on_it(panel):
     """Beyond the edge: the place is the sheet's nearest grid, the depth what is left there."""
     group = int(np.argmin(((panel.centre - [0.05, 0.15, 0.0]) ** 2).sum(axis=1)))

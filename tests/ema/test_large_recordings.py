@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chladni.ema import identification, pole_fitting, pole_search_by_parts
-from chladni.ema.condensed_lines import condensed
+from chladni.ema.condensed_lines import condensed, oversampled
 from chladni.ema.identification import identify, kept_lines, pole_data
 from chladni.ema.out_of_band_poles import outside, with_outer_poles
 from chladni.ema.pole_fitting import PoleData, linear, normal_matrices, polish, solve
@@ -222,3 +222,79 @@ def test_a_long_identification_says_how_long_it_takes(monkeypatch) -> None:
     assert all(a[1] <= b[1] for a, b in pairwise(seen))
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     np.testing.assert_array_equal(identify(frf).poles, found.poles)
+
+
+def test_sums_of_lines_lead_to_the_poles_of_all_lines() -> None:
+    """Neighbours are summed without knowledge of poles: off by their noise, none is lost.
+
+    A second condensation about the poles found is as good as all lines.
+    """
+    known = structure(589, 6, 4)
+    frf, _ = recording(known, "share", 589, lines=8000)
+    data, omega_max = pole_data(frf, kept_lines(frf))
+    few = oversampled(data)
+    assert len(few.s) < len(data.s) / 4
+    assert 0.99 < (few.w**2).sum() / (data.w**2).sum() < 1
+    p = with_outer_poles(data, known.inside / omega_max, Rule(4, len(data.s)))[0].p
+    (a, slope_a), (b, slope_b) = polish(data, p, tol=1e-3), polish(few, p, tol=1e-3)
+    sd, its = (uncertainty(p, slope, 1.0)[0] for slope in (slope_a, slope_b))
+    within = ~outside(data, p)
+    np.testing.assert_allclose(its[within], sd[within], rtol=0.03)
+    assert (np.abs(b.p - a.p) < 5 * sd)[within].all()
+    c, _ = polish(condensed(data, solve(few, b.p)[0]), b.p, tol=1e-3)
+    assert (np.abs(c.p - a.p) < 0.25 * sd)[within].all()
+
+
+def test_samples_that_do_not_count_spoil_no_sum() -> None:
+    frf, _ = recording(structure(589, 6, 4), "share", 589, lines=2000)
+    data, _ = pole_data(frf, kept_lines(frf))
+    w = data.w.copy()
+    w[::40, 1] = 0
+    few = oversampled(replace(data, w=w, y=np.where(w > 0, data.y, 0)))
+    assert (few.w[:, 1] ** 2).sum() > 0.97 * (w[:, 1] ** 2).sum()
+
+
+def test_a_peak_narrower_than_a_sum_stays_apart() -> None:
+    """A line that stands out of the noise of all channels together is summed with none."""
+    rng = np.random.default_rng(592)
+    s, e = 1j * np.linspace(0.1, 1, 1000), rng.normal(size=(1000, 20, 2)) @ [1, 1j]
+    data = PoleData(s, 3 + e, np.ones((1000, 20)), 2)
+    e[500] += 4
+    peak = replace(data, y=3 + e)
+    assert len(oversampled(data).s) < 50
+    assert np.abs(oversampled(peak).s - s[500]).min() == pytest.approx(0, abs=1e-12)
+
+
+def test_the_noise_of_lines_is_their_own() -> None:
+    """Noise stated ten times too large hides no course; ten times too small, lines still repeat."""
+    frf, _ = recording(structure(589, 6, 4), "share", 589, lines=8000)
+    data, _ = pole_data(frf, kept_lines(frf))
+    for factor in (0.1, 10):
+        np.testing.assert_allclose(
+            oversampled(replace(data, w=factor * data.w)).s, oversampled(data).s
+        )
+
+
+def test_lines_that_resolve_nothing_stay() -> None:
+    """Three lines a resonance, whatever noise is stated: none repeats its neighbour."""
+    s = 1j * np.linspace(0.1, 1, 1200)
+    p = np.linspace(0.1, 1, 400) * (1j - 1e-3)
+    rng = np.random.default_rng(593)
+    y = linear(s, p, 2)[:, :-2] @ rng.normal(size=(2 * len(p), 5))
+    for noise in (1e-3, 1.0):
+        w = np.full(y.shape, 1 / (noise * np.abs(y).mean()))
+        assert len(oversampled(PoleData(s, y, w, 2)).s) > 0.9 * len(s)
+
+
+def test_combinations_of_noise_alone_are_left_out() -> None:
+    """Six modes in and beside a band have six shapes; forty channels hold no more than noise."""
+    known = structure(8, 6, 40)
+    frf, _ = recording(known, "floor", 8, lines=2000)
+    data, _ = pole_data(frf, frf.frequency > 0)
+    few = few_channels(data, above_noise=True)
+    assert 6 <= few.y.shape[1] <= len(known.poles)
+    loud = few_channels(replace(data, w=data.w / 10), above_noise=True)
+    assert loud.y.shape[1] == few.y.shape[1]
+    hiss = np.random.default_rng(8).normal(size=(*data.y.shape, 2)) @ [1, 1j]
+    noise = replace(data, y=hiss / data.w)
+    assert few_channels(noise, above_noise=True).y.shape[1] == 1

@@ -119,6 +119,7 @@ def half_cylinder(around, along):
 PROFILES = {  # z over x; folds stand out from the sides around them
     "bead of one flat shell": [0, 0, 0, 0.01, 0.01, 0, 0, 0],
     "bead of two flat shells": [0, 0, 0, 0.01, 0.01, 0.01, 0, 0],
+    "channel of three flat strips": [0.01, 0, 0, 0.01],
     "step": [0, 0, 0, 0.005, 0.01, 0.01, 0.01],
     "ridge": [0, 0.002, 0.004, 0.006, 0.004, 0.002, 0],
     "corrugation": [0, 0.01, 0, 0.01, 0, 0.01, 0],

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from chladni.inference.discrepancy import Discrepancy
-from chladni.inference.linear_model import LinearModel
-from chladni.inference.map_fit import LinearPosterior, Status, descend
+from chladni.inference.linear_model import LinearModel, cost
+from chladni.inference.map_fit import LinearPosterior, Point, Status, descend
 
 T = np.linspace(0, 2, 15)
 TRUE = np.array([1.4, -0.8, 0.5])
@@ -21,16 +21,19 @@ def decay(x):
 
 
 def objective(calls):
-    """Squares of the decay under the error, counting the slopes computed."""
+    """Squares of the decay under the error, counting the values and the slopes computed."""
 
-    def at(x, gradient):
+    def at(x):
         r, J = decay(x)
         r = r - decay(TRUE)[0]
-        r0, J0 = x - TRUE, np.eye(3)
-        calls[gradient] += 1
-        some = J if gradient else J[:, :0]
-        linear = LinearModel(ERROR, some, J0 if gradient else J0[:, :0])
-        return linear.squares(r, r0), LinearPosterior(None, linear, r, r0)
+        r0, linear = x - TRUE, LinearModel(ERROR, J, np.eye(3))
+        calls[0] += 1
+
+        def sloped():
+            calls[1] += 1
+            return linear.squares(r, r0), LinearPosterior(None, linear, r, r0)
+
+        return Point(cost(ERROR, r, r0), sloped)
 
     return at
 
@@ -50,7 +53,15 @@ def test_no_slopes_are_computed_where_no_step_pays():
     """A start at the minimum."""
     calls = [0, 0]
     assert descend(objective(calls), TRUE + 1e-9, LIMIT, 40, 1e-6)[3] is Status.CONVERGED
-    assert calls == [0, 1]
+    assert calls == [1, 1]
+
+
+def test_an_accepted_step_is_evaluated_once():
+    """Each point is one value, and slopes are computed at accepted points alone."""
+    calls = [0, 0]
+    steps = 6
+    descend(objective(calls), TRUE + 0.1, LIMIT, steps, 1e-300)
+    assert calls[0] == calls[1] == 1 + steps
 
 
 def test_a_descent_without_steps_says_so():

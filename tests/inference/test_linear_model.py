@@ -42,3 +42,24 @@ def test_a_refitted_residual_is_the_least_there_is():
     both = np.concatenate([error.whitened(J), J0])
     dx = np.linalg.lstsq(both, -np.append(error.whitened(R), R0), rcond=None)[0]
     assert_allclose(z, error.whitened(R + J @ dx))
+
+
+@pytest.mark.parametrize("error", [None, ERROR])
+def test_products_of_the_first_columns_are_reused(error):
+    plain = LinearModel(error, J, J0)
+    inner = LinearModel(error, J[:, :2], J0[:, :2])
+    for model in (LinearModel(error, J, J0, within=inner), LinearModel(error, J, J0, within=plain)):
+        assert_allclose(model.squares(R, R0).gradient, plain.squares(R, R0).gradient)
+        assert_allclose(model.squares(R, R0).information, plain.squares(R, R0).information)
+
+
+def test_profiled_squares_have_the_best_first_parameters():
+    """They are those of a fit of these at every value of the others."""
+    whole = LinearModel(ERROR, J, J0).squares(R, R0)
+    alone = whole.profiled(2)
+    for z in (0.0, 0.3, -1.2):
+        moved = LinearModel(ERROR, J[:, :2], J0[:, :2]).squares(R + J[:, 2] * z, R0 + J0[:, 2] * z)
+        due = moved.cost - moved.further
+        assert alone.cost + 2 * alone.gradient[0] * z + alone.information[0, 0] * z**2 == (
+            pytest.approx(due)
+        )

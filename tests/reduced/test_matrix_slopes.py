@@ -1,5 +1,7 @@
 """Slopes multiply vectors as the matrices that nobody assembles."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from numpy.testing import assert_allclose
 
@@ -39,3 +41,26 @@ def test_few_vectors_span_neighbouring_lines():
     assert Q.shape[1] < 30
     assert_allclose(Q.T @ Q, np.eye(Q.shape[1]), atol=1e-12)
     assert_allclose(Q @ C / size, Y / size, atol=1e-8)
+
+
+def test_the_last_parameters_alone_have_the_same_slopes():
+    """Of sums, of scaled and of transformed slopes; what moves none of them is left out."""
+    A = RNG.normal(size=(2, R, R))
+    A, G = A + A.swapaxes(1, 2), RNG.normal(size=(M, M))
+    inner, slopes = MatrixSlopes(P), MatrixSlopes(P)
+    inner.add_groups(stacked(A), np.array([[1.0, 0.0, 0.0], [2.0, 3.0, 0.0]]))
+    inner.add_points(RNG.normal(size=(2, M)), RNG.normal(size=(2, 1)), slice(2, 3), {}, np.ones(2))
+    slopes.add_scaled(inner.transformed(lambda z: G @ z, lambda y: G.T @ y), 0.7)
+    slopes.add_half(2, RNG.normal(size=(M, 2)), np.arange(3), RNG.normal(size=(2, 3)))
+    slopes.add_operator(np.eye(M), np.array([1.0, 0.0, 2.0]))
+    for k in (1, 2, P):
+        few = slopes.of_last(k)
+        assert few.count == k
+        assert_allclose(few.times(Z), slopes.times(Z)[P - k :], atol=1e-12)
+
+    def refused(z):
+        raise AssertionError("multiplied for nothing")
+
+    dear = MatrixSlopes(P)
+    dear.add_groups(SimpleNamespace(shape=(1, R), times=refused), np.array([[1.0, 1.0, 0.0]]))
+    assert not dear.of_last(1).times(Z).any()

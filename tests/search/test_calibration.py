@@ -13,7 +13,14 @@ from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.inference.map_fit import Fit, MassMeasurement, Status, fit
 from chladni.inference.result import Agreement, MassComparison, Scores
 from chladni.progress import silent
-from chladni.search.calibration import PROFILED, _basins, _without, latin_hypercube, profiles
+from chladni.search.calibration import (
+    PROFILED,
+    _basins,
+    _without,
+    latin_hypercube,
+    profiles,
+    profiles_of_the_best,
+)
 from chladni.search.compensation import compensating
 from chladni.search.posterior import bands, gaussian_draws, posterior_sample, with_frozen
 
@@ -86,15 +93,24 @@ def test_intervals_count_the_prior_of_what_is_frozen(reduced, columns):
 def test_a_profile_of_a_linear_problem_is_the_parabola_of_its_covariance(reduced, columns):
     given = problem(reduced, columns, np.linspace(-1, 1, 8))
     null = null_of(given)
-    for k, profile in enumerate(profiles(given, null)):
+    found, lower = profiles(given, null)
+    assert lower is None
+    for k, profile in enumerate(found):
         sd = np.sqrt(null.fit.covariance[k, k])
         assert_allclose(profile.values, null.fit.x[k] + sd * np.array(PROFILED))
-        p = columns[k].parameters[0]
-        x = null.fit.x[k] + sd * np.array(PROFILED)
-        away = x - null.fit.x[k]
-        prior = (x**2 - null.fit.x[k] ** 2) / p.sd**2
-        assert_allclose(profile.neg2_log_likelihood, away**2 / sd**2 - prior, atol=1e-6)
-        assert_allclose(profile.quadratic, away**2 * (1 / sd**2 - 1 / p.sd**2), atol=1e-9)
+        assert_allclose(profile.neg2_log_likelihood, np.square(PROFILED), atol=1e-6)
+        assert_allclose(profile.quadratic, np.square(PROFILED))
+
+
+def test_a_fit_above_its_profile_is_begun_again_below_it(reduced, columns):
+    """A fit that stopped early is no best: the profile finds a lower place, and it moves there."""
+    given = problem(reduced, columns, np.linspace(-1, 1, 8))
+    best = null_of(given)
+    early = best.fit.x + np.sqrt(np.diag(best.fit.covariance)) * [1.5, 0.0, 0.0]
+    stopped = fit(reduced.model, columns, given.data, None, early, max_steps=0)
+    found, null = profiles_of_the_best(given, replace(best, fit=stopped))
+    assert_allclose(null.fit.x, best.fit.x, atol=1e-3)
+    assert all(min(p.neg2_log_likelihood) > 0 for p in found)
 
 
 def test_a_latin_hypercube_has_one_start_in_every_stratum(reduced, columns):
@@ -114,7 +130,8 @@ def test_starts_that_end_together_are_one_basin(reduced, columns):
     def end(evidence, shift):
         return SimpleNamespace(neg2_log_evidence=evidence, x=null.fit.x + shift * sd)
 
-    found = _basins(null, [end(5.0, 9.0), end(2.0, 0.1), end(2.3, -0.1), end(2.1, 5.0)])
+    ends = [end(5.0, 9.0), end(2.0, 0.1), end(2.3, -0.1), end(2.1, 5.0)]
+    found = _basins(null, end(2.5, 0.0), ends)
     assert [b.starts for b in found] == [2, 1, 1]
     assert_allclose([b.above for b in found], [0.0, 0.1, 3.0])
 

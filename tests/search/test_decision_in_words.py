@@ -65,7 +65,7 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
         (
             table(row("hem-contact", 200.0), row("adhesive-stiffness", 199.0)),
             (
-                "evidence (2 ln B = 1.0) against adhesive-stiffness",
+                "2 ln B = 1.0 against adhesive-stiffness",
                 "too high for a sealant",
                 "settle",
             ),

@@ -10,8 +10,16 @@ from chladni.errors import ModelError
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import Status
+from chladni.inference.own_optimum import LocalOptimum
 from chladni.search import search_round
-from chladni.search.search_round import BEHIND, _closer, _finished, _tried
+from chladni.search.search_round import (
+    BEHIND,
+    _closer,
+    _finished,
+    _leaders,
+    _tried,
+    by_family,
+)
 
 NULL = SimpleNamespace(neg2_log_evidence=100.0, fit=SimpleNamespace(x=np.ones(2)))
 
@@ -22,7 +30,7 @@ class UpdatingProblem:
     def __init__(self, first, again):
         self.ends, self.starts = {0.0: first, 1.0: again}, []
 
-    def fitted_with(self, effect, start, base, steps):
+    def fitted_with(self, effect, start, base, steps, model):
         self.starts.append(float(base[0]))
         if self.ends[float(base[0])] is None:
             raise ModelError("an effect left negative stiffness")
@@ -45,6 +53,54 @@ def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
     found = _tried(problem, NULL, None, np.zeros(1), np.zeros(2))
     assert min(t.neg2_log_evidence for t in found) == end
     assert problem.starts == starts
+
+
+@pytest.mark.parametrize(
+    ("expected", "joint", "fitted"),
+    [
+        ([50.0, 80.0, 40.0], [50.0, 80.0, 40.0], [2]),  # linear: the others stay behind
+        ([44.0, 80.0, 40.0], [30.0, 60.0, 20.0], [2]),  # all are 20 better than linear
+        ([50.0, 80.0, 40.0], [30.0, 60.0, 60.0], [2, 0]),  # 20 worse: the next may be the best
+        ([50.0, 80.0, None], [30.0, 60.0, None], [0]),  # no structure
+    ],
+)
+def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, fitted):
+    """The linear base may be as wrong about one place as about another; all places are known."""
+    done = []
+
+    def own(effect, start, bases, model):
+        if expected[effect.k] is None:
+            raise ModelError("an effect left negative stiffness")
+        return LocalOptimum(effect, expected[effect.k], start, start), bases[0]
+
+    def fit(effect, start, base, steps, model):
+        done.append(effect.k)
+        assert (model is effect) == (len(done) == 1)  # the first has its model already
+        return hypothesis_of(effect, joint[effect.k])
+
+    problem = SimpleNamespace(
+        own_optimum=own, fitted_with=fit, mean=lambda: NULL.fit.x,
+        reduced=SimpleNamespace(model_for=lambda e, x: e),
+    )  # fmt: skip
+    nowhere = SimpleNamespace(point_m=None, radius_m=None)
+    effects = [
+        SimpleNamespace(k=k, name="mass", text=f"at grid {k}", location=lambda x, sd: nowhere)
+        for k in range(3)
+    ]
+    tried = [Candidate(e, np.zeros(1), np.zeros(1)) for e in (*effects, effects[0])]
+    found = by_family(_leaders(problem, NULL, tried))
+    assert done == fitted
+    assert found[0].fit.neg2_log_evidence == min(joint[k] for k in fitted)
+    known = {found[0].effect.k, *(v.effect.k for v in found[0].optima)}
+    assert known == {k for k in range(3) if expected[k] is not None}
+
+
+def hypothesis_of(effect, evidence):
+    """A fit of one effect with this evidence."""
+    fit = SimpleNamespace(
+        neg2_log_evidence=evidence, of=lambda e: np.zeros(1), sd=lambda e: np.ones(1)
+    )
+    return HypothesisFit(effect, fit, None)
 
 
 @pytest.mark.parametrize("status", list(Status))

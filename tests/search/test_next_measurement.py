@@ -1,17 +1,28 @@
 """What a further measurement would show, under each of several explanations."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.commands import ran, refused
 from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
 
 from chladni.fem.energy import mass_properties
 from chladni.inference.expected_information import chosen
+from chladni.output import write_npz
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import next_measurement
-from chladni.search.next_measurement import Rival, _new, _responses, outlook
+from chladni.search.next_measurement import (
+    Rival,
+    _new,
+    _responses,
+    advised,
+    arrays_of,
+    outlook,
+    read_outlook,
+)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -112,3 +123,42 @@ def test_a_mass_put_on_is_that_of_the_changed_structure(problem, tied):
     mean, F = _new(rival, rival, data.s[:4], data.outputs, data.inputs, loaded, rival.state).seen
     assert np.abs(mean).max() > 1.0
     assert F.shape[0] == len(mean)
+
+
+def test_an_outlook_is_read_as_it_was_written(found, tmp_path):
+    """The advice is that of the diagnosis; kinds and dofs that cannot be measured are left out."""
+    write_npz(tmp_path / "outlook.npz", **arrays_of(found))
+    again = read_outlook(tmp_path)
+    assert again.names == found.names
+    assert advised(again) == advised(found)
+    first, *_ = advised(again)
+    (other, *_) = advised(again, without=[first.kind])
+    assert other.kind != first.kind
+    assert [m.bits for m in advised(again)] == sorted(m.bits for m in advised(again))
+
+
+def test_the_command_prints_the_advice_and_writes_its_files(found, tmp_path):
+    (tmp_path / "run").mkdir()
+    write_npz(tmp_path / "run" / "outlook.npz", **arrays_of(found))
+    out = tmp_path / "out"
+    assert "here, there" in ran("next", tmp_path / "run", "--out", out).stdout
+    best = json.loads((out / "next.json").read_text())["measurements"]
+    assert [m["what"] for m in best] == [m.what for m in advised(found)]
+    sensors = [m["label"] for m in best if m["kind"] == "sensor"]
+    assert (out / "sensors.csv").read_text().split() == ["label", *sensors]
+
+
+@pytest.mark.parametrize(
+    ("made", "words", "why"),
+    [
+        (b"", (), "is no outlook"),
+        (None, (), "there is no outlook.npz; a diagnosis of responses writes it"),
+        (True, ("--without", "laser"), "laser: this is no candidate; kinds are band, drive, mass"),
+    ],
+)
+def test_what_no_outlook_can_answer_is_one_sentence(found, tmp_path, made, words, why):
+    if made is True:
+        write_npz(tmp_path / "outlook.npz", **arrays_of(found))
+    elif made is not None:
+        (tmp_path / "outlook.npz").write_bytes(made)
+    assert why in refused("next", tmp_path, *words, "--out", tmp_path / "out")

@@ -218,11 +218,11 @@ def spectra(path):
     write_sets(path, {}, "x", [binary_set(head, np.column_stack([f, made.y]).tobytes())])
 
 
-def solids(place):
-    block = "\n".join(
-        f"GRID,{1 + k},,{0.3 * (k % 2)},{0.2 * (k // 2 % 2)},{0.1 * (k // 4)}" for k in range(8)
+def springs_alone(place):
+    block = "\n".join(f"GRID,{k},,{0.3 * k},,,,23456" for k in range(1, 9))
+    cards = "".join(
+        f"CONM2,{100 + k},{k},,0.1\nCELAS2,{k},1.+4,{k},1,{k + 1},1\n" for k in range(1, 8)
     )
-    cards = "MAT1,1,2.1+11,,0.3,7850.\nPSOLID,1,1\nCHEXA,1,1,1,2,4,3,5,6\n,8,7\n"
     (place / "plate.bdf").write_text(f"BEGIN BULK\n{block}\n{cards}ENDDATA\n")
     return with_recording(rewritten(place, weighed(place), ""), "poles.csv", poles)
 
@@ -240,7 +240,7 @@ ASKED = {  # how a case is changed: the refusal of diagnose, "" for none
         lambda place: with_recording(place, "steady.npz", steady), "no natural frequency"),
     "neither FRFs nor poles": (
         lambda place: with_recording(place, "coherence.uff", spectra), "neither FRFs nor"),
-    "solids": (solids, "neither shells nor beams"),
+    "springs alone": (springs_alone, "no shells, beams or solids"),
 }  # fmt: skip
 
 
@@ -286,11 +286,11 @@ def test_a_draft_says_usable_only_of_what_check_finds_in_order(copied, tmp_path,
     assert ("can be used" in said) is (name == "poles")
 
 
-def test_a_draft_of_solids_says_what_takes_them(copied, tmp_path):
-    solids(copied)
+def test_a_draft_of_springs_says_what_takes_them(copied, tmp_path):
+    springs_alone(copied)
     words = ["init", copied / "plate.bdf", copied / "poles.csv", "--units", "SI"]
     said = ran(*words, "--out", tmp_path / "out").output
-    assert "not ready yet: the deck has neither shells nor beams" in said
+    assert "not ready yet: the deck has no shells, beams or solids" in said
     assert "calibrate and correlate accept any deck" in said
 
 

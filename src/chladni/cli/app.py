@@ -41,6 +41,7 @@ BUILT_IN = (  # each a module here with a function ``run``, or ``STEPS`` of a co
     "map",
     "render",
     "report",
+    "next",
 )
 OF_CHECKOUT = {"blind": "chladni_evidence.blind_command"}  # evidence/: no wheel holds it
 DONE, FAILED, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 1, 2, 3, 130

@@ -14,12 +14,12 @@ computed when they are read, so that only the fits that decide are made.
 
 from .answer import with_ties
 from .decision_rules import RULES
-from .hypotheses import Hypotheses, Hypothesis, fits
+from .hypotheses import Explanation, Hypotheses, fits
 from .judgement import apply_held_out, tested, untested
 from .named_sets import largest_named
 from .reasons import ALONE, Decision, Reason, Step
 
-Passed = tuple[tuple[Hypothesis, Reason], ...]
+Passed = tuple[tuple[Explanation, Reason], ...]
 
 
 def decide(case: Hypotheses) -> Decision:
@@ -116,7 +116,7 @@ def _alternatives_tested(case: Hypotheses, refused: Decision) -> Decision:
 
 
 def _decided_next(
-    case: Hypotheses, refused: Decision, alternative: Hypothesis, over: Passed
+    case: Hypotheses, refused: Decision, alternative: Explanation, over: Passed
 ) -> Decision:
     """Test a rival, placed in front of the explanations that were passed over."""
     made = alternative.numbers.refined
@@ -132,7 +132,7 @@ def _decided_next(
     return apply_held_out(case, led) if led.named else led
 
 
-def _against(lead: Hypothesis, following: Decision) -> Reason | None:
+def _against(lead: Explanation, following: Decision) -> Reason | None:
     """Return the reason that refutes a rival which passed its own tests, or None.
 
     Modal damping that follows the leader's change refutes a lossless rival.

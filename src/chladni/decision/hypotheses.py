@@ -35,15 +35,15 @@ class Numbers(Protocol):
         """Q of its deck."""
 
     @property
-    def refined(self) -> "Hypothesis":
+    def refined(self) -> "Explanation":
         """The hypothesis, fitted again on a reduced model that is accurate enough for it."""
 
-    def p_after(self, leader: "Hypothesis") -> float:
+    def p_after(self, leader: "Explanation") -> float:
         """P of the test that the damping it leaves follows the change by a leader."""
 
 
 @dataclass(frozen=True, eq=False)
-class Hypothesis:
+class Explanation:
     """One hypothesis; calibration alone has no names.
 
     Attributes
@@ -137,7 +137,7 @@ class EffectSet:
     news : gain of member k on the held-out data, with the others in place
     """
 
-    hypothesis: Hypothesis
+    hypothesis: Explanation
     gains: tuple[float, ...]
     due: float
     ahead: float
@@ -171,8 +171,8 @@ class Hypotheses:
     families : number of known families, used where none was tried
     """
 
-    null: Hypothesis
-    singles: tuple[Hypothesis, ...] = ()
+    null: Explanation
+    singles: tuple[Explanation, ...] = ()
     sets: tuple[EffectSet, ...] = ()
     nominal: float = 0.0
     poles: bool = False
@@ -180,11 +180,11 @@ class Hypotheses:
     contradicted: bool = True
     families: int = 1
 
-    def gain(self, one: Hypothesis) -> float:
+    def gain(self, one: Explanation) -> float:
         """Gain over calibration alone, in -2 ln evidence."""
         return self.null.neg2_log_evidence - one.neg2_log_evidence
 
-    def due(self, one: Hypothesis | None, more: int = 0) -> float:
+    def due(self, one: Explanation | None, more: int = 0) -> float:
         """Gain required to name one; ``more`` sets count in addition to the families tried.
 
         A property that a material usually has is no false alarm (wood is stiffer along its grain).

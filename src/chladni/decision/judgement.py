@@ -1,10 +1,10 @@
 """Judge one hypothesis: the test of fit, the held-out data, and its deck."""
 
-from .hypotheses import Hypotheses, Hypothesis
+from .hypotheses import Explanation, Hypotheses
 from .reasons import Decision, Reason, Step
 
 
-def tested(decision: Decision, one: Hypothesis) -> Decision:
+def tested(decision: Decision, one: Explanation) -> Decision:
     """Name a hypothesis if it fits, and refuse it otherwise."""
     decision = decision.then(Step(Reason.TESTED, one), tested=one)
     if one.fits:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 from typing import Any
 
-from .hypotheses import EffectSet, Hypothesis
+from .hypotheses import EffectSet, Explanation
 
 ALONE = "calibration alone"
 BEYOND = "an effect outside the catalogue"
@@ -55,7 +55,7 @@ class Step:
     """
 
     reason: Reason
-    of: Hypothesis | None = None
+    of: Explanation | None = None
     why: Reason | None = None
     whole: EffectSet | None = None
     member: int = 0
@@ -82,15 +82,15 @@ class Decision:
     """
 
     verdict: str
-    order: tuple[Hypothesis, ...] = ()
+    order: tuple[Explanation, ...] = ()
     reason: Reason = Reason.NOTHING_DUE
     due: float = 0.0
     named: bool = False
     one_of: tuple[str, ...] = ()
-    tested: Hypothesis | None = None
+    tested: Explanation | None = None
     news: float | None = None
     whole: EffectSet | None = None
-    passed_over: tuple[tuple[Hypothesis, Reason], ...] = ()
+    passed_over: tuple[tuple[Explanation, Reason], ...] = ()
     steps: tuple[Step, ...] = ()
 
     @property

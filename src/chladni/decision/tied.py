@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 from .decision_rules import TIED
-from .hypotheses import Hypothesis
+from .hypotheses import Explanation
 
 FOOT = 0.01  # of the gain (a tenth of the amplitude), by which a simpler effect may fall behind
 
 
-def leading(rows: Sequence[Hypothesis], null: float) -> int:
+def leading(rows: Sequence[Explanation], null: float) -> int:
     """Index of the leading row: the first, unless a later one is to be preferred.
 
     A resonator tuned above all spectral lines acts as a point mass. The simpler effect leads,
@@ -32,12 +32,12 @@ def leading(rows: Sequence[Hypothesis], null: float) -> int:
     return 0
 
 
-def same(row: Hypothesis, name: str) -> bool:
+def same(row: Explanation, name: str) -> bool:
     """True if an explanation reduces to a named simpler one, as fitted or within its intervals."""
     return name in (row.becomes, row.nearly)
 
 
-def tied(best: Hypothesis, rows: Sequence[Hypothesis], gap: float = TIED) -> tuple[str, ...]:
+def tied(best: Explanation, rows: Sequence[Explanation], gap: float = TIED) -> tuple[str, ...]:
     """Names of the rows that explain the data as well as the best one, whose own name is first.
 
     A row that reduces to the best one, as fitted or within its intervals, is left out. A simpler

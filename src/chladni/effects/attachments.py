@@ -15,8 +15,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.facets import cell_normals, tangents
+from ..model.assembly import Assembly
 from .effect import WIDER, Effect, Parameter, PointTerm, Traits, Weight
-from .effect_context import EffectContext, ElementGrids
+from .effect_context import EffectContext, ElementGrids, surface
 from .estimate import Estimate, Location, in_mm
 from .search_context import Candidate, SearchContext, best_places, valleys
 
@@ -133,7 +134,7 @@ def _in_face(where: EffectContext, normal: np.ndarray) -> np.ndarray:
     The normal of a grid on a fold is that of neither face, yet both faces reach as far as the fold.
     """
     spots, assembly = where.grids, where.groups.structure.assembly
-    cells = assembly.shells.nodes
+    cells = surface(assembly)
     facing = np.abs(cell_normals(assembly.points, cells) @ normal) > FACING
     bordering = np.isin(spots.grids, assembly.ids[np.unique(cells[facing])])
     return ((np.abs(spots.normal @ normal) > FACING) | bordering) & (spots.line < 0)
@@ -195,6 +196,12 @@ class MovableAttachment(Effect):
     def at(self, x: np.ndarray) -> np.ndarray:
         """The place in the basic frame (3,) [m]."""
         return self.patch.origin + self.patch.inside(self.patch.size * x[1:3]) @ self.patch.plane
+
+    def written_at(self, assembly: Assembly, x: np.ndarray) -> np.ndarray:
+        """The place (3,) in a deck: that of the nearest grid if no element turns it with an arm."""
+        row = assembly.rows([self.nearest(x)])[0]
+        turns = (row == assembly.shells.nodes).any() or (row == assembly.beams.nodes).any()
+        return self.at(x) if turns else np.asarray(assembly.points[row])
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The strength; ``location`` holds the place."""

@@ -86,7 +86,7 @@ class LineFinder:
             return None
         along = unit(flat)
         d, least = self.middle - self.middle[shell], REACH * SHELLS * self.width[shell]
-        half = max(self._half(shell, times), least)
+        half = max(self.half(shell, times), least)
         inside = (np.abs(d @ along) <= half) & (np.abs(d @ n) <= half / 2)
         inside &= np.abs(d @ np.cross(n, along)) <= WIDE * self.width
         p = int(self.part[shell])
@@ -95,7 +95,7 @@ class LineFinder:
             return None
         return Line(shells, self.middle[shells].mean(axis=0), p, shell, along, times)
 
-    def _half(self, shell: int, times: float) -> float:
+    def half(self, shell: int, times: float) -> float:
         """Half of ``times`` the usual length [m]."""
         return 0.5 * LENGTH * times * self.size[int(self.part[shell])]
 
@@ -119,12 +119,12 @@ class LineFinder:
             for j in mine[d <= NEIGHBOUR_DISTANCE * self.width[k]]
             if j != k
         ]
-        across, half = np.cross(n, line.direction), self._half(k, line.times)
+        across, half = np.cross(n, line.direction), self.half(k, line.times)
         turned = [(np.cos(a) * line.direction + np.sin(a) * across, line.times) for a in TURNS]
         stretched = [(line.direction, line.times * f) for f in STRETCHED]
         for direction, times in (*turned, *stretched):
             if SHORTEST <= times <= LONGEST:
-                shift = self._half(k, times) * direction - half * line.direction
+                shift = self.half(k, times) * direction - half * line.direction
                 middles = nearest_points(self.middle[mine], x + np.outer((-1, 0, 1), shift))
                 found += [self.through(int(j), direction, times) for j in mine[middles]]
         return _different(found)
@@ -135,13 +135,13 @@ def _different(lines: Sequence[Line | None]) -> list[Line]:
     return list({line.shells.tobytes(): line for line in lines if line is not None}.values())
 
 
-def _far_apart(score: np.ndarray, centre: np.ndarray) -> list[int]:
+def far_apart(score: np.ndarray, centre: np.ndarray, wanted: int) -> list[int]:
     """The best lines at a minimum distance: far from a crack the scores have no valleys."""
     reach, out = APART * np.linalg.norm(np.ptp(centre, axis=0)), list[int]()
     for k in np.argsort(score):
         if all(np.linalg.norm(centre[k] - centre[j]) > reach for j in out):
             out.append(int(k))
-    return out[:BEGUN]
+    return out[:wanted]
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,26 +259,29 @@ def _at_rest(
 
     def scores(drawn: Sequence[Line]) -> np.ndarray:
         """Score of each line; a line that would gain stiffness explains nothing."""
-        fresh = [line.shells for line in drawn if line.shells.tobytes() not in known]
-        amount, score = scan.bending_scores(about, fresh)
+        keys = [line.shells.tobytes() for line in drawn]
+        fresh = {key: line.shells for key, line in zip(keys, drawn, strict=True)}
+        fresh = {key: shells for key, shells in fresh.items() if key not in known}
+        amount, score = scan.bending_scores(about, list(fresh.values()))
         score = np.where(amount < 0, score, np.inf)
-        known.update((s.tobytes(), float(v)) for s, v in zip(fresh, score, strict=True))
-        return np.array([known[line.shells.tobytes()] for line in drawn])
-
-    def at_rest(line: Line) -> Line:
-        """Move a line until no neighbour explains more."""
-        while near := lines.moved(line):
-            score = scores([line, *near])
-            best = int(np.argmin(score))
-            if not score[best] < score[0] - WORTH:
-                break
-            line = near[best - 1]
-        return line
+        known.update(zip(fresh, map(float, score), strict=True))
+        return np.array([known[key] for key in keys])
 
     score = scores(first)
-    begun = _far_apart(score, np.array([line.centre for line in first]))
-    ends = _different([at_rest(first[k]) for k in begun if np.isfinite(score[k])])
-    return ends, len(known)
+    begun = far_apart(score, np.array([line.centre for line in first]), BEGUN)
+    ends = [first[k] for k in begun if np.isfinite(score[k])]
+    moving = list(range(len(ends)))
+    while moving:
+        near = {k: [ends[k], *lines.moved(ends[k])] for k in moving}
+        every = iter(scores([line for each in near.values() for line in each]))
+        moving = []
+        for k, each in near.items():
+            own = [next(every) for _ in each]
+            best = int(np.argmin(own))
+            if own[best] < own[0] - WORTH:
+                ends[k] = each[best]
+                moving.append(k)
+    return _different(ends), len(known)
 
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:

@@ -235,6 +235,11 @@ class Effect:
     #: identified damping with which it is compared as well, because it dissipates
     damping: IdentifiedDamping | None = None
 
+    @property
+    def axis_1(self) -> np.ndarray | None:
+        """Axis 1 (3,) of the components of the plane stiffness; None: the deck's material axis."""
+        return None
+
     def terms(self, x: np.ndarray) -> tuple[Term, ...]:
         """Everything that the effect adds to the model at x, with exact gradients."""
         return ()

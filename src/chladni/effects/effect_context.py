@@ -12,6 +12,8 @@ from ..fem.locate import Share
 from ..geometry.beam_lines import lines
 from ..geometry.facets import point_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample
+from ..geometry.solid_faces import skin
+from ..model.assembly import Assembly
 from .element_groups import ElementGroups
 from .identified_damping import IdentifiedDamping
 
@@ -40,8 +42,9 @@ class Setup:
 class ElementGrids:
     """Grids of shells and beams that are possible places of an effect, each with a direction.
 
-    A grid of shells is listed once, with the normal of the surface. A grid of beams is listed once
-    for every direction across a beam that ends there.
+    A grid of shells is listed once, with the normal of the surface. Solids without shells and beams
+    have their outer faces for shells. A grid of beams is listed once for every direction across a
+    beam that ends there.
     """
 
     grids: np.ndarray  # (k,) ids
@@ -77,10 +80,18 @@ class ElementGrids:
         return np.concatenate([np.zeros(0, int), *order])
 
 
+def surface(assembly: Assembly) -> np.ndarray:
+    """Shells as cells (m, 4); outer faces of the solids, where these are all that there is."""
+    if len(assembly.shells) or len(assembly.beams):
+        return assembly.shells.nodes
+    faces = [skin(s.nodes, s.part)[0] for s in assembly.solids if len(s)]
+    return np.concatenate([assembly.shells.nodes, *faces]).astype(int)
+
+
 def element_grids(groups: ElementGroups) -> ElementGrids:
-    """All grids of shells that can move along their normal, and of beams that can move across."""
+    """All grids of a surface that can move along its normal, and of beams that can move across."""
     assembly = groups.structure.assembly
-    normal = point_normals(assembly.points, assembly.shells.nodes)
+    normal = point_normals(assembly.points, surface(assembly))
     on_shells = np.flatnonzero(normal.any(axis=1))
     none = np.full(len(on_shells), -1), np.zeros((len(on_shells), 3))
     on_beams, *of_beams = _across_beams(groups)

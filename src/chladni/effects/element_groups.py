@@ -132,14 +132,22 @@ class ElementGroups:
         ).tocsr()
         return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
 
-    def components(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
+    def components(
+        self, axis: np.ndarray | None = None
+    ) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
         """``linear`` and ``cubic`` for each component of the plane stiffness; beams go with Q66.
+
+        Axis 1 of the components is that of the deck, or the projection of ``axis`` (3,).
 
         They come one at a time, because all of them together would double the memory of a large
         model.
         """
-        m = len(self.structure.assembly.shells)
-        for name, pair in component_matrices(self.structure.assembly):
+        made = self.structure.assembly
+        m = len(made.shells)
+        if axis is not None:
+            along = np.broadcast_to(axis, made.shells.axis.shape)
+            made = replace(made, shells=replace(made.shells, axis=along))
+        for name, pair in component_matrices(made):
             beams = [A[m:] if name == "Q66" else 0 * A[m:] for A in (self.linear, self.cubic)]
             A, B = (_stacked(*both) for both in zip(pair, beams, strict=True))
             yield name, (A, B)
@@ -283,7 +291,11 @@ class _Elements(NamedTuple):
 
 
 def _shells(assembly: Assembly) -> _Elements:
-    shells = assembly.shells
+    shells, none = assembly.shells, np.zeros((0, 24, 24))
+    if not len(shells):  # nor perhaps any part
+        return _Elements(
+            none, none, none, shells.nodes, np.zeros((0, 3)), none[:, 0, 0], shells.part
+        )
     geo = shell.geometry(assembly.points, shells)
     arrays = section_arrays(assembly, geo)
     linear, cubic = thickness_split(assembly, geo, arrays)

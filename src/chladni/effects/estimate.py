@@ -38,7 +38,7 @@ class Location:
     parts : names of parts
     grids : ids of grids
     point_m : place in the basic frame [m]
-    radius_m : extent of a distributed effect, or uncertainty of the place of a local one [m]
+    radius_m : the place lies within it with 95 % [m]; of a hem the extent
     band_hz : band that it concerns [Hz]
     channels : labels of the channels that it concerns
     """

@@ -12,7 +12,7 @@ from ..fem.energy import mass_properties
 from ..geometry.sampling import nearest_points
 from ..model.assembly import Assembly
 from .effect import Effect
-from .effect_context import EffectContext
+from .effect_context import EffectContext, surface
 from .search_context import Candidate, SearchContext, best_starts
 
 
@@ -65,8 +65,8 @@ class Article:
         return np.asarray(self.deck.points[self.deck.rows([grid])[0]])
 
     def shell_grid(self, rng: np.random.Generator) -> int:
-        """Id of a random grid of the deck's shells, or of its beams if it has no shells."""
-        nodes = self.deck.shells.nodes if len(self.deck.shells) else self.deck.beams.nodes
+        """Id of a random grid of the deck's surface, or of its beams if it has no shells."""
+        nodes = surface(self.deck) if len(surface(self.deck)) else self.deck.beams.nodes
         return int(self.deck.ids[rng.choice(np.unique(nodes))])
 
 

@@ -118,7 +118,7 @@ class PointMass(MovableMass):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a CONM2 at the nearest grid, offset to the place."""
         m, grid = self.parameters[0].value(x[0]), self.nearest(x)
-        offset = self.at(x) - assembly.points[assembly.rows([grid])[0]]
+        offset = self.written_at(assembly, x) - assembly.points[assembly.rows([grid])[0]]
         return with_masses(assembly, (grid,), m, offset)
 
 
@@ -197,7 +197,8 @@ class LocalResonator(MovableMass):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write a GRID with CONM2, on a CBUSH from the nearest grid."""
         m, k = self.values(x)
-        return with_oscillator(assembly, self.nearest(x), self.at(x), self.direction, m, k)
+        place = self.written_at(assembly, x)
+        return with_oscillator(assembly, self.nearest(x), place, self.direction, m, k)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Mass and frequency; ``location`` holds the place."""

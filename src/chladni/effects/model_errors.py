@@ -14,8 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dynamics.modes import ModalModel
-from ..fem.assemble import Structure
-from ..fem.modelled import Modelled, modelled
+from ..dynamics.reduction import iterated
+from ..fem.assemble import Structure, structure
+from ..fem.modelled import Modelled, solved
 from ..geometry.facets import cell_areas
 from ..geometry.folds import share_at_folds
 from ..geometry.footprints import on_smaller_shells, regions_of_joints
@@ -28,6 +29,9 @@ from .element_groups import ElementGroups
 MOST_DOFS = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
 LARGE = 20_000  # dofs from which refined modes are solved only up to the comparison limit
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
+FAR = (
+    0.1  # largest change of a frequency for which modes of the deck are near those of a finer mesh
+)
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
 FOOTPRINT = 0.5, 0.7  # prior of the footprint error: as in the deck, half or a quarter as wide
@@ -102,19 +106,30 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     The refined modes Ψ at the old points are paired with the modes Φ. B = ΦᵀMΨ is made orthogonal,
     softest modes first, and Λ^½ e^L Λ^½ = B Λ_ref Bᵀ. B is square, so that x = 1 gives the refined
     frequencies exactly.
+
+    Ψ begins with Φ. :func:`.iterated` leaves the square of what the mesh changes, times
+    (λ_r/λ_m)² a step, λ_m that of the last mode it begins with. No count proves Ψ complete.
     """
     built = model.structure
     made = built.assembly
     if len(built.system.dofs) > MOST_DOFS or not len(made.shells) + len(made.beams):
         return []
     above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
+    band = above[1] * f_max
     coarse = _CoarseModes.of(
         built, _flexible(model.up_to(above[0] * f_max), f_max), places or _nowhere
     )
+    begun = built.system.M @ model.up_to(min(band, model.band)).shapes
+    lowest = float(coarse.omega.min(initial=2 * np.pi * f_max)) / (2 * np.pi)
 
     def change(finer: Assembly) -> _ModalChange:
-        solved = modelled(finer, above[1] * f_max)
-        return coarse.changed_to(solved.structure, _flexible(solved.modes, f_max))
+        made = structure(finer)
+        loads = made.rows(built.system.dofs).T @ begun
+        modes = iterated(made.system, loads, lowest / 2)
+        near = coarse.changed_to(made, _flexible(modes.sel(modes.frequency < band), f_max))
+        if near.largest(f_max) < FAR:
+            return near
+        return coarse.changed_to(made, _flexible(solved(made, band).modes, f_max))
 
     fine = refined(built.assembly)
     of_shells = change(fine)
@@ -155,6 +170,11 @@ class _ModalChange:
     def __sub__(self, other: Self) -> Self:
         """The difference of two changes."""
         return replace(self, log=self.log - other.log, seen=self.seen - other.seen)
+
+    def largest(self, f_max: float) -> float:
+        """Largest relative change of a frequency up to ``f_max`` [Hz]."""
+        within = self.omega <= 2 * np.pi * f_max
+        return float(np.abs(self.log.diagonal()[within]).max(initial=0.0)) / 2
 
     def error(self, kind: type[MeshError], prior: tuple[float, float]) -> MeshError:
         """The nuisance effect with this change."""

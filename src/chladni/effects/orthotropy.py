@@ -19,6 +19,8 @@ from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 
+SQUARE = 1e-3  # relative difference of two extents below which neither is the longest
+
 
 @dataclass(frozen=True)
 class Orthotropy:
@@ -85,6 +87,11 @@ class OrthotropicMaterial(Effect):
         E1, E2 = self.E * np.exp(x[0]), self.E * np.exp(x[1])
         G12 = self.E / (2 * (1 + self.nu)) * np.exp(x[2])
         return float(E1), float(E2), float(G12), float(_mean_ratio(x[3]) * np.sqrt(E1 / E2))
+
+    @property
+    def axis_1(self) -> np.ndarray:
+        """Material axis 1, along which the components of the plane stiffness act."""
+        return self.axis
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """E1, E2, G12 and nu12."""
@@ -215,13 +222,18 @@ def isotropic(part: Part) -> Isotropic | None:
 def _extents(groups: ElementGroups, inside: np.ndarray) -> list[np.ndarray]:
     """Principal directions of some groups, longest first, snapped to nearby coordinate axes.
 
-    The third, if any, is across the sheet.
+    The third, if any, is across the sheet.  A square has none: it gets coordinate axes.
     """
-    centre, area = groups.centre[inside], groups.area[inside]
+    made = groups.structure.assembly
+    chosen = inside[groups.group[: len(made.shells)]]
+    centre = made.points[made.shells.nodes[chosen]].mean(axis=1)
     if len(centre) < 3:
         return list(np.eye(3))
-    X = centre - np.average(centre, axis=0, weights=area)
-    at = [(d, int(np.argmax(np.abs(d)))) for d in np.linalg.svd(X, full_matrices=False)[2]]
+    X = centre - centre.mean(axis=0)
+    _, size, directions = np.linalg.svd(X, full_matrices=False)
+    if size[1] > (1 - SQUARE) * size[0]:
+        return [np.eye(3)[k] for k in np.argsort(-np.ptp(X, axis=0).round(9), kind="stable")]
+    at = [(d, int(np.argmax(np.abs(d)))) for d in directions]
     return [np.eye(3)[k] if abs(d[k]) > 0.98 else d for d, k in at]
 
 

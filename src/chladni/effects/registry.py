@@ -20,9 +20,11 @@ from . import (
     hems,
     masses,
     membrane_prestress,
+    open_joints,
     orthotropy,
     sheets,
     springs,
+    stiffener,
     welds,
 )
 from .family import Family
@@ -35,11 +37,13 @@ BUILT_IN = (
     springs.SUPPORT,
     springs.SUSPENSION,
     sheets.THICKNESS,
+    sheets.DOUBLER,
     channels.FAMILY,
     masses.RESONATOR,
     sheets.STIFFNESS,
     sheets.MASS,
     crack.FAMILY,
+    stiffener.FAMILY,
     membrane_prestress.FAMILY,
     welds.MISSING,
     welds.COMPLIANCE,
@@ -48,6 +52,7 @@ BUILT_IN = (
     contacts.FAMILY,
     welds.TIE,
     compliant_support.FAMILY,
+    open_joints.FAMILY,
     springs.SHAKER,
     adhesive.FAMILY,
 )

@@ -19,7 +19,10 @@ NEIGHBOURS = 6  # places round a place of a sheet
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect worth a fit: its start (n_p,), and the start of the base effects (n_base,)."""
+    """An effect worth a fit, its start (n_p,), and the start of the base effects (n_base,).
+
+    That of the base is for poles; with responses it follows from the own optimum of the effect.
+    """
 
     effect: Effect
     start: np.ndarray

@@ -59,6 +59,9 @@ def in_bands(
     return replace(assembly, parts=tuple(parts), shells=replace(assembly.shells, part=part))
 
 
+SAG = 0.05  # of a shell: a centre as near to the chords of a curved sheet lies on it
+
+
 @dataclass(frozen=True, eq=False)
 class Quadric:
     """c(u) = c0 + u E + h(u) n, h the quadric a + b u + ... that follows a sheet about c0.
@@ -196,20 +199,27 @@ class SheetPatch(Effect):
         return float(self.size * np.exp(x[1]))
 
     def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
-        """The fitted place, where the change of the sheet is largest."""
+        """The fitted place, where the change of the sheet is largest, and its 95 % radius [m]."""
         grid, deepest = self.deepest(x)
         point = tuple(float(v) for v in deepest)
         text = f"on {self.parts[0]} near ({in_mm(point)} mm)"
-        radius = self.radius_at(x)
+        far = None if sd is None else 1.96 * self.size * float(self.widened(sd)[2:4].max())
+        radius = None if far is None else max(far, self.spacing)
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
 
     def deepest(self, x: np.ndarray) -> tuple[int, np.ndarray]:
-        """Grid and point with the largest q: c, or the nearest grid if c is off the sheet."""
+        """Nearest grid, and point with the largest q: c, or near it a point of the sheet.
+
+        The nearest grid stands for a centre that is far off the sheet.
+        """
         c = self.at(x)
         d2 = ((self.points - c) ** 2).sum(axis=1)
-        k = int(np.argmin(d2))
-        outside = d2[k] > max(0.25 * self.radius_at(x), self.spacing) ** 2
-        return int(self.ids[k]), self.points[k] if outside else c
+        near = np.argsort(d2)[:4]
+        if d2[near[0]] > max(0.25 * self.radius_at(x), self.spacing) ** 2:
+            return int(self.ids[near[0]]), self.points[near[0]]
+        on_sheet = nearest_mean(self.points[near], c)
+        off = np.linalg.norm(on_sheet - c) > SAG * self.spacing
+        return int(self.ids[near[0]]), on_sheet if off else c
 
     @classmethod
     def candidates(cls, context: SearchContext) -> list[Candidate]:
@@ -275,6 +285,21 @@ class SheetLoss(SheetPatch):
         q = float(self.bump(x, self.deepest(x)[1][None])[0])
         here, *ends = (self.value_of(q * self.lost(x[0] + s * reach)) for s in (0, -1, 1))
         return replace(rows[0], value=here, low=min(ends), high=max(ends)), rows[1]
+
+
+def nearest_mean(points: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """The point Σ w_i p_i nearest to c, with w_i >= 0 and Σ w_i = 1.
+
+    >>> nearest_mean(np.eye(3)[:2], np.array([0.0, 2.0, 1.0])).round(6)
+    array([0., 1., 0.])
+    """
+    from scipy.optimize import nnls
+
+    heavy = 1e4 * np.ptp(points, axis=0).max(initial=0.0)
+    local = (points - points.mean(axis=0)).T
+    w, _ = nnls(np.vstack([local, np.full(len(points), heavy)]),
+                np.append(c - points.mean(axis=0), heavy))  # fmt: skip
+    return np.asarray((w / w.sum()) @ points)
 
 
 def random_place(article: Article, rng: np.random.Generator) -> np.ndarray:

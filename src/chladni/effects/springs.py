@@ -162,7 +162,7 @@ class ExtraSupport(MovableAttachment):
         """Write a CBUSH to ground at the place, attached to the nearest grid."""
         row = assembly.rows([self.nearest(x)])
         k, d = self.parameters[0].value(x[0]), self.pushes(x)
-        return with_ground_bushes(assembly, row, d[None], k, self.at(x)[None])
+        return with_ground_bushes(assembly, row, d[None], k, self.written_at(assembly, x)[None])
 
     def location(self, x: np.ndarray, sd: np.ndarray | None = None) -> Location:
         """The fitted place, and the direction where it is not across the sheet."""

@@ -79,6 +79,11 @@ class UserParameter(Effect):
         every = (t for m in self.members for t in m.terms(y))
         return tuple(replace(t, gradient=slope * t.gradient) for t in every)
 
+    @property
+    def axis_1(self) -> np.ndarray | None:
+        """Material axis 1 of the first member that has one."""
+        return next((m.axis_1 for m in self.members if m.axis_1 is not None), None)
+
     def weight(self, x: np.ndarray) -> Weight:
         """Mass of all members."""
         y, slope = self.y(x)

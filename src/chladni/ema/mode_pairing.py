@@ -6,6 +6,8 @@ import numpy as np
 
 from ..errors import ShapeError
 
+LEAST_CHANNELS = 3  # on fewer all shapes look similar, so that modes are paired by frequency
+
 
 @dataclass(frozen=True, eq=False)
 class ModePairs:

@@ -19,6 +19,7 @@ from .channel_delays import channel_delays
 from .finding import Check, Finding, Screening
 from .frf_maps import Misreading, mapped, misreadings
 from .identification import Identified, identify
+from .roving_mass import roving_mass
 from .screening import levels_checked
 from .setup import Recording
 from .shapes import lines_per_bandwidth
@@ -74,6 +75,9 @@ def screened(
     more, check = levels_checked(recording, others)
     findings += more
     checks += check
+    more, one = roving_mass(frf, found)
+    findings += more
+    checks.append(one)
     if found is not None:
         strong = strong_modes(found)
         read = other_readings(frf, strong, use) if alone else []

@@ -8,12 +8,10 @@ from scipy.special import gammaincc
 
 from ..dynamics.frf import FRF
 from ..errors import ShapeError, named
-from .correlation import wrapped
+from .correlation import log10
 from .finding import Check, Finding, probability
 from .response_variance import moving_mean
 from .setup import Recording
-
-_LN10 = np.log(10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +67,7 @@ def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
     noise = noise_of(low)[at] + _interpolated(f, high.frequency, noise_of(high)).real
     rounding = 1e-12 * np.abs(H1) ** 2 + 1e-300
     whitened = np.abs(H2 - H1) ** 2 / np.maximum(moving_mean(noise, _POOLED), rounding)
-    delta = wrapped(np.log(H2 / H1) / _LN10)
+    delta = log10(H2 / H1)
     ratio, rms = float(whitened.mean()), float(np.sqrt((np.abs(delta) ** 2).mean()))
     limit = 1 + max(_CHANCE, 5 / np.sqrt(whitened.size))
     linear = bool(ratio <= limit or rms <= least)

@@ -76,7 +76,10 @@ def bulges(points: np.ndarray, cells: np.ndarray, edges: np.ndarray, of: np.ndar
 def _smooth(
     sides: _Sides, facet: np.ndarray, rows: np.ndarray, d: np.ndarray, count: int
 ) -> np.ndarray:
-    """Edges (count,) of two shells whose angle does not stand out from the next parallel sides."""
+    """Edges (count,) of two shells whose angle does not stand out from the next parallel sides.
+
+    It takes three such angles in a row: two are also those of a profile of three flat strips.
+    """
     order = np.argsort(sides.edge, kind="stable")
     first = np.searchsorted(sides.edge[order], np.arange(count))
     shared = np.flatnonzero(np.bincount(sides.edge, minlength=count) == 2)
@@ -90,15 +93,18 @@ def _smooth(
     of_first[shared], of_second[shared] = angle, same * angle  # with the normal of either shell
     leader = np.full(count, -1)
     leader[shared] = sides.cell[a]
-    out, known = np.zeros(len(shared), bool), np.zeros(len(shared), bool)
-    for side, own in ((a, angle), (b, same * angle)):
-        quad, further = sides.count[sides.cell[side]] == 4, sides.turned(2)[side]
-        leads = leader[further] == sides.cell[side]
-        other = np.where(quad, np.where(leads, of_first[further], of_second[further]), np.nan)
-        known |= np.isfinite(other)
-        out |= (other * own <= 0) | (np.abs(own) > STANDS_OUT * np.abs(other))
+    further = np.stack([sides.turned(2)[a], sides.turned(2)[b]])
+    own = np.stack([angle, same * angle])
+    leads = leader[further] == np.stack([sides.cell[a], sides.cell[b]])
+    other = np.where(leads, of_first[further], of_second[further])
+    other[np.stack([sides.count[sides.cell[a]], sides.count[sides.cell[b]]]) == 3] = np.nan
+    alike = (other * own > 0) & (np.abs(own) <= STANDS_OUT * np.abs(other))
+    number = np.zeros(count, int)
+    number[shared] = alike.sum(axis=0)
+    in_row = (number[shared] == 2) | (alike & (number[further] == 2)).any(axis=0)
+    curve = in_row & (alike | np.isnan(other)).all(axis=0)
     size, smooth = np.abs(angle), np.zeros(count, bool)
-    smooth[shared] = (size < FLAT) | ((size < SHARP) & known & ~out)
+    smooth[shared] = (size < FLAT) | ((size < SHARP) & curve)
     return smooth
 
 

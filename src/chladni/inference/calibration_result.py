@@ -105,7 +105,7 @@ class Basin:
 
 @dataclass(frozen=True)
 class LikelihoodProfile:
-    """-2 ln of the profile likelihood of a parameter above its minimum.
+    """-2 ln of the profile of likelihood and priors of a parameter, above the best fit.
 
     Every other parameter is fitted again at each value.  ``quadratic`` is what the covariance
     predicts: where both agree, the interval of the table holds.

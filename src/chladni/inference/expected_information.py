@@ -93,16 +93,16 @@ class Rivals:
         log = self.log_density(G, t) + np.log(self.probability)[:, None]
         return np.asarray(np.exp(log - logsumexp(log, axis=0)))
 
-    def drawn(self, G: np.ndarray, j: int, ξ: np.ndarray, η: np.ndarray) -> np.ndarray:
+    def drawn(self, G: np.ndarray, j: int, known: np.ndarray, noise: np.ndarray) -> np.ndarray:
         """T (count, n) of data under hypothesis j.
 
         Parameters
         ----------
-        ξ, η : (count, n) standard normal; ξ holds what is unknown of the object, η the noise
+        known, noise : (count, n) standard normal, for what is unknown of the object and for noise
         """
         at = self.columns.factors[j]
         mean = (G @ self.columns.shift(j))[:, None]
-        return mean + G[:, at] @ ξ[at] + root(G) @ η
+        return mean + G[:, at] @ known[at] + root(G) @ noise
 
     def forecast(self, G: np.ndarray, draws: int = DRAWS) -> "Forecast":
         """Expect the outcome of a measurement with this Gram matrix."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import logsumexp
@@ -17,7 +18,9 @@ from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN
 from .likelihood import Data, Responses
+from .linear_model import LinearModel
 from .map_fit import Fit, MassMeasurement, constants, fit, linearised_fit, prior_residuals
+from .own_optimum import Base, LocalOptimum, distinct, own_optimum
 from .pole_data import SCALE, SCALE_SD, Poles
 
 FAILED = (ModelError, np.linalg.LinAlgError)  # of a fit: its hypothesis is lost, and no other
@@ -25,27 +28,6 @@ ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the
 
 
 NEARLY = 6.0  # in -2 ln evidence: an optimum so much worse still has a share of 5 %
-
-
-@dataclass(frozen=True, eq=False)
-class LocalOptimum:
-    """An effect at one optimum of its family: its parameters and standard deviations (n_p,)."""
-
-    effect: Effect
-    neg2_log_evidence: float
-    x: np.ndarray
-    sd: np.ndarray
-
-    def same(self, other: "LocalOptimum") -> bool:
-        """True if both are one optimum: places or parameters agree within their uncertainty."""
-        if self.effect.text == other.effect.text:
-            sd = np.maximum(self.sd, other.sd)
-            return bool((np.abs(self.x - other.x) <= 2 * sd).all())
-        mine, its = (v.effect.location(v.x, v.sd) for v in (self, other))
-        if None in (mine.point_m, its.point_m, mine.radius_m, its.radius_m):
-            return False
-        apart = np.linalg.norm(np.subtract(mine.point_m, its.point_m))  # type: ignore[arg-type]
-        return bool(apart <= max(mine.radius_m, its.radius_m))  # type: ignore[type-var, operator]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +86,13 @@ class HypothesisFit:
 
     def among(self, other: "HypothesisFit") -> "HypothesisFit":
         """Keep the optima of another fit of the same family, each once."""
-        kept = [self.own]
-        for v in sorted(
-            (other.own, *self.optima, *other.optima), key=lambda v: v.neg2_log_evidence
-        ):
-            if not any(v.same(known) for known in kept):
-                kept.append(v)
-        return replace(self, optima=tuple(kept[1:]))
+        return self.knowing((other.own, *other.optima))
+
+    def knowing(self, optima: Sequence[LocalOptimum]) -> "HypothesisFit":
+        """Keep other optima of the same family, each once."""
+        return replace(
+            self, optima=tuple(distinct(optima=(*self.optima, *optima), kept=[self.own]))
+        )
 
     def refitted(self, fit: Fit) -> "HypothesisFit":
         """A copy with another fit; the other optima keep their distance in evidence."""
@@ -200,17 +182,47 @@ class UpdatingProblem:
         return np.concatenate([np.zeros(0), *each])
 
     def fitted_with(
-        self, effect: Effect, start: np.ndarray, base: np.ndarray, max_steps: int = 30
-    ) -> HypothesisFit:
-        """Fit one effect together with the base, from these starts."""
-        model = self.reduced.model_for(effect, start)
+        self, effect: Effect, start: np.ndarray, base: np.ndarray, max_steps: int = 30,
+        model: Reduced | None = None,
+    ) -> HypothesisFit:  # fmt: skip
+        """Fit one effect together with the base, from these starts; over the basis for it."""
+        model = self.reduced.model_for(effect, start) if model is None else model
         data = self.data.rebased(model)
         kept = self.without(effect)
-        inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
-        x0 = np.concatenate([base[inside.astype(bool)], start])
+        x0 = np.concatenate([base[self._positions(kept)], start])
         effects, mass = [*kept, effect], self.mass_measurement
         fit = fitted(model, effects, data, mass, x0, max_steps)
         return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
+
+    def own_optimum(
+        self, effect: Effect, start: np.ndarray, bases: Sequence[np.ndarray], model: Reduced
+    ) -> tuple[LocalOptimum, np.ndarray]:
+        """Optimise one effect from a start, the base linear about the best of some (n_base,).
+
+        The second value is the base that goes with it.
+        """
+        kept = self.without(effect)
+        inside = self._positions(kept)
+        about = [self._about(tuple(kept), tuple(x[inside].tolist())) for x in bases]
+        data, mass, whole = self.data.rebased(model), self.mass_measurement, bases[0].copy()
+        found, whole[inside] = own_optimum(model, kept, effect, data, mass, about, start)
+        return found, whole
+
+    def _positions(self, kept: Sequence[Effect]) -> np.ndarray:
+        """Mask over the parameters of the base of some of its effects."""
+        return np.array([e in kept for e in self.base for _ in e.parameters], dtype=bool)
+
+    def _about(self, kept: tuple[Effect, ...], x: tuple[float, ...]) -> Base:
+        """The responses of some base effects linear about x; computed once."""
+        if (kept, x) not in self._linear:
+            at = np.array(x)
+            J = self.data.scaled(evaluate(self.reduced.model, kept, at), True)[1]
+            self._linear[kept, x] = LinearModel(self.data.error, J, np.zeros((0, len(x)))), at
+        return self._linear[kept, x]
+
+    @cached_property
+    def _linear(self) -> dict[tuple[tuple[Effect, ...], tuple[float, ...]], Base]:
+        return {}
 
     def about_itself(self, hypothesis: HypothesisFit, max_steps: int = 30) -> HypothesisFit:
         """Fit a hypothesis again with errors of the model's form about its own state.

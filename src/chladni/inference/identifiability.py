@@ -91,6 +91,15 @@ def information(problem: UpdatingProblem, x: np.ndarray) -> Information:
     return Information(A.T @ A - (A.T @ B) @ mixed, weighing, problem.mass_measurement is not None)
 
 
+def effective_number(problem: UpdatingProblem) -> float:
+    """Effective number of calibration parameters, Σ (1 - σ² after / σ² before) (MacKay 1992).
+
+    A parameter that its prior knows far better than the data takes nothing from them.
+    """
+    found = information(problem, problem.mean())
+    return float(len(found.data) - found.left(np.arange(len(found.data))).sum())
+
+
 def _slopes(data: Responses | Poles, state: State) -> np.ndarray:
     """Slopes of the whitened data; natural frequencies are paired in a wide window first."""
     if not isinstance(data, Poles):

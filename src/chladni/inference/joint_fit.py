@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.effect import Effect, changes_channels
-from ..reduced.reduced_model import State, evaluate
+from ..reduced.reduced_model import State
 from .hypothesis_fit import HypothesisFit
-from .linear_model import LinearModel, Squares
-from .map_fit import MassMeasurement, descend, prior_residuals
+from .linear_model import Squares
+from .map_fit import MassMeasurement, Point, descend, posterior
 
 SharedKey = tuple[str, str, int]  # an effect's name, where it acts, number of the parameter
 Posterior = dict[SharedKey, tuple[float, float]]  # mean and standard deviation
@@ -62,21 +62,24 @@ def joint_fit(
         start[at] = fit.fit.x
     mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
 
-    def objective(x: np.ndarray, gradient: bool) -> tuple[Squares, list[State]]:
+    def objective(x: np.ndarray) -> Point:
         off = (x - mean) / sd
-        found, cost, slope, H = [], float(off @ off), off / sd, np.diag(1 / sd**2)
-        for one, at, mass in zip(states, where, masses, strict=True):
-            state = evaluate(one.model, one.fit.effects, x[at], gradient)
-            r, J = one.data.scaled(state, gradient)
-            weighed, J0 = _weighed(one, mass, x[at], state)
-            linear = LinearModel(one.data.error, J, J0 if gradient else J0[:, :0])
-            own = linear.squares(r, weighed)
-            found.append(state)
-            cost += own.cost
-            if gradient:
+        each = [
+            posterior(one.model, one.fit.effects, one.data, mass, x[at], priors=False)
+            for one, at, mass in zip(states, where, masses, strict=True)
+        ]
+        total = float(off @ off) + sum(point.cost for point in each)
+
+        def sloped() -> tuple[Squares, list[State]]:
+            slope, H, found = off / sd, np.diag(1 / sd**2), list[State]()
+            for point, at in zip(each, where, strict=True):
+                own, there = point.sloped()
                 slope[at] += own.gradient
                 H[np.ix_(at, at)] += own.information
-        return Squares(cost, slope, H), found
+                found.append(there.state)
+            return Squares(total, slope, H), found
+
+        return Point(total, sloped)
 
     limit = np.array([p.step for p in priors])
     x, squares, found, _ = descend(objective, start, limit, max_steps, tol)
@@ -86,14 +89,6 @@ def joint_fit(
         for one, at, state in zip(states, where, found, strict=True)
     )
     return JointFit(x, covariance, tuple(where), shared, fits)
-
-
-def _weighed(
-    one: HypothesisFit, mass: MassMeasurement | None, x: np.ndarray, state: State
-) -> tuple[np.ndarray, np.ndarray]:
-    """The residual and slope of the weighing alone."""
-    r, J = prior_residuals(one.fit.effects, mass, x, state)
-    return r[len(x) :], J[len(x) :]
 
 
 def _positions(

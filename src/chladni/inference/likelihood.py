@@ -11,7 +11,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from ..dynamics.modal_sum import modal_sum
-from ..ema.correlation import wrapped
+from ..ema.correlation import log10, wrapped
 from ..ema.identification import DERIVATIVES
 from ..reduced.matrix_slopes import spanned
 from ..reduced.matrix_stack import EVERY
@@ -125,10 +125,8 @@ class Responses:
 
     def deviation(self, state: State) -> np.ndarray:
         """δ = log10(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in)."""
-        delta = np.log(self.model(state) / self.values) / LN10
-        if state.offset is not None:
-            delta = delta + state.offset[:, None]
-        return wrapped(delta)
+        delta = log10(self.model(state) / self.values)
+        return delta if state.offset is None else wrapped(delta + state.offset[:, None])
 
     def std(self) -> np.ndarray:
         """Standard deviation of δ of each sample, without their dependence."""

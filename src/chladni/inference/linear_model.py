@@ -5,12 +5,11 @@ The covariance is C = I + δ² U diag(s) Uᵀ. Products with its inverse need no
 aᵀ C⁻¹ b = aᵀb - (Uᵀa)ᵀ diag(w) (Uᵀb),   w = δ² s / (1 + δ² s).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
-import scipy.linalg as sl
 
 from .discrepancy import Discrepancy
 
@@ -41,11 +40,27 @@ class Squares:
         """Improvement of the cost by the best step, if residuals are linear."""
         return float(self.gradient @ np.linalg.solve(self.information, self.gradient))
 
+    def profiled(self, n: int) -> Self:
+        """Squares with the best first n parameters for any of the others."""
+        A, g = self.information, self.gradient
+        taken = np.linalg.solve(A[:n, :n], np.column_stack([g[:n], A[:n, n:]]))
+        return replace(
+            self, cost=self.cost - float(g[:n] @ taken[:, 0]),
+            gradient=g[n:] - A[n:, :n] @ taken[:, 0],
+            information=A[n:, n:] - A[n:, :n] @ taken[:, 1:],
+        )  # fmt: skip
+
     def of_some(self, chosen: np.ndarray) -> Self:
         """Squares with the slopes by some parameters alone."""
         return replace(
             self, gradient=self.gradient[chosen], information=self.information[chosen][:, chosen]
         )
+
+
+def cost(error: Discrepancy | None, r: np.ndarray, r0: np.ndarray) -> float:
+    """|r|² of the data under an error of form, with |r0|² of the rest."""
+    plain = float(r @ r + r0 @ r0)
+    return plain if error is None else plain - float(error.share() @ (error.U.T @ r) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,21 +86,36 @@ class LinearModel:
     error : Discrepancy or None     of the data's residuals
     J : (n, n_p)                    slopes of the data's residuals, not whitened by C
     J0 : (m, n_p)                   those of the priors and the weighing
+    within : LinearModel or None    with the first columns of J; its products are reused
     """
 
     error: Discrepancy | None
     J: np.ndarray
     J0: np.ndarray
+    within: "LinearModel | None" = field(default=None, kw_only=True)
 
     @cached_property
     def _along(self) -> np.ndarray:
         """UᵀJ (k, n_p)."""
-        return np.zeros((0, self.J.shape[1])) if self.error is None else self.error.U.T @ self.J
+        if self.error is None:
+            return np.zeros((0, self.J.shape[1]))
+        if (inner := self.within) is None:
+            return np.asarray(self.error.U.T @ self.J)
+        return np.hstack([inner._along, self.error.U.T @ self.J[:, inner.J.shape[1] :]])
+
+    @cached_property
+    def _products(self) -> np.ndarray:
+        """JᵀJ (n_p, n_p)."""
+        if (inner := self.within) is None:
+            return np.asarray(self.J.T @ self.J)
+        old = inner.J.shape[1]
+        border = self.J.T @ self.J[:, old:]
+        return np.block([[inner._products, border[:old]], [border.T]])
 
     @cached_property
     def _information(self) -> np.ndarray:
         """JᵀJ + J0ᵀJ0 (n_p, n_p)."""
-        return np.asarray(self.J.T @ self.J + self.J0.T @ self.J0)
+        return np.asarray(self._products + self.J0.T @ self.J0)
 
     def _plain(self, r: np.ndarray, r0: np.ndarray) -> Squares:
         """Squares without an error of form."""
@@ -111,19 +141,32 @@ class LinearModel:
             return plain
         return self._less(plain, self.error.U.T @ r, self.error.share(delta))
 
+    def neg2_log_evidence(self, r: np.ndarray, r0: np.ndarray) -> float:
+        """-2 ln evidence of the linear model, over all sizes of its error if it has one."""
+        if self.error is not None:
+            return self.learned(r, r0).neg2_log_evidence
+        found = self.squares(r, r0)
+        return found.cost - found.further + float(np.linalg.slogdet(found.information)[1])
+
+    @cached_property
+    def _over_sizes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """At every δ of the grid: w (d, k), L⁻¹ of the information L Lᵀ, terms without r."""
+        assert self.error is not None
+        grid, V = self.error.prior.grid, self._along
+        w = np.array([self.error.share(delta) for delta in grid])
+        L = np.linalg.cholesky(self._information - np.array([(V.T * each) @ V for each in w]))
+        terms = 2 * np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
+        terms += self.error.prior.neg2_log(grid) - np.log1p(-w).sum(axis=1)
+        return w, np.linalg.inv(L), terms
+
     def learned(self, r: np.ndarray, r0: np.ndarray) -> Learned:
         """Integrate δ out of the evidence."""
         assert self.error is not None
-        plain, u, prior = self._plain(r, r0), self.error.U.T @ r, self.error.prior
-        grid = prior.grid
-        S = np.empty(len(grid))
-        for k, delta in enumerate(grid):
-            w = self.error.share(delta)
-            under = self._less(plain, u, w)
-            L = np.linalg.cholesky(under.information)
-            step = sl.solve_triangular(L, under.gradient, lower=True)
-            cost = under.cost - float(step @ step)
-            S[k] = cost + 2 * np.log(np.diag(L)).sum() - np.log1p(-w).sum() + prior.neg2_log(delta)
+        plain, u, grid = self._plain(r, r0), self.error.U.T @ r, self.error.prior.grid
+        w, inverse, terms = self._over_sizes
+        gradient = plain.gradient - (w * u) @ self._along
+        step = (inverse @ gradient[:, :, None])[:, :, 0]
+        S = plain.cost - w @ u**2 - (step**2).sum(axis=1) + terms
         width = np.log(grid[1] / grid[0])
         best = int(np.argmin(S))
         total = S[best] - 2 * np.log(np.exp(-(S - S[best]) / 2).sum() * width)

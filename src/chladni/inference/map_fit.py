@@ -5,6 +5,7 @@
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Self
@@ -16,7 +17,7 @@ from ..errors import ModelError
 from ..reduced.effect_dofs import slices
 from ..reduced.reduced_model import Reduced, State, evaluate
 from .likelihood import Data
-from .linear_model import LinearModel, Squares
+from .linear_model import LinearModel, Squares, cost
 
 APART = 1.96  # standard deviations of a weighing: a mass farther off has left the scales
 
@@ -147,22 +148,41 @@ class LinearPosterior:
     r0: np.ndarray
 
 
-def linearised(
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A sum of squares at one x; ``sloped`` computes its slopes, and a second value of any kind."""
+
+    cost: float
+    sloped: Callable[[], tuple[Squares, Any]]
+
+
+def posterior(
     model: Reduced, effects: Sequence[Effect], data: Data,
-    mass_measurement: MassMeasurement | None, x: np.ndarray, gradient: bool = True,
-) -> tuple[Squares, LinearPosterior]:  # fmt: skip
-    """-2 ln posterior at x up to a constant, its slopes with ``gradient``, and what it is made of.
+    mass_measurement: MassMeasurement | None, x: np.ndarray, *, priors: bool = True,
+) -> Point:  # fmt: skip
+    """-2 ln posterior at x up to a constant, and the :class:`LinearPosterior` when it is needed.
+
+    Parameters
+    ----------
+    priors : False leaves the priors of x out
 
     Raises
     ------
     ModelError
         If x is no structure.
     """
-    state = evaluate(model, effects, x, gradient)
-    r, J = data.scaled(state, gradient)
-    r0, J0 = prior_residuals(effects, mass_measurement, x, state)
-    linear = LinearModel(data.error, J, J0 if gradient else J0[:, :0])
-    return linear.squares(r, r0), LinearPosterior(state, linear, r, r0)
+    state = evaluate(model, effects, x)
+    r = data.scaled(state, False)[0]
+    first = 0 if priors else len(x)
+    r0 = prior_residuals(effects, mass_measurement, x, state.without_slopes())[0][first:]
+
+    def sloped() -> tuple[Squares, LinearPosterior]:
+        J = data.scaled(state, True)[1]
+        J0 = prior_residuals(effects, mass_measurement, x, state)[1][first:]
+        linear = LinearModel(data.error, J, J0)
+        return linear.squares(r, r0), LinearPosterior(state, linear, r, r0)
+
+    return Point(cost(data.error, r, r0), sloped)
 
 
 def fit(
@@ -192,8 +212,8 @@ def linearised_fit(
     """Fit as :func:`fit`, and keep the linear model at the end."""
     limit = np.array([p.step for p in unknowns(effects)])
 
-    def objective(x: np.ndarray, gradient: bool) -> tuple[Squares, LinearPosterior]:
-        return linearised(model, effects, data, mass_measurement, x, gradient)
+    def objective(x: np.ndarray) -> Point:
+        return posterior(model, effects, data, mass_measurement, x)
 
     x, found, there, status = descend(objective, start, limit, max_steps, tol)
     A = found.information
@@ -203,23 +223,24 @@ def linearised_fit(
     return Fit(*done), there
 
 
-Objective = Callable[[np.ndarray, bool], tuple[Squares, Any]]
+Objective = Callable[[np.ndarray], Point]
 SETTLED = 0.02  # of the tolerance: a further step that is expected to improve less is not taken
 
 
 def descend(
-    objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float
-) -> tuple[np.ndarray, Squares, Any, Status]:
+    objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float,
+    begun: Point | None = None,
+) -> tuple[np.ndarray, Squares, Any, Status]:  # fmt: skip
     """Levenberg-Marquardt: final x, its squares, second value of the objective, status.
 
     Parameters
     ----------
-    objective : x, True for slopes -> squares, any second value
     limit : (n_p,)     longest step
     tol : stop when a step improves the sum of squares by less, or a further one by far less
+    begun : at the start, where it is known
     """
     x, damping = start.copy(), 1e-2
-    found, here = objective(x, True)
+    found, here = (begun or objective(x)).sloped()
     for _ in range(max_steps):
         if found.further < SETTLED * tol:
             break
@@ -227,9 +248,10 @@ def descend(
         if step is None:
             stalled = np.abs(found.gradient).max() > 1e-2 * found.cost
             return x, found, here, Status.STALLED if stalled else Status.CONVERGED
-        improved, x, damping = step
+        point, x, damping = step
+        improved = found.cost - point.cost
         del here  # its slopes take as much memory as the next ones
-        found, here = objective(x, True)
+        found, here = point.sloped()
         if improved < tol:
             return x, found, here, Status.CONVERGED
     settled = found.further < SETTLED * tol
@@ -238,17 +260,15 @@ def descend(
 
 def _step(
     objective: Objective, x: np.ndarray, found: Squares, damping: float, limit: np.ndarray
-) -> tuple[float, np.ndarray, float] | None:
-    """One accepted Levenberg-Marquardt step: (improvement, new x, new damping), or None."""
+) -> tuple[Point, np.ndarray, float] | None:
+    """One accepted Levenberg-Marquardt step: (the point, new x, new damping), or None."""
     A, g = found.information, found.gradient
     for _ in range(8):
         dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)
         dx = dx / max(1.0, np.abs(dx / limit).max())
-        try:
-            new = objective(x + dx, False)[0].cost
-        except ModelError:
-            new = np.inf
-        if new < found.cost:
-            return found.cost - new, x + dx, damping / 6
+        with suppress(ModelError):
+            new = objective(x + dx)
+            if new.cost < found.cost:
+                return new, x + dx, damping / 6
         damping = max(damping, 1e-4) * 6
     return None

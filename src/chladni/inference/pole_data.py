@@ -9,12 +9,19 @@ from typing import Self
 
 import numpy as np
 
-from ..reduced.pole_assignment import SPURIOUS, paired, price_missed, price_spurious
+from ..reduced.pole_assignment import (
+    SPURIOUS,
+    SPURIOUS_LISTED,
+    paired,
+    price_missed,
+    price_spurious,
+)
 from ..reduced.reduced_model import Reduced, State
 
 LN10 = np.log(10.0)
-SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes
-SCALE_SD = 0.6  # of its logarithm
+ABOVE = 1.7  # times the highest pole: as far as its partner is looked for
+SCALE = 0.01  # prior median of that spread: careful models of one structure differ by 0.5 to 2 %
+SCALE_SD = 0.35  # of its logarithm: these are the ends of its 95 % interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +75,7 @@ class Poles:
             return poles, poles, 0.0
         f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
         f_max = self.frequency[poles[-1]]
-        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * f_max))
+        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < ABOVE * f_max))
         missed = price_missed(self.visibility(state, modes))
         ends = (f[modes] < self.band[0]) | (f[modes] > min(self.band[1], f_max * (1 + 1e-9)))
         test, model, unpaired = paired(
@@ -117,15 +124,37 @@ class Poles:
         J[test] = (dlam / (2 * lam) / sd[test]).T
         return r[use], J[use]
 
+    @property
+    def listed(self) -> bool:
+        """True for modes that the user lists, False for poles of a recording."""
+        return np.ndim(self.spurious) == 0
+
+    def all_paired(self) -> Self:
+        """Return these poles with a partner for each, at any distance."""
+        return replace(self, strength=np.full(len(self.strength), np.inf))
+
     def only(self, use: np.ndarray) -> Self:
         """Return these poles with others in use."""
         return replace(self, use=use)
 
     using = only  # poles are independent
 
+    @classmethod
+    def of_list(cls, frequency: np.ndarray, band: tuple[float, float] = (0.0, np.inf)) -> Self:
+        """Natural frequencies (n,) [Hz] that a user lists, in increasing order."""
+        one = np.ones(len(frequency))
+        return cls(frequency, 1e-3 * one, one > 0, one, band, spurious=SPURIOUS_LISTED)
+
+    def partners(self, f_model: np.ndarray) -> np.ndarray:
+        """Position of the partner of each pole among modes (m,) [Hz] in increasing order; or -1."""
+        lam, none = (2 * np.pi * f_model) ** 2, np.zeros(0)
+        state = State(lam, np.eye(len(lam)), np.zeros((0, len(lam))), None, None, 0.0, none, None,
+                      None)  # fmt: skip
+        return self.forced(state, np.ones(len(self.frequency), bool))[1]
+
     def forced(self, state: State, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """ln(f_model / f_test) and the model mode of every real pole (n,); all are paired."""
-        wide = replace(self, scale=0.1, strength=np.full(len(self.strength), np.inf))
+        wide = replace(self.all_paired(), scale=0.1)
         delta, mode = np.full(len(real), np.nan), np.full(len(real), -1)
         d, test, model = wide.deviation(state, real)
         delta[test], mode[test] = d, model

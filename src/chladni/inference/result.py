@@ -123,6 +123,30 @@ class Agreement:
 
 
 @dataclass(frozen=True)
+class NextMeasurement:
+    """A measurement that would tell tied explanations apart, made after those listed before it.
+
+    Attributes
+    ----------
+    kind : sensor, drive, mass, band or weighing
+    what : in words
+    label : dof; "" where it has no place
+    point_m : its place [m]
+    bits : information that all of them are expected to bring together
+    settles : probability that the true explanation then has odds of 10 : 1 or better
+    misleads : probability that a wrong one has
+    """
+
+    kind: str
+    what: str
+    label: str = ""
+    point_m: tuple[float, float, float] | None = None
+    bits: float = 0.0
+    settles: float = 0.0
+    misleads: float = 0.0
+
+
+@dataclass(frozen=True)
 class CalibratedParameter:
     """A fitted calibration parameter, and its values in the decks.
 

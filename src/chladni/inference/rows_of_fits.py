@@ -2,20 +2,20 @@
 
 from collections.abc import Sequence
 
-from ..decision.hypotheses import Hypothesis, Numbers
+from ..decision.hypotheses import Explanation, Numbers
 from ..decision.tied import leading
 from ..effects.effect import Effect
 from .hypothesis_fit import HypothesisFit
 from .implausible_values import strained
 
 
-def hypothesis_of(fitted: HypothesisFit, numbers: Numbers | None = None) -> Hypothesis:
+def hypothesis_of(fitted: HypothesisFit, numbers: Numbers | None = None) -> Explanation:
     """A fitted hypothesis as a decision reads it; calibration alone has no names."""
     effect, fit = fitted.effect, fitted.fit
     if type(effect) is Effect:
-        return Hypothesis((), fitted.neg2_log_evidence, numbers, strained=bool(strained(fit)))
+        return Explanation((), fitted.neg2_log_evidence, numbers, strained=bool(strained(fit)))
     known = effect.remarks(fit.of(effect), fit.sd(effect))
-    return Hypothesis(
+    return Explanation(
         tuple(e.name for e in fitted.effects),
         fitted.neg2_log_evidence,
         numbers,

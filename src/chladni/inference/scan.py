@@ -16,7 +16,7 @@ from ..effects.effect import Effect, FieldChange, Parameter
 from ..effects.effect_context import ElementGrids
 from ..reduced.matrix_slopes import MatrixSlopes
 from ..reduced.reduced_model import Reduced, State, evaluate
-from .likelihood import LN10, Data, Responses
+from .likelihood import Data, Responses
 from .map_fit import MassMeasurement, unknowns
 
 
@@ -164,13 +164,13 @@ def reanalysis(
 
 def whitened(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
     """Whitened residuals of many responses (m, n_f, n_out, n_in) as columns (n, m)."""
-    from ..ema.correlation import wrapped
+    from ..ema.correlation import log10, wrapped
 
     H = data.s[:, None, None] ** data.power * H + data.direct
-    delta = np.log(H / data.values) / LN10
+    delta = log10(H / data.values)
     if state.offset is not None:
-        delta = delta + state.offset[:, None]
-    return data.stacked(wrapped(delta) / data.std())
+        delta = wrapped(delta + state.offset[:, None])
+    return data.stacked(delta / data.std())
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,13 +212,15 @@ def bending_slopes(
     for k in range(0, len(sets), AT_ONCE):
         chunk = sets[k : k + AT_ONCE]
 
-        def bent(z: np.ndarray, forces: np.ndarray, chunk: Sequence[np.ndarray] = chunk) -> None:
+        def bent(
+            z: np.ndarray, forces: np.ndarray, first: int, chunk: Sequence[np.ndarray] = chunk
+        ) -> None:
             for force, shells in zip(forces, chunk, strict=True):
                 V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
                 own = groups.cubic[shells] @ (V @ z[:r]).reshape(len(shells), dofs.shape[1], -1)
                 force[:r] += V.T @ own.reshape(len(V), -1)
 
-        dK, dM = MatrixSlopes(len(chunk), [bent]), MatrixSlopes(len(chunk))
+        dK, dM = MatrixSlopes(len(chunk), [(len(chunk) - 1, bent)]), MatrixSlopes(len(chunk))
         J = data.scaled(replace(still, dK=dK, dM=dM), True)[1]
         rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..dynamics.modal_sum import modal_sum
-from ..ema.correlation import wrapped
+from ..ema.correlation import log10, wrapped
 from ..ema.finding import Finding
 from ..ema.identification import DERIVATIVES
 from ..ema.shape_faults import SHIFT
@@ -95,8 +95,8 @@ class Smoothed:
 
 
 def log10_of(H: np.ndarray) -> np.ndarray:
-    """log10 of responses, -300 of zero."""
-    return np.asarray(np.log(np.where(H == 0, 1e-300, H)) / LN10)
+    """log10 of responses, -150 of zero."""
+    return log10(np.where(H == 0, 1e-150, H))
 
 
 def level_free(H: np.ndarray) -> np.ndarray:

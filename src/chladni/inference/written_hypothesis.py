@@ -8,9 +8,10 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.joint_stiffness import calibrated_family
 from ..errors import ModelError
-from .hypothesis_fit import HypothesisFit
+from .hypothesis_fit import HypothesisFit, fitted
 from .implausible_values import is_strained
 from .map_fit import Fit, MassMeasurement, fit
+from .pole_data import Poles
 
 
 def as_written(
@@ -36,12 +37,15 @@ def as_written(
     found = hypothesis.fit
     kept = [e for e in found.effects if e.traits.writable or is_strained(e, found.of(e))]
     numbers = [calibrated_family(e) if is_strained(e, found.of(e)) else e for e in kept]
-    fits: list[Fit] = []
+    data, fits = hypothesis.data, list[Fit]()
+    made = fitted if isinstance(data, Poles) else fit  # poles have the spread of the deck itself
+    if isinstance(data, Poles) and data.listed:
+        data = data.all_paired()
     for given in (False, True):
         x = [_given(e) if given and e.kind == "calibration" else found.of(e) for e in kept]
         start = np.concatenate([np.zeros(0), *x])
         with suppress(ModelError):
-            fits.append(fit(hypothesis.model, numbers, hypothesis.data, mass_measurement, start))
+            fits.append(made(hypothesis.model, numbers, data, mass_measurement, start))
     if not fits:
         raise ModelError("neither the calibrated nor the given values belong to a structure")
     best = min(fits, key=lambda f: f.neg2_log_evidence)

@@ -72,7 +72,12 @@ class Dissipated:
     @property
     def held(self) -> "Dissipated":
         """The dissipation without its slopes, so that no parameter moves it."""
-        return replace(self, slopes=self.slopes[:0], dcoupling=self.dcoupling[:0])
+        return self.of_last(0)
+
+    def of_last(self, k: int) -> "Dissipated":
+        """The dissipation with its slopes by the last k parameters alone."""
+        first = len(self.slopes) - k
+        return replace(self, slopes=self.slopes[first:], dcoupling=self.dcoupling[first:])
 
     def seen(
         self, s: np.ndarray, d: np.ndarray, phi_o: np.ndarray, phi_i: np.ndarray
@@ -138,7 +143,8 @@ class Rising:
         modes, mixing, slopes = phi @ V, None, []
         if gradient:
             slopes = [one.slopes(phi, dK, dM) for one in parts]
-            dK = replace(dK, parts=[*dK.parts, *(each.over_basis(M @ phi) for each in slopes)])
+            more = [(dK.count - 1, each.over_basis(M @ phi)) for each in slopes]
+            dK = replace(dK, parts=[*dK.parts, *more])
             mixing = _mixing(risen, modes, dK, dM, parts)
         count = dK.count if gradient else 0
         return Risen(risen, modes, dK, dM, _dissipated(parts, slopes, risen, V, mixing, count))
@@ -225,7 +231,7 @@ class _RisenSlopes:
         """The slopes over the basis, with φ⁻ᵀ (m, m)."""
         side, low = back @ self.GA, self.low
 
-        def part(z: np.ndarray, out: np.ndarray) -> None:
+        def part(z: np.ndarray, out: np.ndarray, first: int) -> None:
             y, t = back.T @ z, side.T @ z
             out += self.c * (side[:, low] @ (self.rows @ y) + side @ (self.columns @ y[low]))
             out += self.c * (back @ (self.rows.swapaxes(1, 2) @ t[low]))

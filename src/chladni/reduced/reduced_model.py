@@ -65,6 +65,7 @@ class Reduced:
     weight0: float
     base: BaseParticipation | None = None
     following: np.ndarray | None = None
+    axis: np.ndarray | None = None  # (3,) axis 1 of the components; None: that of the deck
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
     _within: "Reduced | None" = None  # over the first vectors of this basis; its results are reused
 
@@ -199,22 +200,23 @@ class Reduced:
         if "" in self.linear:
             yield "", (self.groups.linear, self.groups.cubic)
         else:
-            yield from self.groups.components()
+            yield from self.groups.components(self.axis)
 
     def split_for(self, effect: Effect, x: np.ndarray) -> Self:
         """The model, split into components where the effect changes one of them."""
         split = any(change.field in COMPONENTS for change in of(FieldChange, effect.terms(x)))
-        return self.with_components() if split and "" in self.linear else self
+        return self.with_components(effect.axis_1) if split and "" in self.linear else self
 
-    def with_components(self) -> Self:
+    def with_components(self, axis: np.ndarray | None = None) -> Self:
         """The model with plane stiffness in four components; one copy serves all its users."""
-        if (known := self._split.get("")) is not None:
+        key = "" if axis is None else str(axis.tolist())
+        if (known := self._split.get(key)) is not None:
             return known
         linear: dict[str, MatrixStack] = {}
         cubic: dict[str, MatrixStack] = {}
-        for name, pair in self.groups.components():
+        for name, pair in self.groups.components(axis):
             linear[name], cubic[name] = map(stacked, self.groups.project(pair, self.vectors))
-        made = self._split[""] = replace(self, linear=linear, cubic=cubic)
+        made = self._split[key] = replace(self, linear=linear, cubic=cubic, axis=axis)
         return made
 
     @cached_property
@@ -277,6 +279,19 @@ class State:
         """The state without ∂K and ∂M, which hold the matrices that they are made of."""
         lost = self.dissipated
         return replace(self, dK=None, dM=None, dissipated=None if lost is None else lost.held)
+
+    def of_last(self, k: int) -> Self:
+        """The state with its slopes by the last k parameters alone."""
+        assert self.dK is not None
+        assert self.dM is not None
+        first, lost = self.dK.count - k, self.dissipated
+        return replace(
+            self, dK=self.dK.of_last(k), dM=self.dM.of_last(k), dweight=self.dweight[first:],
+            doffset=None if self.doffset is None else self.doffset[:, first:],
+            ddrive=None if self.ddrive is None else self.ddrive[first:],
+            dmoved={p - first: moved for p, moved in self.dmoved.items() if p >= first},
+            dissipated=None if lost is None else lost.of_last(k),
+        )  # fmt: skip
 
 
 def evaluate(

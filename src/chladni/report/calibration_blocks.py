@@ -29,7 +29,8 @@ _BASINS = (
 )
 _PROFILE = (
     "-2 ln profile likelihood above the best, all other parameters fitted again, at one and two "
-    "standard deviations. In brackets: the value assumed by the interval of the table."
+    "standard deviations; all priors count. In brackets: the value assumed by the interval of the "
+    "table."
 )
 _DRAWN = (
     "Draws: median and 95 % interval of the posterior, frozen parameters free with their priors. "

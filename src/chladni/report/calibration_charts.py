@@ -56,7 +56,7 @@ def profiles(study: CalibrationStudy) -> Chart:
             [Series("interval", at, parabola, tint="before", dash="dash"),
              Series("profile", at, found, "both", "after")],
             ChartAxis("sd from the best"),
-            ChartAxis("-2 ln", limits=(min(-1.0, float(found.min())), top)),
+            ChartAxis("-2 ln", limits=(-1.0, top)),
             p.name, [Mark(_SIGNIFICANT, "x")],
         ))  # fmt: skip
     columns = min(4, len(panels))

@@ -8,8 +8,9 @@ from pathlib import Path
 from ..case import Case
 from ..io.nastran import changed_lines, write_deck
 from ..io.nastran.edit.changes import Change
-from ..output import write_json
+from ..output import write_json, write_npz
 from ..progress import Progress, silent
+from ..search.next_measurement import FILE, arrays_of
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
 from ..workflows.diagnosis_result import DiagnosisResult
@@ -49,6 +50,8 @@ def write_diagnosis(
     if result.study is not None:
         files["calibration"] = "calibration.json"
         write_json(folder / "calibration.json", calibration_json(result))
+    if result.outlook is not None:
+        files["outlook"] = write_npz(folder / FILE, **arrays_of(result.outlook)).name
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)

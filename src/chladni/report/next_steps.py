@@ -6,6 +6,7 @@ from ..effects.registry import families
 from ..ema.level_study import SETTLED_BY
 from ..errors import named
 from ..inference.result import CalibratedParameter
+from ..search.next_measurement import ODDS
 from ..workflows.diagnosis_result import DiagnosisResult
 from .words import interval, percent, quantity
 
@@ -33,7 +34,7 @@ def _steps(result: DiagnosisResult) -> list[str]:
         "calibration only": _check_values,
         "nothing missing": _keep,
     }
-    first = _settle(result) if result.one_of else []
+    first = [*_advised(result), *_settle(result)] if result.one_of else []
     of_verdict = by_verdict.get(result.verdict, _keep)(result)
     steps = [*_mend(result), *first, *of_verdict, *_weigh(result)]
     return list(dict.fromkeys(steps))
@@ -47,6 +48,17 @@ def _mend(result: DiagnosisResult) -> list[str]:
         f"Correct the recording, {f.kind}{' of ' + named(f.channels, 3) if f.channels else ''}: "
         f"{f.repair or f.text}."
         for f in result.screening.faults
+    ]
+
+
+def _advised(result: DiagnosisResult) -> list[str]:
+    """Name the measurements that tell tied explanations apart, and what they will probably do."""
+    if not (every := result.next_measurements):
+        return []
+    what = "; ".join(m.what for m in every)
+    return [
+        f"Measure with {what}: one explanation then has odds of {ODDS:.0f} : 1 or better in "
+        f"{every[-1].settles:.0%} of cases, and a wrong one in {every[-1].misleads:.0%}."
     ]
 
 
@@ -88,6 +100,9 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
         return []
     if result.distrust:
         return [f"Do not use {deck} before the reasons for doubt are settled."]
+    error = result.frequency_error
+    if result.compared == "frequencies" and error and (error.after or 0) >= (error.before or 0):
+        return [f"Do not use {deck}: its frequencies are no nearer to the test."]
     return [f"Use {deck}: it contains the change."]
 
 

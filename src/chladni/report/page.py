@@ -25,32 +25,9 @@ if TYPE_CHECKING:
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def write_page(
-    folder: Path | str,
-    result: DiagnosisResult,
-    figures: Mapping[str, Path] | None = None,
-    notes: Sequence[str] = (),
-    tables: Sequence[Section] = (),
-    command: str = "",
-    title: str = "",
-    drawn: Sequence[Drawing] = (),
-    shared: Mapping[str, Any] | None = None,
-) -> Path:
-    """Write ``report.html`` of a diagnosis into ``folder``.
-
-    Parameters
-    ----------
-    result : DiagnosisResult
-    figures : dict     pictures by name; those of a drawing replace it on paper, known names are put
-                       in their section (``verdict.PLACES``), others at the end
-    notes : sentences  what was done and why
-    tables : sections  anything more, put before the files
-    command : str      the line that makes this run again
-    drawn : drawings   that of the first screen is ``where``
-    shared : dict      what the drawings of an earlier page share
-    """
-    text = diagnosis_page(result, figures, notes, tables, command, title, drawn, shared)
-    return write_text(Path(folder) / "report.html", text)
+def write_page(folder: Path | str, *given: Any, **more: Any) -> Path:
+    """Write the text of :func:`diagnosis_page` as ``report.html`` into a folder."""
+    return write_text(Path(folder) / "report.html", diagnosis_page(*given, **more))
 
 
 def diagnosis_page(
@@ -63,7 +40,19 @@ def diagnosis_page(
     drawn: Sequence[Drawing] = (),
     shared: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page of a diagnosis as text, its parameters those of :func:`write_page`."""
+    """The page of a diagnosis as text.
+
+    Parameters
+    ----------
+    result : DiagnosisResult
+    figures : dict     pictures by name; those of a drawing replace it on paper, known names are put
+                       in their section (``verdict.PLACES``), others at the end
+    notes : sentences  what was done and why
+    tables : sections  anything more, put before the files
+    command : str      the line that makes this run again
+    drawn : drawings   that of the first screen is ``where``
+    shared : dict      what the drawings of an earlier page share
+    """
     from .next_steps import next_steps
     from .sentence import sentence
     from .verdict import HEADING, TONE, sections, three_numbers

@@ -98,6 +98,8 @@ def _tied(result: DiagnosisResult) -> str:
 def _gain(result: DiagnosisResult) -> str:
     """State Q of the last deck and of the one before it, on data that only report."""
     held = Scores() if result.agreement is None else result.agreement.held_out
+    if result.compared == "frequencies":
+        return _closer(result)
     (one, before), (last, after) = held.last_step(bool(result.effects)).items()
     if not before or after is None:
         return ""
@@ -110,4 +112,18 @@ def _gain(result: DiagnosisResult) -> str:
     return (
         f"; on held-out data the deviation Q goes from {number(before, 3)} ({one} deck) to "
         f"{number(after, 3)} ({last} deck){said}"
+    )
+
+
+def _closer(result: DiagnosisResult) -> str:
+    """State the deviation of all frequencies: one or two held-out ones prove little."""
+    error = result.frequency_error
+    if error is None or error.calibrated is None or error.after is None:
+        return ""
+    named, count = bool(result.effects), sum(bool(r.after_hz) for r in result.frequencies)
+    before, after = (error.calibrated if named else error.before), error.after
+    one, last = ("calibrated", "updated") if named else ("given", "calibrated")
+    return (
+        f"; {count} frequencies are {number(before, 2)} % from the test (rms) with the {one} deck, "
+        f"{number(after, 2)} % with the {last} deck"
     )

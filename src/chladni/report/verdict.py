@@ -6,7 +6,15 @@ from pathlib import Path
 
 from ..effects.estimate import Estimate, Location
 from ..inference.calibration_result import ParameterKnowledge
-from ..inference.result import Adequacy, Agreement, LeftPlace, NamedEffect
+from ..inference.result import (
+    Adequacy,
+    Agreement,
+    CalibratedParameter,
+    LeftPlace,
+    NamedEffect,
+    NextMeasurement,
+)
+from ..search.next_measurement import ODDS
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Drawing, Facts, Items, Links, Picture, Section, Table, Text
 from .calibration_blocks import study_sections
@@ -42,6 +50,7 @@ PLACES = {  # section: pictures of a run that stand there where the page does no
     "test": ("setup",),
     "found": ("where_2", "where_3"),
 }
+APART = 0.01  # relative difference of a written value from the found one that is explained
 LEVELS = "levels_"  # pictures of modes over levels: with the number of the mode
 _FILES = {
     "deck": "the updated deck",
@@ -50,6 +59,7 @@ _FILES = {
     "diagnosis": "the result for other programs",
     "calibration": "what could be known, basins, covariance and profiles for other programs",
     "frf": "test and model as arrays",
+    "outlook": "forecasts of further measurements, for chladni next",
 }
 
 
@@ -117,6 +127,7 @@ def sections(
         Section("Reasons for doubt", [Items(result.distrust)] if result.distrust else []),
         *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
+        Section("Next measurement", _advised(result)),
         Section("At a glance", _glance(result)),
         Section("Findings", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),
@@ -135,6 +146,24 @@ def sections(
         Section("Files", _files(result)),
         Section("Run it again", [Code([command])] if command else []),
     ]
+
+
+def _advised(result: DiagnosisResult) -> list[Block]:
+    """Tabulate the next measurements, where explanations are open."""
+    every = result.next_measurements
+    return [next_measurements(every)] if every else []
+
+
+def next_measurements(every: Sequence[NextMeasurement], odds: float = ODDS) -> Table:
+    """Tabulate the measurements that would separate what the data cannot."""
+    rows = [(m.what, number(m.bits, 2), f"{m.settles:.0%}", f"{m.misleads:.0%}") for m in every]
+    heads = ("measure", "bits", f"settles at {odds:.0f} : 1", "misleads")
+    what = (
+        "Each row counts the rows above it. Bits: information expected about which explanation is "
+        "true. Settles: share of cases in which the true explanation gets these odds; misleads: in "
+        "which a wrong one does."
+    )
+    return Table(heads, rows, ("measure",), what)
 
 
 def _mode(name: str) -> int:
@@ -244,7 +273,7 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
             quantity(c.deck_value, c.estimate.unit),
             _interval(c.estimate),
             percent(c.estimate.value, c.deck_value),
-            quantity(c.written_value, c.estimate.unit),
+            _written(c, result),
         )
         for c in result.calibrated
     ]
@@ -256,6 +285,18 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
     ]  # fmt: skip
     heads = ("parameter", "deck", "found (95 % interval)", "change", "updated deck")
     return [Table(heads, rows, ("parameter",), _REACHED)]
+
+
+def _written(c: CalibratedParameter, result: DiagnosisResult) -> str:
+    """The value of the updated deck, with the reason where it is not the one that was found."""
+    written, found = c.written_value, c.estimate.value
+    value = quantity(written, c.estimate.unit)
+    if not result.deck_changed:
+        return f"{value} (kept: the found value gains too little)"
+    if written is None or not found or abs(written / found - 1) < APART:
+        return value
+    change = percent(written, found)
+    return f"{value} ({change}: fitted without these errors)"
 
 
 def _range(p: ParameterKnowledge) -> str:

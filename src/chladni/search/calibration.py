@@ -24,8 +24,7 @@ from ..inference.calibration_result import (
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from ..inference.identifiability import calibration_positions, identifiability, parameter_names
 from ..inference.likelihood import Responses
-from ..inference.linear_model import Squares
-from ..inference.map_fit import Fit, MassMeasurement, descend, fit, linearised, unknowns
+from ..inference.map_fit import Fit, MassMeasurement, Point, descend, fit, posterior, unknowns
 from ..inference.pole_data import Poles
 from ..inference.written_hypothesis import as_written
 from ..parallel import in_parallel
@@ -46,6 +45,8 @@ REACH = 0.02  # probability beyond each end of the hypercube: two standard devia
 SAME = 1.0  # in -2 ln evidence and in standard deviations: fits as near as that are one basin
 PROFILED = (-2.0, -1.0, 1.0, 2.0)  # standard deviations from the best at which a profile is taken
 PROFILE_STEPS = 6  # of a fit with one parameter held; it starts where the covariance says
+TOLERANCE = 0.05  # in -2 ln posterior, of a fit
+LOWER = 3  # times a fit is begun again where a profile lies below it
 SEED = 20250102
 
 
@@ -99,9 +100,9 @@ def calibration(
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
     ends = [] if quick else list(_ends(problem, null, settings.starts, within(progress, 0.3, 0.7)))
     null = _restarted(problem, null, ends)
-    basins = _basins(null, ends)
     progress("profiles", 0.75)
-    profiled = () if quick else tuple(profiles(problem, null))
+    profiled, null = ((), null) if quick else profiles_of_the_best(problem, null)
+    basins = () if quick else _basins(null, _end_of(problem, null), ends)
     every, sample = gaussian_draws(null.fit), None
     if settings.sample:
         sample, every = posterior_sample(whole, null, within(progress, 0.8, 1.0))
@@ -185,20 +186,31 @@ def _ends(
 def _restarted(problem: UpdatingProblem, null: HypothesisFit, ends: Sequence[Fit]) -> HypothesisFit:
     """The null, or the fit from the best start where that is better."""
     best = min(ends, key=lambda f: f.neg2_log_evidence, default=null.fit)
-    if best.neg2_log_evidence > null.fit.neg2_log_evidence - SAME:
+    if isinstance(null.data, Poles):
+        again = replace(null, fit=best)
+    elif best.neg2_log_evidence > null.fit.neg2_log_evidence - SAME:
         return null
-    again = best_base_fit(problem, problem.base, [best.x])
+    else:
+        again = best_base_fit(problem, problem.base, [best.x])
     return min((null, again), key=lambda t: t.neg2_log_evidence)
 
 
-def _basins(null: HypothesisFit, ends: Sequence[Fit]) -> tuple[Basin, ...]:
-    """The ends that are one place together, best first."""
+def _end_of(problem: UpdatingProblem, null: HypothesisFit) -> Fit:
+    """The null as an end like those of the starts: with the evidence at one error of form."""
+    if isinstance(null.data, Poles):
+        return null.fit
+    effects, mass = null.fit.effects, problem.mass_measurement
+    return fit(null.model, effects, null.data, mass, null.fit.x, max_steps=0).kept()
+
+
+def _basins(null: HypothesisFit, own_end: Fit, ends: Sequence[Fit]) -> tuple[Basin, ...]:
+    """The ends that are one place together, best first, with the number of starts of each."""
     own = calibration_positions(null.fit.effects)
     if not len(own):
         return ()
     sd = np.sqrt(np.diag(null.fit.covariance)[own])
     basins: list[list[Fit]] = []
-    for end in sorted(ends, key=lambda f: f.neg2_log_evidence):
+    for end in sorted((own_end, *ends), key=lambda f: f.neg2_log_evidence):
         for basin in basins:
             apart = np.abs(end.x[own] - basin[0].x[own]) / sd
             if apart.max() < SAME and end.neg2_log_evidence < basin[0].neg2_log_evidence + SAME:
@@ -208,7 +220,8 @@ def _basins(null: HypothesisFit, ends: Sequence[Fit]) -> tuple[Basin, ...]:
             basins.append([end])
     return tuple(
         Basin(
-            b[0].neg2_log_evidence - basins[0][0].neg2_log_evidence, len(b),
+            b[0].neg2_log_evidence - basins[0][0].neg2_log_evidence,
+            sum(end is not own_end for end in b),
             tuple(physical_values(null.fit.effects, b[0].x)),
         )
         for b in basins
@@ -236,47 +249,72 @@ def _notes(
         yield sample.sentence
 
 
-def profiles(problem: UpdatingProblem, null: HypothesisFit) -> Iterator[LikelihoodProfile]:
-    """LikelihoodProfile likelihood of every free calibration parameter, all others fitted again.
+def profiles_of_the_best(
+    problem: UpdatingProblem, null: HypothesisFit
+) -> tuple[tuple[LikelihoodProfile, ...], HypothesisFit]:
+    """The profiles, and the null, fitted again from a place on them that lies below it."""
+    for _ in range(LOWER):
+        found, lower = profiles(problem, null)
+        if lower is None:
+            break
+        again = best_base_fit(problem, null.fit.effects, [lower])
+        if again.neg2_log_evidence >= null.neg2_log_evidence:
+            break
+        null = again
+    return found, null
 
-    Raue et al. (2009), Bioinformatics 25, 1923-1929.  The prior of the parameter itself is left
-    out; those of all others stay, and frozen parameters are held.
+
+def profiles(
+    problem: UpdatingProblem, null: HypothesisFit
+) -> tuple[tuple[LikelihoodProfile, ...], np.ndarray | None]:
+    """Profile of every free calibration parameter, all others fitted again.
+
+    Raue et al. (2009), Bioinformatics 25, 1923-1929, profile the likelihood.  Here all priors
+    count, that of the parameter as well: then the fit is the lowest place, and the covariance
+    predicts z² at z standard deviations.  Frozen parameters are held.
+
+    Returns
+    -------
+    The profiles above the lowest place, and that place where it lies clearly below the null.
     """
-    found, mass = null.fit, problem.mass_measurement
-    own, every = calibration_positions(found.effects), unknowns(found.effects)
-    tasks = [(int(k), z) for k in own for z in (0.0, *PROFILED)]
-    costs = list(in_parallel(lambda task: _held_cost(null, mass, *task), tasks))
+    found, mass, out = null.fit, problem.mass_measurement, []
+    own, count = calibration_positions(found.effects), len(PROFILED)
+    tasks = [(int(k), z) for k in own for z in PROFILED]
+    every = list(in_parallel(lambda task: _held(null, mass, *task), tasks))
+    best = linearised(null.model, found.effects, found.data, mass, found.x, False)[0].cost
+    lowest, x = min(every, key=lambda one: one[0], default=(best, found.x))
     for n, k in enumerate(own):
-        p, sd = every[k], float(np.sqrt(found.covariance[k, k]))
-        best, *each = costs[n * (1 + len(PROFILED)) : (n + 1) * (1 + len(PROFILED))]
-        away = sd * np.array(PROFILED)
-        prior = (found.x[k] + away - p.mean) ** 2 - (found.x[k] - p.mean) ** 2
+        away = float(np.sqrt(found.covariance[k, k])) * np.array(PROFILED)
         at = [list(physical_values(found.effects, found.x + d * (np.arange(len(found.x)) == k)))[n]
               for d in away]  # fmt: skip
-        data = max(1 / sd**2 - 1 / p.sd**2, 0.0)
-        yield LikelihoodProfile(
+        costs = [cost for cost, _ in every[n * count : (n + 1) * count]]
+        out.append(LikelihoodProfile(
             at[0].name, at[0].unit, tuple(v.value for v in at),
-            tuple((np.array(each) - best - prior / p.sd**2).tolist()),
-            tuple((data * away**2).tolist()),
-        )  # fmt: skip
+            tuple(cost - min(best, lowest) for cost in costs), tuple(z**2 for z in PROFILED),
+        ))  # fmt: skip
+    return tuple(out), x if lowest < best - TOLERANCE else None
 
 
-def _held_cost(null: HypothesisFit, mass: MassMeasurement | None, k: int, z: float) -> float:
-    """-2 ln posterior, parameter k held z deviations from its fit; inf where it is no structure."""
+def _held(
+    null: HypothesisFit, mass: MassMeasurement | None, k: int, z: float
+) -> tuple[float, np.ndarray]:
+    """-2 ln posterior and x, parameter k held z deviations from its fit; inf: no structure."""
     found, model = null.fit, null.model
     rest = np.arange(len(found.x)) != k
     sd = np.sqrt(found.covariance[k, k])
     held = found.x[k] + z * sd
 
-    def objective(y: np.ndarray, gradient: bool) -> tuple[Squares, None]:
+    def objective(y: np.ndarray) -> Point:
         x = np.empty(len(rest))
         x[rest], x[k] = y, held
-        squares, _ = linearised(model, found.effects, found.data, mass, x, gradient)
-        return squares.of_some(rest) if gradient else squares, None
+        there = posterior(model, found.effects, found.data, mass, x)
+        return Point(there.cost, lambda: (there.sloped()[0].of_some(rest), None))
 
     start = found.x[rest] + z * found.covariance[rest, k] / sd
     limit = np.array([p.step for p in unknowns(found.effects)])[rest]
+    x = np.insert(start, k, held)
     try:
-        return descend(objective, start, limit, PROFILE_STEPS, 0.05)[1].cost
+        x[rest], squares, *_ = descend(objective, start, limit, PROFILE_STEPS, TOLERANCE)
     except ModelError:
-        return float("inf")
+        return np.inf, x
+    return squares.cost, x

@@ -3,10 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import cast
+
+import numpy as np
 
 from ..decision.decide import decide
-from ..decision.hypotheses import EffectSet, Hypotheses, Hypothesis, Left
-from ..decision.reasons import Decision
+from ..decision.hypotheses import EffectSet, Explanation, Hypotheses, Left
+from ..decision.reasons import ALONE, Decision
 from ..errors import ModelError
 from ..inference.adequacy import FitTest
 from ..inference.held_out_evidence import held_out_evidence
@@ -23,6 +26,8 @@ from .question import Prepared
 from .search_round import on_common_basis, taken
 from .several import Several
 from .verdict_models import scores_of
+
+MOST_OPEN = 3  # effects whose further measurements are forecast
 
 Refine = Callable[[HypothesisFit], Refinement]
 
@@ -54,6 +59,7 @@ class Evaluated(Tested):
     note, distrust : of the refinement that made its fit
     lost : why it could not be fitted again
     after : test of the damping it leaves along the change of a leader
+    forgotten : whether its model is gone
     """
 
     trial: Trial = field(kw_only=True)
@@ -62,6 +68,7 @@ class Evaluated(Tested):
     distrust: tuple[str, ...] = ()
     lost: str = ""
     after: FitTest | None = None
+    forgotten: bool = False
 
     @cached_property
     def news(self) -> float:
@@ -83,7 +90,7 @@ class Evaluated(Tested):
         return Left(*((a, b) for a, b in scores_of(prepared, self.fit, stages, choosing)))
 
     @cached_property
-    def refined(self) -> Hypothesis:
+    def refined(self) -> Explanation:
         """The hypothesis fitted again on an accurate model; a rival first gets its own basis."""
         trial = self.trial
         try:
@@ -99,6 +106,11 @@ class Evaluated(Tested):
         trial.spare = again if self.rival else trial.spare
         return hypothesis_of(made.hypothesis, again)
 
+    @property
+    def whole(self) -> HypothesisFit:
+        """The fit with a model of its own."""
+        return self._on_its_own_basis() if self.rival or self.forgotten else self.fit
+
     def _on_its_own_basis(self) -> HypothesisFit:
         """The fit again, from its result: a diagnosis keeps only its leader's model."""
         null, problem, effect = self.trial.found.null.data, self.problem, self.fit.effect
@@ -107,7 +119,7 @@ class Evaluated(Tested):
         base = taken(problem, self.fit, ("calibration", "nuisance"))
         return problem.fitted_with(effect, self.fit.fit.of(effect), base)
 
-    def p_after(self, leader: Hypothesis) -> float:
+    def p_after(self, leader: Explanation) -> float:
         """P of the test that the damping it leaves follows the change by a leader."""
         damping, test, lead = self.problem.damping, self.chances.test, leader.numbers
         if test is None or damping is None or not isinstance(lead, Evaluated):
@@ -120,6 +132,7 @@ class Evaluated(Tested):
         """Keep the fit, not the vectors that were added to the basis for it."""
         self.fit = on_common_basis(self.problem, self.fit)
         vars(self).pop("written", None)
+        self.forgotten = True
 
 
 def decided(prepared: Prepared, found: Diagnosis, refine: Refine) -> tuple[Hypotheses, Decision]:
@@ -150,3 +163,17 @@ def _effect_set(trial: Trial, s: Several, own: Evaluated) -> EffectSet:
 
     made = replace(hypothesis_of(s.hypothesis, own), names=tuple(e.name for e in s.own.effects))
     return EffectSet(made, s.gains, s.due, s.ahead, s.alternatives, news)
+
+
+def open_explanations(
+    case: Hypotheses, decision: Decision
+) -> tuple[list[HypothesisFit], list[str], np.ndarray]:
+    """Explanations that the data cannot separate: fits, names and relative probabilities."""
+    listed = [h for h in decision.order if h.name in decision.one_of][:MOST_OPEN]
+    if ALONE in decision.one_of:
+        listed.append(case.null)
+    if len(listed) < 2:
+        return [], [], np.zeros(0)
+    gain = np.array([case.gain(h) for h in listed])
+    fits = [cast(Evaluated, h.numbers).whole for h in listed]
+    return fits, [h.name or ALONE for h in listed], np.exp((gain - gain.max()) / 2)

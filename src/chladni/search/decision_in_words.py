@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from ..decision.hypotheses import EffectSet, Hypotheses, Hypothesis
+from ..decision.decision_rules import RULES
+from ..decision.hypotheses import EffectSet, Explanation, Hypotheses
 from ..decision.reasons import ALONE, Decision, Reason, Step
 from ..effects.registry import family
-from ..ema.odds import evidence_in_words
 from ..inference.adequacy import FitTest
 from .deciding import Evaluated
 from .diagnosis import Diagnosis
@@ -42,7 +42,7 @@ def concluded(
     return replace(said, written=order[0].written), order[0].distrust
 
 
-def _of(one: Hypothesis | None) -> Evaluated:
+def _of(one: Explanation | None) -> Evaluated:
     """The fit of a hypothesis, with all tests that were made of it."""
     assert one is not None
     return cast(Evaluated, one.numbers)
@@ -66,7 +66,7 @@ class DecisionWords:
         tested = self.decision.tested
         return None if tested is None else _of(tested).chances.test
 
-    def refusal(self, one: Hypothesis, why: Reason) -> str:
+    def refusal(self, one: Explanation, why: Reason) -> str:
         """Reason why a hypothesis is not named."""
         made = _of(one)
         if why is Reason.TOO_FEW:
@@ -91,8 +91,8 @@ class DecisionWords:
         if decision.one_of and gain > decision.due:
             yield (
                 f"all data together give {lead.name} {gain:.0f} in -2 ln evidence over "
-                f"calibration alone, but {REFUSED[decision.reason]}: a cause outside the catalogue "
-                "may imitate it"
+                f"calibration alone, but {self.refusal(lead, decision.reason)}: a cause outside "
+                "the catalogue may imitate it"
             )
 
     def settled(self) -> str:
@@ -200,10 +200,11 @@ class DecisionWords:
         each = {h.name: h for h in self.decision.order}
         first, *others = step.names
         gap = {n: each[n].neg2_log_evidence - best.neg2_log_evidence for n in others}
-        odds = "; ".join(f"{evidence_in_words(gap[n] / 2)} against {n}" for n in others)
+        odds = "; ".join(f"2 ln B = {gap[n]:.1f} against {n}" for n in others)
         known = [(n, _of(h).fit) for n, h in each.items() if n in step.names]
         odd = [(n, t.effect.remarks(t.fit.of(t.effect)).implausible) for n, t in known]
-        note = f"these data do not distinguish {first} from the others: {odds}"
+        due = f"{RULES.tied:.0f} are required to separate two explanations"
+        note = f"these data do not distinguish {first} from the others: {odds}; {due}"
         impossible = [needs_impossible(n, why) for n, why in odd if why]
         return _with_check("; ".join([note, *impossible]), step.names)
 
@@ -237,7 +238,7 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
 }
 
 
-def _one(step: Step) -> Hypothesis:
+def _one(step: Step) -> Explanation:
     """The hypothesis that a step is about."""
     assert step.of is not None
     return step.of

@@ -2,7 +2,7 @@
 
 1. Null: calibration parameters and scatter alone, from several starts.
 2. Scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0.
-3. Fits: the best places of every family, jointly with the calibration parameters and the scatter.
+3. Own optima of every candidate, with the base linear; joint fits of the leaders of every family.
 4. Evidence: Laplace, with 2 ln of the number of places tried. Leaders restart the null.
 5. Verdict.
 6. Sets of several effects (``several``), if an effect is named or nothing fits.
@@ -22,7 +22,7 @@ from ..decision.hypotheses import Hypotheses, Numbers
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
-from ..inference.adequacy import FitTest, adequacy
+from ..inference.adequacy import FitTest, adequacy, of_poles
 from ..inference.discrepancy import MEDIAN
 from ..inference.hypothesis_fit import (
     CLOSE,
@@ -37,8 +37,10 @@ from ..inference.pole_data import Poles
 from ..inference.rows_of_fits import hypothesis_of
 from ..inference.written_hypothesis import as_written
 from ..progress import within
+from ..reduced.accuracy import accuracy
 from ..reduced.reduced_model import evaluate
 from ..sparse.freed_memory import give_back_freed_memory
+from .basis_refinement import TRIES
 from .candidates import Proposals, proposals, unasked
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
@@ -204,9 +206,19 @@ def hypotheses_of(
     singles = tuple(hypothesis_of(t, numbers(t, k > 0)) for k, t in enumerate(found.hypotheses))
     return Hypotheses(
         hypothesis_of(found.null, numbers(found.null, False)), singles,
-        nominal=found.nominal.neg2_log_evidence, poles=isinstance(found.null.data, Poles),
-        families=len(problem.families),
+        nominal=np.inf if _misfits(found.nominal) else found.nominal.neg2_log_evidence,
+        poles=isinstance(found.null.data, Poles), families=len(problem.families),
     )  # fmt: skip
+
+
+def _misfits(deck: HypothesisFit) -> bool:
+    """True for a given deck whose natural frequencies are farther off than those of any model.
+
+    No rule of evidence keeps such a deck: wide priors would charge its calibration more than it
+    gains on few frequencies.
+    """
+    data = deck.data
+    return isinstance(data, Poles) and not of_poles(data, deck.fit.state).passes
 
 
 def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
@@ -275,7 +287,31 @@ def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, Hypothes
         if k and abs(np.log(delta / before)) < CLOSE:
             break
         state, starts = null.fit.state, [null.fit.x]
-    return problem, null
+    return on_its_basis(problem, null)
+
+
+CAREFUL = (
+    0.005  # least spread of ln f of careful models: a smaller error of the basis moves nothing
+)
+
+
+def on_its_basis(
+    problem: UpdatingProblem, fit: HypothesisFit
+) -> tuple[UpdatingProblem, HypothesisFit]:
+    """The problem over a basis that represents a fit without effects, and the fit made on it.
+
+    The modes of a deck do not span those of a structure in which a part is several times softer.
+    On them such a part appears too stiff, and its fitted number is too low.
+    """
+    for _ in range(TRIES):
+        effects, x = fit.fit.effects, fit.fit.x
+        found = accuracy(problem.reduced, fit.model, effects, x, problem.setup.f_max)
+        if found.serves(CAREFUL):
+            break
+        reduced = replace(problem.reduced, model=found.refined(fit.model))
+        problem = replace(problem, reduced=reduced, data=problem.data.rebased(reduced.model))
+        fit = best_base_fit(problem, effects, [x, problem.begun(effects)])
+    return problem, fit
 
 
 def threshold(data: object, tried: int | None = None) -> float:

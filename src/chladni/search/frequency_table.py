@@ -14,8 +14,6 @@ from .measured_modes import MeasuredModes
 from .question import Prepared, Question
 from .written_scores import seen
 
-FIRST = 8  # paired frequencies over which the rms is reported
-
 
 def frequency_rows(
     question: Question,
@@ -71,9 +69,9 @@ def frequency_error(rows: Sequence[FrequencyRow]) -> FrequencyError:
     )
 
 
-def rms(pairs: Sequence[tuple[float | None, float]], first: int = FIRST) -> float | None:
-    """Root mean square of ln(model/test) over the first paired frequencies, in per cent."""
-    both = [(model, test) for model, test in pairs if model][:first]
+def rms(pairs: Sequence[tuple[float | None, float]]) -> float | None:
+    """Root mean square of ln(model/test) over all paired frequencies, in per cent."""
+    both = [(model, test) for model, test in pairs if model]
     if not both:
         return None
     d = np.log([model / test for model, test in both])

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from ..dynamics.modes import ModalModel
 from ..ema.correlation import mac
-from ..ema.mode_pairing import ModePairs, pair
+from ..ema.mode_pairing import LEAST_CHANNELS, ModePairs, pair
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..inference.pole_data import Poles
@@ -77,7 +77,7 @@ def measured_modes(prepared: Prepared) -> MeasuredModes:
     low, high = found.band
     keep = (found.frequency >= low) & (found.frequency <= high) & (found.damping < 0.05)
     keep &= found.relative_delta_chi2 > 3.0
-    if found.residues.shape[1] < 4:
+    if found.residues.shape[1] < LEAST_CHANNELS:
         return MeasuredModes(found.frequency[keep], found.damping[keep])
     every = found.residues[keep]
     strongest = np.linalg.norm(every, axis=1).argmax(axis=1)

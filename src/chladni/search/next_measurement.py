@@ -7,22 +7,28 @@ and a weighing.  Their Gram matrices add up, so that any set of them is judged a
 (:mod:`..inference.expected_information`).
 """
 
+import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..effects.effect_context import ElementGrids
-from ..errors import ModelError
+from ..errors import FileError, ModelError
 from ..inference.discrepancy import Form, columns, form
-from ..inference.expected_information import Columns, Rivals
+from ..inference.expected_information import Columns, Rivals, chosen
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import prior_residuals
+from ..inference.result import NextMeasurement
 from ..reduced.reduced_model import Reduced, State, evaluate
 
+FILE = "outlook.npz"  # of a run
+ADVISED = 3  # measurements
+ODDS = 10.0
 LINES = 40  # of a recording at which a further measurement is forecast
 PLACES = 60  # grids at which sensors are tried
 MASSES = 12  # grids at which a known mass and a drive are tried
@@ -34,7 +40,7 @@ ABOVE = 1.25  # times the highest line: reach of a wider band
 
 
 @dataclass(frozen=True)
-class Candidate:
+class FurtherTest:
     """One measurement that could be made.
 
     Attributes
@@ -70,8 +76,79 @@ class Outlook:
 
     names: tuple[str, ...]
     rivals: Rivals
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[FurtherTest, ...]
     grams: np.ndarray
+
+
+def advised(
+    known: Outlook, count: int = ADVISED, odds: float = ODDS, without: Sequence[str] = ()
+) -> tuple[NextMeasurement, ...]:
+    """Choose the best few measurements, each with the most information for its cost.
+
+    Parameters
+    ----------
+    odds : that settle an explanation
+    without : kinds or labels that cannot be measured
+    """
+    barred = set(without)
+    cost = np.array([np.inf if barred & {c.kind, c.label} else c.cost for c in known.candidates])
+    total, out = np.zeros(known.grams.shape[1:]), []
+    for k in chosen(known.rivals, known.grams, cost, count):
+        total, c = total + known.grams[k], known.candidates[k]
+        after = known.rivals.forecast(total)
+        out.append(
+            NextMeasurement(
+                c.kind, c.what, c.label, c.point_m, after.information / np.log(2),
+                after.settled(odds), after.misled(odds),
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def arrays_of(known: Outlook) -> dict[str, np.ndarray]:
+    """The arrays of an outlook, by name."""
+    nowhere = (np.nan,) * 3
+    return {
+        "names": np.array(known.names), "probability": known.rivals.probability,
+        "sizes": np.array(known.rivals.columns.sizes), "grams": known.grams,
+        "kind": np.array([c.kind for c in known.candidates]),
+        "what": np.array([c.what for c in known.candidates]),
+        "label": np.array([c.label for c in known.candidates]),
+        "point_m": np.array([c.point_m or nowhere for c in known.candidates]),
+        "cost": np.array([c.cost for c in known.candidates]),
+    }  # fmt: skip
+
+
+def read_outlook(folder: Path) -> Outlook:
+    """Read the outlook of a run.
+
+    Raises
+    ------
+    FileError
+        If the run has none, or the file is no outlook.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        raise FileError(
+            f"{folder}: there is no {FILE}; a diagnosis of responses writes it where it leaves "
+            "explanations that the data cannot distinguish"
+        )
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            held = {name: file[name] for name in file.files}
+        sizes = tuple(int(k) for k in held["sizes"])
+        where = [None if np.isnan(p).any() else tuple(p.tolist()) for p in held["point_m"]]
+        each = zip(*(held[k].tolist() for k in ("kind", "what", "label")), where,
+                   held["cost"].tolist(), strict=True)  # fmt: skip
+        found = Outlook(
+            tuple(held["names"].tolist()), Rivals(Columns(sizes), held["probability"]),
+            tuple(FurtherTest(*row) for row in each), held["grams"],
+        )  # fmt: skip
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        raise FileError(f"{path} is no outlook of a diagnosis: {error}") from error
+    if found.grams.shape[1:] != 2 * (found.rivals.columns.count,):
+        raise FileError(f"{path} is no outlook of a diagnosis: its matrices have another size")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +261,7 @@ Seen = list[tuple[np.ndarray, np.ndarray]]  # of each rival: mean and factor
 
 def _measurements(
     problem: UpdatingProblem, rivals: Sequence[Rival]
-) -> Iterator[tuple[Candidate, Seen]]:
+) -> Iterator[tuple[FurtherTest, Seen]]:
     """Every candidate, with its prediction under each rival."""
     data, places = rivals[0].data, problem.reduced.candidates
     places = places.only(places.spread(PLACES))
@@ -210,20 +287,20 @@ def _measurements(
     ratio = data.s[-1].real / data.s[-1].imag
     wider = np.linspace(top, ABOVE * top, LINES // 2 + 1)[1:] * (ratio + 1j)
     yield (
-        Candidate("band", f"lines up to {ABOVE * top / (2 * np.pi):.4g} Hz", cost=COSTS["band"]),
+        FurtherTest("band", f"lines up to {ABOVE * top / (2 * np.pi):.4g} Hz", cost=COSTS["band"]),
         [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals],
     )
     yield (
-        Candidate("weighing", f"a weighing to {1e3 * WEIGHED:.2g} g", cost=COSTS["weighing"]),
+        FurtherTest("weighing", f"a weighing to {1e3 * WEIGHED:.2g} g", cost=COSTS["weighing"]),
         [r.weight() for r in rivals],
     )
 
 
-def _placed(kind: str, what: str, places: ElementGrids, k: int) -> Candidate:
+def _placed(kind: str, what: str, places: ElementGrids, k: int) -> FurtherTest:
     """A candidate at the k-th grid, along the normal of its surface."""
     x, y, z = places.point[k].tolist()
     label = f"{places.grids[k]}:n"
-    return Candidate(kind, f"{what} {label}", label, (x, y, z), COSTS[kind])
+    return FurtherTest(kind, f"{what} {label}", label, (x, y, z), COSTS[kind])
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,13 +346,18 @@ def _new(
 ) -> Predicted:  # fmt: skip
     """Responses on some lines under a rival, compared with those of the first rival."""
     given = _responses(first, lines, outputs, inputs)
-    values = given.model(first.state if about is None else about)
+    values = given.model(elsewhere(first.state if about is None else about))
     given = replace(given, values=values, level=np.abs(values).max(axis=0))
     rows = replace(given, a=rival.model.rows(outputs, keep=False),
                    b=rival.model.rows(inputs, keep=False))  # fmt: skip
-    mean, F = rival.predicted(rows, rival.state if state is None else state)
+    mean, F = rival.predicted(rows, elsewhere(rival.state if state is None else state))
     shape = (2, *values.shape)
     return Predicted(mean.reshape(shape), F.reshape(*shape, -1), GAIN / LN10 / given.std())
+
+
+def elsewhere(state: State) -> State:
+    """The state without what effects do to the shapes and gains of the measured places alone."""
+    return replace(state, moved=None, dmoved={}, offset=None, doffset=None)
 
 
 def _responses(rival: Rival, lines: np.ndarray, outputs: Any, inputs: Any) -> Responses:

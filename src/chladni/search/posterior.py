@@ -17,7 +17,7 @@ from ..inference.calibration_result import (
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.identifiability import calibration_positions, parameter_names
 from ..inference.likelihood import Responses
-from ..inference.map_fit import Fit, fit, linearised, unknowns
+from ..inference.map_fit import Fit, fit, posterior, unknowns
 from ..inference.posterior_samples import WALKERS, Chains, sampled
 from ..progress import Progress
 from ..reduced.reduced_model import evaluate
@@ -49,7 +49,8 @@ def with_frozen(whole: UpdatingProblem, null: HypothesisFit) -> Fit:
     effects = [*found.effects, *frozen]
     z = unknowns(frozen)
     x = np.concatenate([found.x, [p.mean for p in z]])
-    H = linearised(null.model, effects, found.data, whole.mass_measurement, x)[0].information
+    there = posterior(null.model, effects, found.data, whole.mass_measurement, x)
+    H = there.sloped()[0].information
     n = len(found.x)
     moved = np.linalg.solve(H[:n, :n], H[:n, n:])
     spread = moved * [p.sd for p in z]
@@ -76,7 +77,7 @@ def posterior_sample(
 
     def log_density(x: np.ndarray) -> float:
         try:
-            return -linearised(model, effects, data, mass, x, False)[0].cost / 2
+            return -posterior(model, effects, data, mass, x).cost / 2
         except ModelError:
             return -np.inf
 

@@ -31,7 +31,8 @@ from ..fem.modelled import Modelled, modelled
 from ..inference.complex_modes import mode_coupling
 from ..inference.damping_scatter import modal_damping
 from ..inference.hypothesis_fit import UpdatingProblem
-from ..inference.least_data import numbers, too_little
+from ..inference.identifiability import effective_number
+from ..inference.least_data import NUMBERS, TAKEN, numbers, too_little
 from ..inference.likelihood import Responses, rms_over_lines
 from ..inference.map_fit import APART, unknowns
 from ..inference.pole_data import Poles
@@ -179,7 +180,7 @@ def _by_responses(
     size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
         problem, data[1], held, unseen, what, tuple(notes), nominal, floor, found,
-        too_little(*size), numbers(*size), others=tuple(others), levels=studied, above=above,
+        *_few(problem, *size), others=tuple(others), levels=studied, above=above,
     )  # fmt: skip
 
 
@@ -239,10 +240,21 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     n = int(left_out.reporting.sum())
     what = f"{n} of {len(held)} frequencies" if n else "nothing"
     notes = (*notes, *_unscored(question), *_mass_note(question, problem), *suspension_note(above))
-    few = too_little(len(frequency), 0), numbers(len(frequency), 0)
+    few = _few(problem, len(frequency), 0)
     return Prepared(
         problem, data, left_out, left_out, what, notes, nominal, None, found, *few, ~held
     )
+
+
+def _few(problem: UpdatingProblem, modes: int, channels: int) -> tuple[str, float]:
+    """Reason why the data support no name as a rule, or "", and numbers that calibration leaves.
+
+    Many numbers need no count of the parameters, which takes the slopes of the whole problem.
+    """
+    given = numbers(modes, channels)
+    countable = isinstance(problem.data, Poles) or given < NUMBERS
+    taken = effective_number(problem) if countable else TAKEN
+    return too_little(modes, channels, taken), given - taken
 
 
 def _unscored(question: Question) -> list[str]:

@@ -145,7 +145,9 @@ class Prepared:
     noise: np.ndarray | None = None
     identified: Identified | None = None
     too_little: str = ""  # reason why data so few rarely separate explanations
-    numbers: int = NUMBERS  # of the fitted modes and channels
+    numbers: float = (
+        NUMBERS  # of the fitted modes and channels, beyond those that calibration takes
+    )
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     others: tuple[OtherTest, ...] = ()
     levels: LevelStudy = field(default_factory=LevelStudy)

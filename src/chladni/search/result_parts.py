@@ -5,14 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..decision.decision_rules import TIED
+from ..decision.decision_rules import RULES, TIED
 from ..decision.tied import same
 from ..effects.effect import Effect
 from ..effects.estimate import Estimate, Location
 from ..ema.odds import evidence_in_words
-from ..inference.hypothesis_fit import HypothesisFit, LocalOptimum
+from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.joint_fit import JointFit
 from ..inference.likelihood import LN10
+from ..inference.own_optimum import LocalOptimum
 from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation
 from ..inference.result import (
@@ -182,6 +183,11 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
     if same(hypothesis_of(hypothesis), best.name):
         return f"these data cannot distinguish its fitted form from {best.name}"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
+    if hypothesis.effect.name in diagnosis.one_of:
+        return (
+            f"these data do not distinguish it from {best.name}: 2 ln B = {2 * gap:.1f}, and "
+            f"{TIED:.0f} are required to separate two explanations"
+        )
     return (
         f"{evidence_in_words(gap)} for {best.name} compared with it; its weighted sum of squares "
         f"is {hypothesis.fit.misfit:.0f}, that of {best.name} {best.fit.misfit:.0f}"
@@ -249,6 +255,17 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
             where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
             out.append(CalibratedParameter(where, row, given, other.value if changed else given))
     return tuple(out)
+
+
+def values_kept(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Sentence on found values that are not written: the given ones explain the data as well."""
+    if diagnosis.verdict != "nothing missing":
+        return ()
+    gain = diagnosis.nominal.neg2_log_evidence - diagnosis.null.neg2_log_evidence
+    return (
+        f"the deck keeps its values, and those that were found are not written: they gain "
+        f"{gain:.1f} in -2 ln evidence, and {RULES.changed:.0f} are required to change a deck",
+    )
 
 
 def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:

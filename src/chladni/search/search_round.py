@@ -13,11 +13,19 @@ import numpy as np
 from ..decision.decision_rules import TIED
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
-from ..inference.hypothesis_fit import FAILED, ROUGH, HypothesisFit, UpdatingProblem, fitted
+from ..inference.hypothesis_fit import (
+    FAILED,
+    ROUGH,
+    HypothesisFit,
+    UpdatingProblem,
+    fitted,
+)
 from ..inference.likelihood import Responses
 from ..inference.map_fit import Status
+from ..inference.own_optimum import LocalOptimum, distinct
 from ..inference.rows_of_fits import simplest_first
 from ..parallel import in_parallel
+from ..reduced.reduced_model import Reduced
 from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
 
@@ -44,9 +52,10 @@ def search_round(
     later = least is not None  # the bases of the first round are still there
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
     progress(f"trying {len(tried)} candidates", 0.0)
-    every = in_parallel(lambda c: _tried(problem, null, c.effect, c.start, c.base), tried)
-    for k, (c, fits) in enumerate(zip(tried, every, strict=True)):
-        progress(f"tried {c.effect.name} {c.effect.text}", 0.8 * (k + 1) / len(tried))
+    families = _by_name(tried)
+    every = in_parallel(_fits(problem, null), families.values())
+    for k, (name, fits) in enumerate(zip(families, every, strict=True)):
+        progress(f"tried {name}", 0.8 * (k + 1) / len(families))
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
         give_back_freed_memory()
     if least is not None and not _gained(null, hypotheses, least):
@@ -76,12 +85,61 @@ def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: flo
     return bool(null.neg2_log_evidence - best > least)
 
 
+def _by_name(tried: Sequence[Candidate]) -> dict[str, list[Candidate]]:
+    """Candidates of each family."""
+    out: dict[str, list[Candidate]] = {}
+    for c in tried:
+        out.setdefault(c.effect.name, []).append(c)
+    return out
+
+
+def _fits(
+    problem: UpdatingProblem, null: HypothesisFit
+) -> Callable[[Sequence[Candidate]], list[HypothesisFit]]:
+    """A function that fits the candidates of a family roughly.
+
+    Poles are paired anew by every change: each candidate is fitted from its start. With responses
+    each candidate's own parameters are optimised first, and the base is linear about the null or
+    the deck. The best is then fitted jointly, and others where their joint fit may be the best.
+    The linear base may be as wrong about another as it was about the best.
+    """
+    if isinstance(problem.data, Responses):
+        return lambda tried: _leaders(problem, null, tried)
+    return lambda tried: [
+        t for c in tried for t in _tried(problem, null, c.effect, c.start, c.base)
+    ]
+
+
+def _leaders(
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate]
+) -> list[HypothesisFit]:
+    """Rough joint fits of the leading candidates of a family, from their own optima."""
+    bases, lead = dict[LocalOptimum, np.ndarray](), None
+    for c in {(c.effect.text, *c.start): c for c in tried}.values():
+        with suppress(*FAILED):
+            model = problem.reduced.model_for(c.effect, c.start)
+            own, base = problem.own_optimum(c.effect, c.start, (null.fit.x, problem.mean()), model)
+            if all(own.neg2_log_evidence < other.neg2_log_evidence for other in bases):
+                lead = model  # the only one of them that is kept
+            bases[own] = base
+    optima, fits, slack = distinct(bases), list[HypothesisFit](), 0.0
+    for k, own in enumerate(optima):
+        expected = own.neg2_log_evidence
+        if fits and expected - slack > fits[0].neg2_log_evidence:
+            return [fits[0].knowing(optima[k:]), *fits[1:]]
+        found = _tried(problem, null, own.effect, own.x, bases[own], lead)
+        slack = max([slack, *(abs(expected - t.neg2_log_evidence) for t in found)])
+        fits, lead = sorted([*fits, *found], key=lambda t: t.neg2_log_evidence), None
+    return fits
+
+
 def _tried(
     problem: UpdatingProblem,
     null: HypothesisFit,
     effect: Effect,
     start: np.ndarray,
     base: np.ndarray,
+    model: Reduced | None = None,
 ) -> list[HypothesisFit]:
     """Rough fits; a second one begins at the null if the first remains worse than the null.
 
@@ -93,7 +151,7 @@ def _tried(
         if out and out[0].neg2_log_evidence < null.neg2_log_evidence + BEHIND:
             break
         with suppress(*FAILED):
-            out.append(problem.fitted_with(effect, start, x, ROUGH))
+            out.append(problem.fitted_with(effect, start, x, ROUGH, model))
     return out
 
 

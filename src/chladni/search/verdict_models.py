@@ -73,10 +73,12 @@ def of_channels(prepared: Prepared, winner: HypothesisFit, held: np.ndarray) -> 
 
 
 def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
-    """Poles of the test with a partner in the winning model (n,) bool; the rest are spurious."""
+    """Poles of the test that are modes (n,) bool: those listed, or with a partner in the winner."""
     if not isinstance(prepared.score, Poles):
         return None
     data = prepared.score.rebased(winner.model)
+    if data.listed:
+        return np.ones(len(data.frequency), bool)
     fitted = winner.fit.data
     wide = Poles(**{**vars(data), "scale": max(3 * getattr(fitted, "scale", 0.01), 0.02)})
     real = np.zeros(len(data.frequency), bool)

@@ -16,10 +16,11 @@ from ..ema.finding import Screening
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.mac_significance import CLOSE, Likeness, likeness
-from ..ema.mode_pairing import ModePairs, pair
+from ..ema.mode_pairing import LEAST_CHANNELS, ModePairs, pair
 from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
 from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
+from ..inference.pole_data import ABOVE, Poles
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
@@ -36,6 +37,7 @@ from .sign_of_gain import with_sign_of_gain
 from .unit_check import refuse_other_units
 
 BANDS = 6
+NEAR = 1.3  # times the highest line: as far as the partner of an identified mode is looked for
 LONG = 100_000  # values of a recording: 210 000 took 190 s on a busy machine
 RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid motions
 
@@ -111,7 +113,9 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     case = with_sign_of_gain(case, model)
     test = case.frfs[0] if case.frfs else None
     f = model.modes.frequency
-    inside = ~rigid_modes(model.modes) & (f > RIGID * f_max) & (f <= 1.3 * f_max)
+    inside = (
+        ~rigid_modes(model.modes) & (f > RIGID * f_max) & (f <= (NEAR if test else ABOVE) * f_max)
+    )
     near = model.modes.sel(np.flatnonzero(inside))
     numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
@@ -124,7 +128,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     found = found.sel(firm(found) & found.inside)
     refuse_turned_axes(case, found, model)
     phi, psi = case.outputs.rows(model.structure) @ near.shapes, driven_shapes(found)
-    M = mac(phi, psi) if len(test.outputs) > 2 else None
+    M = mac(phi, psi) if len(test.outputs) >= LEAST_CHANNELS else None
     pairs = pair(near.frequency, found.frequency, M)
     by_dof = None
     if M is not None and len(pairs):
@@ -205,8 +209,21 @@ def _by_poles(case: Case, near: ModalModel) -> Correlation:
         raise nothing_measured(case)
     poles = tables[0]
     f = poles.of(poles.states[0]).frequency
-    return Correlation((), (), None, f, near.frequency, None, pair(near.frequency, f),
+    by_test = np.argsort(f, kind="stable")
+    at = Poles.of_list(f[by_test], case.band or (0.0, np.inf)).partners(near.frequency)
+    pairs = pairs_of(at, by_test, len(near))
+    return Correlation((), (), None, f, near.frequency, None, pairs,
                        notes=tuple(case.said("correlate")))  # fmt: skip
+
+
+def pairs_of(at: np.ndarray, by_test: np.ndarray, modes: int) -> ModePairs:
+    """Return pairs from the partner of each mode of the test, -1 where it has none."""
+    known = at >= 0
+    model, test = at[known], by_test[known]
+    return ModePairs(
+        model, test, np.full(len(model), np.nan),
+        np.setdiff1d(np.arange(modes), model), np.setdiff1d(by_test, test),
+    )  # fmt: skip
 
 
 def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:

@@ -36,12 +36,14 @@ from ..search.basis_refinement import Refinement, refined
 from ..search.calibration import FULL, CalibrationSettings, calibration
 from ..search.compensation import compensating
 from ..search.damping_by_part import damping_by_part
-from ..search.deciding import decided
+from ..search.deciding import decided, open_explanations
 from ..search.decision_in_words import concluded
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
 from ..search.frequency_table import frequency_error, frequency_rows
+from ..search.left_frequencies import left_frequencies
 from ..search.measured_modes import MeasuredModes, measured_modes
+from ..search.next_measurement import Outlook, advised, outlook
 from ..search.other_recordings import scored_others
 from ..search.preparation import NOT_WEIGHED
 from ..search.question import Prepared, Question
@@ -56,6 +58,7 @@ from ..search.result_parts import (
     named_effects,
     otherwise,
     remainder,
+    values_kept,
 )
 from ..search.verdict_models import models, of_channels, real_poles, scores_of
 from ..search.written_scores import noise_Q, written_Q
@@ -80,6 +83,7 @@ class Explained:
     screening: Screening | None = None
     study: CalibrationStudy | None = None
     distrust: tuple[str, ...] = ()
+    outlook: Outlook | None = None
 
     def refine(self, hypothesis: HypothesisFit) -> Refinement:
         """Fit a hypothesis again on a reduced model that can represent it."""
@@ -139,11 +143,11 @@ def explained(
 ) -> Explained:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
     made = searched(case, diagnosing, progress, known, settings)
-    found, distrust = _apply_held_out(made, diagnosing)
+    found, distrust, known_outlook = _apply_held_out(made, diagnosing)
     seen = made.screening
     if seen is not None and seen.faults and not diagnosing:
         distrust = (*distrust, f"{seen.sentence}; a fit to it distorts the model")
-    return replace(made, found=found, distrust=distrust)
+    return replace(made, found=found, distrust=distrust, outlook=known_outlook)
 
 
 def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
@@ -172,14 +176,18 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*foretells_worse(result.agreement, bool(result.effects)), *distrust)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
+    if result.compared == "frequencies":
+        distrust = (*left_frequencies(result.frequencies, stages.final.model), *distrust)
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
         distrust = (*distrust, *doubts)
     said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
+    ahead = known.outlook
     return replace(
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
+        outlook=ahead, next_measurements=() if ahead is None else advised(ahead),
     )  # fmt: skip
 
 
@@ -197,17 +205,20 @@ def far_off(result: DiagnosisResult) -> Iterator[str]:
         )
 
 
-def _apply_held_out(made: Explained, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
-    """Return the verdict by all data, and reasons not to trust it."""
+def _apply_held_out(
+    made: Explained, diagnosing: bool
+) -> tuple[Diagnosis, tuple[str, ...], Outlook | None]:
+    """Return the verdict by all data, reasons not to trust it, and what would settle a tie."""
     prepared = made.prepared
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
     case, decision = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, case, decision)
+    ahead = outlook(prepared.problem, *open_explanations(case, decision)) if diagnosing else None
     plain = refined(made.question, prepared, found.plain, written=True)
     found = replace(found, plain=plain.hypothesis)
     if found.found is not None:
-        return found, distrust
-    return replace(found, notes=(*found.notes, plain.note)), (*plain.distrust, *distrust)
+        return found, distrust, ahead
+    return replace(found, notes=(*found.notes, plain.note)), (*plain.distrust, *distrust), ahead
 
 
 def _updated(
@@ -320,6 +331,7 @@ def _result(
             *found.notes,
             *laid_on_sheets(found, weighed, mass_properties(question.assembly)[0]),
             *otherwise(found),
+            *values_kept(found),
             *away,
             left.sentence,
             *blind_note(spot),

@@ -25,12 +25,14 @@ from ..inference.result import (
     FrequencyRow,
     MassComparison,
     NamedEffect,
+    NextMeasurement,
     RecordingScore,
     Remainder,
 )
 from ..io.nastran.edit.changes import Change
 from ..results import Result
 from ..search.measured_modes import MeasuredModes
+from ..search.next_measurement import Outlook
 
 Compared = Literal["responses", "frequencies"]
 
@@ -79,6 +81,7 @@ class DiagnosisResult(Result):
     structured : whether calibration alone leaves more than noise
     adequate : the absolute test of the best explanation
     one_of : groups of explanations that the data cannot separate
+    next_measurements : that would separate them, the one that tells most for its cost first
     notes : how the recording was read, what was done and why
     distrust : reasons not to trust the result; the command then exits with 3
     compared : whether responses or natural frequencies were compared
@@ -106,6 +109,7 @@ class DiagnosisResult(Result):
     structured: Remainder | None = None
     adequate: Adequacy | None = None
     one_of: tuple[tuple[str, ...], ...] = ()
+    next_measurements: tuple[NextMeasurement, ...] = ()
     notes: tuple[str, ...] = ()
     distrust: tuple[str, ...] = ()
     compared: Compared = "responses"
@@ -114,6 +118,7 @@ class DiagnosisResult(Result):
     files: dict[str, str | None] = field(default_factory=dict)
     models: UpdatedModels | None = None
     residual_localisation: ResidualLocalisation | None = None
+    outlook: Outlook | None = None
     recordings: tuple[RecordingScore, ...] = ()
     levels: tuple[LevelTable, ...] = ()
     joints: tuple[LinearJoint, ...] = ()

@@ -23,10 +23,11 @@ from .screening_of_case import (
 
 def refuse_without_effects(case: Case) -> None:
     """Refuse a deck without parts for the effects."""
-    if not len(case.assembly.shells) + len(case.assembly.beams):
+    made = case.assembly
+    if not len(made.shells) + len(made.beams) + sum(map(len, made.solids)):
         raise FileError(
-            f"{case.path}: the deck has neither shells nor beams, but the effects of diagnose act "
-            "on these; calibrate and correlate accept any deck"
+            f"{case.path}: the deck has no shells, beams or solids, but the effects of diagnose "
+            "act on these; calibrate and correlate accept any deck"
         )
 
 
