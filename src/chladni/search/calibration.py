@@ -281,7 +281,7 @@ def profiles(
     own, count = calibration_positions(found.effects), len(PROFILED)
     tasks = [(int(k), z) for k in own for z in PROFILED]
     every = list(in_parallel(lambda task: _held(null, mass, *task), tasks))
-    best = linearised(null.model, found.effects, found.data, mass, found.x, False)[0].cost
+    best = posterior(null.model, found.effects, found.data, mass, found.x).cost
     lowest, x = min(every, key=lambda one: one[0], default=(best, found.x))
     for n, k in enumerate(own):
         away = float(np.sqrt(found.covariance[k, k])) * np.array(PROFILED)
