@@ -358,8 +358,11 @@ def neg2_log_mixture(data: Poles, state: State) -> float:
     """-2 ln p(poles | modes, best assignment, scale) p(scale), up to a constant."""
     r, _ = data.scaled(state, False)
     widths = 2 * np.log(data.std()[data.use]).sum()
-    return float(r @ r + widths) + _scale_prior(data.scale)
+    return float(r @ r + widths) + _scale_prior(data.scale, LEARNED_SD)
 
 
-def _scale_prior(scale: float, median: float = SCALE) -> float:
-    return float((np.log(scale / median) / SCALE_SD) ** 2)
+LEARNED_SD = 0.6  # of ln scale while pairs are sought: a narrow one would drop poles as spurious
+
+
+def _scale_prior(scale: float, sd: float = SCALE_SD) -> float:
+    return float((np.log(scale / SCALE) / sd) ** 2)

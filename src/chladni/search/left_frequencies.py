@@ -66,10 +66,10 @@ def _folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> Iterator[str]:
     away = abs(np.log(kappa)) / FOLDS
     if away > STRAINED:
         yield (
-            f"the folds are {'softer' if kappa < 1 else 'stiffer'} than in the deck: the shells "
-            f"along them with about {kappa:.2g} of their bending stiffness ({away:.2g} standard "
-            f"deviations of what meshes differ by) account for {1 - left / plain:.0%} of what the "
-            "frequencies leave; look at the joints along the folds"
+            f"the folds are {'softer' if kappa < 1 else 'stiffer'} than in the deck: shells along "
+            f"them with about {kappa:.2g} of their bending stiffness remove "
+            f"{1 - left / plain:.0%} of the squared deviations; that is {away:.2g} standard "
+            "deviations of the differences between meshes; look at the joints along the folds"
         )
 
 
