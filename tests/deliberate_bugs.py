@@ -66,8 +66,8 @@ BUGS = (
         "tests/effects/test_contract.py",
     ),
     DeliberateBug(  # the place of a moved mass is mirrored at its grid
-        "src/chladni/effects/masses.py", "offset = self.at(x) - assembly.points[",
-        "offset = -self.at(x) + assembly.points[", "tests/effects/test_contract.py",
+        "src/chladni/effects/masses.py", "offset = self.written_at(assembly, x) - assembly",
+        "offset = -self.written_at(assembly, x) + assembly", "tests/effects/test_contract.py",
     ),
     DeliberateBug(  # springs along a hem hold half of what they should
         "src/chladni/effects/hems.py", "self.parameters[0].value(x[0]) * self.line.share * w",

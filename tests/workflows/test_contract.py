@@ -33,6 +33,7 @@ WORKFLOW = {  # command: the function it calls
     "check-effect": "chladni_contract.check_effect",
     "specimen": "chladni_specimens.tailgate_specimen",
     "report": "chladni.report.page.write_page",
+    "next": "chladni.search.next_measurement.advised",
 }
 
 

@@ -180,7 +180,8 @@ class ElementGroups:
     @cached_property
     def _places(self) -> list["_Place"]:
         """The elements and dofs of every group."""
-        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), -1)
+        m, n = self.nodes.shape
+        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(m, 6 * n)
         return [_Place.of(on, dofs[on], self.structure.T) for on in alike(self.group)]
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
-from scipy.special import roots_jacobi
 
 _CUBE = np.array(
     [
@@ -123,9 +122,17 @@ def _rational(*exponents: tuple[int, int]) -> np.ndarray:
 
 
 def _line(n: int, alpha: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Jacobi rule of ∫ f(u) (1 - u)^alpha du over 0 to 1."""
-    t, w = roots_jacobi(n, alpha, 0)
-    return (1 + t) / 2, w / 2 ** (alpha + 1)
+    """Gauss-Jacobi rule of ∫ f(u) (1 - u)^alpha du over 0 to 1.
+
+    Nodes are the eigenvalues of the tridiagonal matrix of the recurrence (Golub and Welsch 1969,
+    Math. Comp. 23, 221-230).
+    """
+    k = np.arange(1.0, n)
+    s = 2 * np.arange(n) + alpha
+    a = -(alpha**2) / np.maximum(s * (s + 2), 1)
+    b = 2 * k * (k + alpha) / (2 * k + alpha) / np.sqrt((2 * k + alpha) ** 2 - 1)
+    t, V = np.linalg.eigh(np.diag(a) + np.diag(b, 1) + np.diag(b, -1))
+    return (1 + t) / 2, V[0] ** 2 / (alpha + 1)
 
 
 def _along(plane: Rule, n: int) -> Rule:

@@ -264,9 +264,14 @@ class Assembly:
 
 
 def appended(family: Any, **columns: Any) -> Any:
-    """Add members to a family of elements; a column that is not given is zero."""
+    """Add members to a family of elements; a column that is not given is zero.
+
+    Shells that are added have no nodes on their edges.
+    """
     n = len(columns["ids"])
     none = {k: np.zeros((n, *old.shape[1:]), old.dtype) for k, old in vars(family).items()}
+    if "middle" in none:
+        none["middle"] -= 1
     return concatenated(family, replace(family, **{**none, **columns}))
 
 
