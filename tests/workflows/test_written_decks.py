@@ -73,7 +73,7 @@ def test_Q_is_that_of_the_full_matrices(case):
 
 
 def test_every_structure_is_solved_once(diagnosis):
-    """The deck, the calibrated and the updated deck: three eigenproblems; the refined mesh is none."""
+    """Three eigenproblems: the given, the calibrated and the updated deck."""
     result, solved = diagnosis
     models = result.models
     assert len(solved) == len({id(system) for system in solved}) == 3

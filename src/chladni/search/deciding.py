@@ -9,7 +9,7 @@ import numpy as np
 
 from ..decision.decide import decide
 from ..decision.hypotheses import EffectSet, Explanation, Hypotheses, Left
-from ..decision.reasons import ALONE, Decision
+from ..decision.reasons import ALONE, BEYOND, Decision
 from ..errors import ModelError
 from ..inference.adequacy import FitTest
 from ..inference.held_out_evidence import held_out_evidence
@@ -168,12 +168,15 @@ def _effect_set(trial: Trial, s: Several, own: Evaluated) -> EffectSet:
 def open_explanations(
     case: Hypotheses, decision: Decision
 ) -> tuple[list[HypothesisFit], list[str], np.ndarray]:
-    """Explanations that the data cannot separate: fits, names and relative probabilities."""
+    """Explanations that the data cannot separate: fits, names and even probabilities.
+
+    Calibration with its errors of form stands for what the catalogue lacks as well.
+    """
     listed = [h for h in decision.order if h.name in decision.one_of][:MOST_OPEN]
-    if ALONE in decision.one_of:
-        listed.append(case.null)
+    names = [h.name for h in listed]
+    if other := [name for name in (ALONE, BEYOND) if name in decision.one_of]:
+        listed, names = [*listed, case.null], [*names, " or ".join(other)]
     if len(listed) < 2:
         return [], [], np.zeros(0)
-    gain = np.array([case.gain(h) for h in listed])
     fits = [cast(Evaluated, h.numbers).whole for h in listed]
-    return fits, [h.name or ALONE for h in listed], np.exp((gain - gain.max()) / 2)
+    return fits, names, np.full(len(listed), 1 / len(listed))
