@@ -64,6 +64,28 @@ class MeshError(Effect):
             return (own,)
         return own, ShapeChange(self.rows, self.shapes, float(x[0]), np.ones(1))
 
+    @property
+    def halved(self) -> "HalvedMesh":
+        """The finer mesh itself."""
+        return HalvedMesh(
+            (), self.text, rows=self.rows, omega=self.omega, log=self.log, shapes=self.shapes
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HalvedMesh(MeshError):
+    """The mesh twice as fine, which a deck can have: a mesh error of x = 1, no parameter."""
+
+    name = "halved-mesh"
+    claim = "every shell is halved"
+
+    def terms(self, x: np.ndarray) -> tuple[Term, ...]:
+        """L over the modes, and the change of their shapes at sensors and shaker."""
+        own = ModalFactor(self.rows, self.omega, self.log, np.zeros((0, *self.log.shape)))
+        if not len(self.shapes):
+            return (own,)
+        return own, ShapeChange(self.rows, self.shapes, 1.0, np.zeros(0))
+
 
 @dataclass(frozen=True, eq=False)
 class ModalDiscrepancy(Effect):
