@@ -1,8 +1,8 @@
 """Scores of effects on few degrees of freedom, without a basis of their own.
 
-The rows B of these dofs move by B Φ q + R f: Φ is the basis, f the force on them, and R their
-static flexibility beyond the basis. A stiffness A then acts as A (1 + R A)⁻¹ on B Φ q, and a mass
-moves by (1 + R A)⁻¹ B Φ q (Woodbury). The inertia of what lies beyond the basis is left out.
+The rows B of these dofs move by B Φ q + R f under forces f on them. Φ is the basis. R is their
+static flexibility beyond it. A stiffness A then acts as A (1 + R A)⁻¹ on B Φ q, and a mass moves by
+(1 + R A)⁻¹ B Φ q (Woodbury). The inertia of motions beyond the basis is left out.
 """
 
 from collections.abc import Sequence
