@@ -146,7 +146,7 @@ class SearchContext(Protocol):
         """Score of an effect at each start, from one of ``bases`` (n_ways, n_starts).
 
         With ``extended``, or if the effect releases clamps, the basis is extended by the responses
-        of the effect, as for a fit.
+        of the effect, as for a fit. The static flexibility of few dofs stands for that basis.
         """
 
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ its modal damping would scatter more than that of one structure.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
@@ -194,9 +195,7 @@ def of_poles(data: Poles, state: State) -> FitTest:
     and of at least as many poles without a partner among the modes of ``state``. Each pole is
     spurious with its own probability.
     """
-    from scipy.stats import norm
-
-    closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
+    closely = float(ndtr(-np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
     alone = np.setdiff1d(poles, data.pairs(state)[0])
     share = np.broadcast_to(data.spurious, data.frequency.shape)[poles]
