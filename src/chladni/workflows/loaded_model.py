@@ -119,6 +119,7 @@ class DeckModels:
     source: Path
     deck: Deck
     units: Units | None
+    notes: tuple[str, ...] = ()  # on the file that the deck was made of
 
     @cached_property
     def analysis(self) -> Analysis:
@@ -139,7 +140,7 @@ class DeckModels:
         from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
 
         made = assembly(self.deck, self.units, subcase)
-        notes = tuple(remarks(self.deck, STRUCTURAL))
+        notes = (*self.notes, *remarks(self.deck, STRUCTURAL))
         if self.units is None:
             return Model(self.source, made, "", notes, deck=self.deck)
         if doubt := doubt_of_units(made, str(self.source), self.units):
