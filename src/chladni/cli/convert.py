@@ -64,15 +64,15 @@ def _say(found: ConvertedModel, made: Assembly, why: str, place: Path) -> None:
     """Counts, mass, parts, and all that was left out."""
     assert found.units is not None
     mass, _ = mass_properties(made)
-    counts = {
-        "shells": len(made.shells),
-        "solids": sum(map(len, made.solids)),
-        "beams": len(made.beams),
-        "springs": len(made.springs) + len(made.bushes),
-        "masses": len(made.masses),
-        "constraints": len(made.rigid),
-    }
-    there = ", ".join(f"{n} {what}" for what, n in counts.items() if n)
+    counts = (
+        (len(made.shells), "shell", "s"),
+        (sum(map(len, made.solids)), "solid", "s"),
+        (len(made.beams), "beam", "s"),
+        (len(made.springs) + len(made.bushes), "spring", "s"),
+        (len(made.masses), "mass", "es"),
+        (len(made.rigid), "constraint", "s"),
+    )
+    there = ", ".join(f"{n} {what}{s * (n > 1)}" for n, what, s in counts if n)
     say(f"{place}: {len(made.points)} grids, {there}; its mass is {number(mass, 6)} kg.")
     if why:
         say(why)
