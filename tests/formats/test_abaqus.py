@@ -241,6 +241,15 @@ def test_profiles_have_their_area_and_moment(read, section, numbers, area, I):
     assert (s.area, s.I1, s.I2) == pytest.approx((area, I, I))
 
 
+def test_an_i_beam_is_stiff_along_its_height(read):
+    """Its flanges are along n1 and its web along n2: I about n1 is the larger."""
+    text = beam_text("B31", 2, "I", "0.05, .1, .06, .06, .01, .01, .005")
+    s = again(read(text)).parts[0].section
+    assert s.area == pytest.approx(2 * 0.06 * 0.01 + 0.08 * 0.005)
+    assert s.I2 == pytest.approx((0.06 * 0.1**3 - 0.055 * 0.08**3) / 12)
+    assert s.I1 == pytest.approx((2 * 0.01 * 0.06**3 + 0.08 * 0.005**3) / 12)
+
+
 def test_a_general_section_has_its_own_material(read):
     text = re.sub(r"\*BEAM SECTION.*", "", beam_text("B31", 4, "RECT", "1., 1."), flags=re.DOTALL)
     text += "*BEAM GENERAL SECTION, ELSET=ALL, DENSITY=1000.\n1e-4, 2e-9, 0., 3e-9, 1e-9\n0, 1, 0\n"
@@ -363,12 +372,12 @@ def test_orthotropic_sheets_have_their_axis(read, axes, way):
     np.testing.assert_allclose(modes(found, 10)[6:], modes(due, 10)[6:], rtol=1e-6)
 
 
-def test_supports_follow_a_transform(read):
-    """A node on rollers along 45 degrees is free along them and held across."""
+@pytest.mark.parametrize("system", ["R\n1., 1., 0., -1., 1., 0.", "C\n-.1, .1, 0., -.1, .1, 1."])
+def test_supports_follow_a_transform(read, system):
+    """A node on rollers along 45 degrees is free along them and held across, y or the angle."""
     text = shell_text(plate(0.3, 0.2, 2, 2, 1e-3)) + "*NSET, NSET=ROLL\n3\n"
-    made = again(
-        read(text + "*TRANSFORM, NSET=ROLL, TYPE=R\n1., 1., 0., -1., 1., 0.\n*BOUNDARY\nROLL, 2\n")
-    )
+    text += f"*TRANSFORM, NSET=ROLL, TYPE={system}\n*BOUNDARY\nROLL, 2\n"
+    made = again(read(text))
     built = structure(made)
     row = int(np.searchsorted(made.ids, 3))
     free = built.T[[6 * row, 6 * row + 1]].toarray()
@@ -391,6 +400,31 @@ def test_what_is_not_understood_is_listed(read):
     found = {x.name: x.count for x in read(text + "*DLOAD\nALL, P, 1.\n").model.left_out}
     assert found == {"S4 without a section": 1, "elements CAX4": 1, "*CONNECTOR SECTION": 1,
                      "*CONTACT PAIR": 1}  # fmt: skip
+
+
+def test_rubber_and_odd_profiles_are_left_out(read):
+    """Elements of a material without linear elasticity, or of a section that is not known."""
+    text = shell_text(plate(0.3, 0.2, 2, 2, 1e-3))
+    text += "*MATERIAL, NAME=RUBBER\n*HYPERELASTIC\n1., 2.\n"
+    text += elements("S4", [[1, 2, 5, 4]], "PAD", 80) + elements("B31", [[1, 2]], "L", 90)
+    text += "*SHELL SECTION, ELSET=PAD, MATERIAL=RUBBER\n1.\n"
+    text += "*BEAM SECTION, SECTION=ARBITRARY, ELSET=L, MATERIAL=STEEL\n3, 0., 0., 1.\n"
+    found = read(text)
+    assert [(x.name, x.count) for x in found.model.left_out] == [
+        ("S4 of PAD, material RUBBER without linear *ELASTIC", 1),
+        ("B31 of L, SECTION=ARBITRARY of 4 sizes", 1),
+        ("*HYPERELASTIC", 1),
+    ]
+    assert len(again(found).shells) == 4
+
+
+def test_an_edge_of_shells_is_its_nodes(read):
+    """E2 of the last element: its nodes 2 and 3, as a coupling takes them."""
+    made = plate(0.3, 0.2, 2, 2, 1e-3)
+    text = shell_text(made) + nodes([[0.4, 0.1, 0]], 99) + "*SURFACE, NAME=S\n4, E2\n"
+    text += "*COUPLING, CONSTRAINT NAME=C, REF NODE=99, SURFACE=S\n*KINEMATIC\n"
+    (body,) = again(read(text)).rigid
+    assert set(body.dependent) == set(made.shells.nodes[3, 1:3].tolist())
 
 
 def test_a_mesh_alone_takes_its_properties_by_set(read):
@@ -419,8 +453,7 @@ FAULTS = [
     ("elset=ALL\n1, 1,", "elset=ALL\n1, 77,", r"line \d+: \*ELEMENT: there is no node 77"),
     ("ELSET=ALL", "ELSET=AL", r"there is no element set 'AL'; did you mean 'all'\?"),
     ("MATERIAL=STEEL", "MATERIAL=IRON", r"there is no material 'IRON'; there are steel"),
-    ("*ELASTIC\n2.1e11, 0.3\n", "", r"material 'STEEL' has no \*ELASTIC"),
-    ("*ELASTIC", "*ELASTIC, TYPE=COUPLED", "TYPE COUPLED is not understood"),
+    ("*NODE\n", "*NGEN\n1, 9, 1\n*NODE\n", r"line 1: \*NGEN: generated meshes are not read"),
     (", type=S4R", "", "the parameter TYPE is missing"),
 ]
 

@@ -7,8 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from ...geometry.mesh_cells import across
 from ...geometry.nearest import ShellSurface
-from ...model.assembly import Average, Bushes, Equation, Masses, RigidBody, Scalars
+from ...model.assembly import (
+    Average,
+    Bushes,
+    Equation,
+    Masses,
+    RigidBody,
+    Scalars,
+    appended,
+)
 from .abaqus_mesh import AbaqusMesh
 from .abaqus_sections import orientation_of
 from .keywords import Keyword
@@ -53,37 +62,48 @@ class AbaqusJoints:
         return True
 
     def families(self) -> dict[str, Any]:
-        """The families of an assembly over these points."""
-        n = len(self.lines)
-        ends = np.array([rows for rows, _ in self.lines], dtype=np.int64).reshape(-1, 2)
-        k = np.zeros((n, 6))
-        k[:, 0] = [value for _, value in self.lines]
-        x = np.diff(self.points[ends], axis=1)[:, 0]
-        across = np.eye(3)[np.argmin(np.abs(x), axis=1)] if n else np.zeros((0, 3))
-        z = np.cross(x, across)
-        frame = np.stack([x, np.cross(z, x), z], axis=1)
-        frame /= np.linalg.norm(frame, axis=2, keepdims=True)
-        place = self.points[ends].mean(axis=1) if n else np.zeros((0, 3))
+        """The families of an assembly over these points; all ids are given by the deck."""
         axes = np.broadcast_to(np.eye(3), (len(self.points), 3, 3)).copy()
         for row, turned in self.frames.items():
             axes[row] = turned
-        m = len(self.scalars)
-        pairs, components = (
-            np.array([s[i] for s in self.scalars], dtype=np.int64).reshape(-1, 2) for i in (0, 1)
-        )
-        values = np.array([s[2] for s in self.scalars])
-        nodes = np.array([row for row, _ in self.masses], dtype=np.int64)
-        matrix = np.array([M for _, M in self.masses]).reshape(-1, 6, 6)
-        none = np.zeros((n, 6))
+        rows, components, values = zip(*self.scalars, strict=True) if self.scalars else ((), (), ())
+        springs = {
+            "ids": np.zeros(len(rows), np.int64),
+            "nodes": np.array(rows, np.int64).reshape(-1, 2),
+            "component": np.array(components, np.int64).reshape(-1, 2),
+            "value": np.array(values, float),
+        }
+        masses = {
+            "ids": np.zeros(len(self.masses), np.int64),
+            "node": np.array([row for row, _ in self.masses], np.int64),
+            "matrix": np.array([M for _, M in self.masses]).reshape(-1, 6, 6),
+        }
         return {
             "points": self.points,
             "axes": axes if self.frames else None,
             "rigid": tuple(self.rigid),
             "supports": np.array(sorted(self.supports), dtype=np.int64).reshape(-1, 2),
-            "masses": Masses(np.zeros(len(nodes), np.int64), nodes, matrix),
-            "springs": Scalars(np.zeros(m, np.int64), pairs, components, values, np.zeros(m)),
-            "bushes": Bushes(np.zeros(n, np.int64), ends, frame, place, k, none, none),
+            "masses": appended(Masses(), **masses),
+            "springs": appended(Scalars(), **springs),
+            "bushes": self._axial_springs(),
         }
+
+    def _axial_springs(self) -> Bushes:
+        ends = np.array([rows for rows, _ in self.lines], dtype=np.int64).reshape(-1, 2)
+        x = np.diff(self.points[ends], axis=1)[:, 0]
+        z = np.cross(x, across(self.points[ends]))
+        frame = np.stack([x, np.cross(z, x), z], axis=1)
+        stiffness = np.zeros((len(ends), 6))
+        stiffness[:, 0] = [value for _, value in self.lines]
+        made: Bushes = appended(
+            Bushes(),
+            ids=np.zeros(len(ends), np.int64),
+            nodes=ends,
+            frame=frame / np.linalg.norm(frame, axis=2, keepdims=True),
+            place=self.points[ends].mean(axis=1),
+            stiffness=stiffness,
+        )
+        return made
 
     def _rows(self, key: Keyword, name: str, row: int = -1) -> list[int]:
         return [self.row[id] for id in self.mesh.group(key, name, row)]

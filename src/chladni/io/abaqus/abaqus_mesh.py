@@ -96,6 +96,8 @@ class AbaqusMesh:
             self.elements.gather(key, key.word("ELSET"))
         elif key.name == "SURFACE":
             self.surfaces.setdefault(full_name(key.scope, key.word("NAME")), []).append(key)
+        elif key.name in ("NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY"):
+            raise key.fault("generated meshes are not read; write the nodes and elements out")
         else:
             return False
         return True

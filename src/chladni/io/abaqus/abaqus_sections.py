@@ -1,5 +1,6 @@
 """Materials, orientations and sections of an input file as parts of a deck."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -20,6 +21,7 @@ from ...model.properties import (
 )
 from ..meshes.part_statement import PartStatement, beam_section
 from ..nastran.read.beam_profiles import SHAPES
+from ..nastran.read.coordinate_systems import Frame
 from ..nastran.read.laminate import Ply, laminate_section
 from .abaqus_mesh import AbaqusMesh
 from .element_types import MEMBRANE, TRUSS, kind_of
@@ -30,38 +32,31 @@ SECTIONS = (
     "BEAM GENERAL SECTION",
 )  # fmt: skip
 OF_MATERIALS = ("MATERIAL", "ELASTIC", "DENSITY", "DAMPING")
-# shear area over area of sections by name: Abaqus, Choosing a beam element, transverse shear
-_SHEAR = {"RECT": 0.85, "CIRC": 0.89, "PIPE": 0.53, "THICK PIPE": 0.53, "BOX": 0.44, "I": 0.44}
+_PROFILES = {  # of *BEAM SECTION: shape of PBARL, positions of its sizes, shear area over area
+    "RECT": ("BAR", (1, 0), 0.85),
+    "CIRC": ("ROD", (0,), 0.89),
+    "PIPE": ("TUBE2", (0, 1), 0.53),
+    "THICK PIPE": ("TUBE2", (0, 1), 0.53),
+    "BOX": ("BOX1", (1, 0, 2, 4, 3, 5), 0.44),
+    "I": ("I", (1, 2, 3, 6, 4, 5), 0.44),
+}
 _DOWN = (0.0, 0.0, -1.0)  # n1 of beams where the file gives none
 
 
 @dataclass(frozen=True, eq=False)
 class AbaqusOrientation:
-    """A system of material axes: rectangular or cylindrical, turned about one of its axes."""
+    """A system of material axes, turned about one of them."""
 
-    cylindrical: bool
-    a: np.ndarray  # (3,) points of the card
-    b: np.ndarray
-    about: int  # axis of the additional rotation
+    system: Frame
+    about: int  # axis of the additional rotation, 0-2
     angle: float  # [rad]
 
     def frames(self, x: np.ndarray) -> np.ndarray:
         """Axes (n, 3, 3), as rows, at places (n, 3)."""
-        if self.cylindrical:
-            z = np.broadcast_to(self.b - self.a, x.shape)
-            first = x - self.a
-        else:
-            z = np.broadcast_to(np.cross(self.a, self.b), x.shape)
-            first = np.broadcast_to(self.a, x.shape)
-        z = z / np.linalg.norm(z, axis=1, keepdims=True)
-        first = first - np.einsum("ni,ni->n", first, z)[:, None] * z
-        first = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
-        axes = np.stack([first, np.cross(z, first), z], axis=1)
-        c, s, k = np.cos(self.angle), np.sin(self.angle), self.about
-        turn = np.eye(3)
-        i, j = (k + 1) % 3, (k + 2) % 3
+        turn, (i, j) = np.eye(3), np.array([self.about + 1, self.about + 2]) % 3
+        c, s = np.cos(self.angle), np.sin(self.angle)
         turn[np.ix_((i, j), (i, j))] = [[c, s], [-s, c]]
-        return np.asarray(turn @ axes)
+        return np.asarray(turn @ self.system.at(x))
 
     def on_shells(self, x: np.ndarray) -> np.ndarray:
         """Direction (n, 3) whose projection is material axis 1 of shells.
@@ -74,15 +69,26 @@ class AbaqusOrientation:
 def orientation_of(key: Keyword, kind: str) -> AbaqusOrientation:
     """Read *ORIENTATION and *TRANSFORM of a kind RECTANGULAR (R) or CYLINDRICAL (C).
 
-    Without a second line the third axis is the normal of shells.
+    Points a and b are on axis 1 and in plane 1-2, or on the axis of a cylinder. Without a second
+    line the third axis is the normal of shells.
     """
-    points = np.array((key.reals(0) + [0.0] * 6)[:6]).reshape(2, 3)
-    about = int(key.real(1, 0, 3.0)) if len(key.rows) > 1 else 3
-    angle = np.radians(key.real(1, 1, 0.0)) if len(key.rows) > 1 else 0.0
-    if kind[:1].upper() not in ("R", "C"):
+    a, b = np.array([*key.reals(0), *[0.0] * 6][:6]).reshape(2, 3)
+    letter = kind[:1].upper()
+    if letter not in ("R", "C"):
         raise key.fault(f"system {kind} is not understood; there are RECTANGULAR and CYLINDRICAL")
-    cylindrical = kind[0].upper() == "C"
-    return AbaqusOrientation(cylindrical, points[0], points[1], about - 1, float(angle))
+    z, x = (np.cross(a, b), a) if letter == "R" else (b - a, np.eye(3)[np.argmin(np.abs(b - a))])
+    y = np.cross(z, x)
+    if not np.linalg.norm(y) > 0:
+        raise key.fault("its points lie on one line", 0)
+    axes = np.array([v / np.linalg.norm(v) for v in (np.cross(y, z), y, z)])
+    frame = Frame(letter, np.zeros(3) if letter == "R" else a, axes)
+    two = len(key.rows) > 1
+    about, angle = (int(key.real(1, 0, 3.0)), key.real(1, 1, 0.0)) if two else (3, 0.0)
+    return AbaqusOrientation(frame, about - 1, float(np.radians(angle)))
+
+
+class _NotUnderstood(Exception):
+    """A section whose elements are left out; its text says why."""
 
 
 def materials_of(keys: Iterable[Keyword]) -> dict[str, Material]:
@@ -114,8 +120,7 @@ def _elastic(key: Keyword, m: Material) -> Material:
     elif kind.startswith("ENGINEERING") and len(v) > 8:
         E1, E2, nu12, (G12, G13, G23) = v[0], v[1], v[3], v[6:9]
     else:
-        raise key.fault(f"TYPE {kind} is not understood; there are ISOTROPIC, LAMINA and "
-                        "ENGINEERING CONSTANTS")  # fmt: skip
+        return m  # the elements are listed
     return Orthotropic(E1, E2, nu12, G12, G13, G23, m.rho, m.damping, m.id)
 
 
@@ -130,6 +135,7 @@ class AbaqusParts:
     cells: list[ForeignCells] = field(default_factory=list)  # their nodes by number of the deck
     assigned: set[int] = field(default_factory=set)  # elements
     nodal: dict[int, float] = field(default_factory=dict)  # thickness at nodes
+    left_out: Counter[str] = field(default_factory=Counter)
 
     def read(self, key: Keyword) -> None:
         """Take in a section and the elements of its set by their kinds, or nodal thickness."""
@@ -145,8 +151,13 @@ class AbaqusParts:
         dimension = {"SHELL": 2, "MEMBRANE": 2, "BEAM": 1}.get(key.name.split()[0], 3)
         for type, ids in kinds.items():
             own = 1 if TRUSS.fullmatch(type) else dimension
-            if (kind := kind_of(type)) and DIMENSION[kind] == own:
+            if not (kind := kind_of(type)) or DIMENSION[kind] != own:
+                continue
+            try:
                 self._add(key, type, kind, ids)
+            except _NotUnderstood as error:
+                self.left_out[f"{type} of {name}, {error}"] += len(ids)
+                self.assigned |= set(ids)
 
     def state(self, statement: PartStatement) -> None:
         """Give a statement's section to the elements of a set, or to all that have none."""
@@ -202,7 +213,7 @@ class AbaqusParts:
     def _section(self, key: Keyword, type: str) -> tuple[Section, float, np.ndarray | None]:
         """Section, offset of shells, n1 of beams."""
         if key.name.startswith("BEAM"):
-            return *self._beam(key), self._n1(key)  # type: ignore[return-value]
+            return self._beam(key), 0.0, self._n1(key)
         if "COMPOSITE" in key.words:
             stack = laminate_section(self._plies(key))
             return stack, self._offset(key) * stack.thickness, None
@@ -220,7 +231,7 @@ class AbaqusParts:
         if made is None:
             raise key.fault(f"there is no material {name!r}; there are {', '.join(self.materials)}")
         if isinstance(made, Isotropic) and not made.E > 0:
-            raise key.fault(f"material {name!r} has no *ELASTIC")
+            raise _NotUnderstood(f"material {name} without linear *ELASTIC")
         return made
 
     def _offset(self, key: Keyword) -> float:
@@ -253,33 +264,24 @@ class AbaqusParts:
         along_x = np.abs(normal[:, :1]) > np.cos(np.radians(0.1))
         return np.where(along_x, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
 
-    def _beam(self, key: Keyword) -> tuple[BeamSection, float]:
-        """Sections by their sizes (RECT: along n1 and n2), or by their area and moments."""
+    def _beam(self, key: Keyword) -> BeamSection:
+        """Sections by their sizes, or by their area and moments; n1 is axis y of our beams."""
         kind, v = key.words.get("SECTION", "GENERAL").upper(), key.reals(0)
-        sizes = {
-            "RECT": ("BAR", lambda: (v[1], v[0])),
-            "CIRC": ("ROD", lambda: v[:1]),
-            "PIPE": ("TUBE2", lambda: v[:2]),
-            "THICK PIPE": ("TUBE2", lambda: v[:2]),
-            "BOX": ("BOX1", lambda: (v[1], v[0], v[2], v[4], v[3], v[5])),
-        }
-        if kind in sizes:
-            shape, numbers = sizes[kind]
-            made = beam_section(self._beam_material(key), SHAPES[shape][0](*numbers()))
-            shear = _SHEAR[kind]
-        elif kind == "GENERAL" and len(v) > 4:
+        material = self._beam_material(key)
+        if kind == "GENERAL" and len(v) > 4:
             A, I11, I12, I22, J = v[:5]
-            made = BeamSection(self._beam_material(key), A, I22, I11, I12, J)
-            shear = 0.0
-        else:
-            raise key.fault(
-                f"SECTION {kind} is not understood; there are GENERAL, {', '.join(sizes)}"
-            )
-        return replace(made, shear=(shear, shear)), 0.0
+            return BeamSection(material, A, I22, I11, I12, J)
+        if kind not in _PROFILES or len(v) <= max(_PROFILES[kind][1]):
+            raise _NotUnderstood(f"SECTION={kind} of {len(v)} sizes")
+        shape, sizes, shear = _PROFILES[kind]
+        made = beam_section(material, SHAPES[shape][0](*(v[k] for k in sizes)))
+        if kind == "I":  # its height is along n2
+            made = replace(made, I1=made.I2, I2=made.I1)
+        return replace(made, shear=(shear, shear))
 
     def _beam_material(self, key: Keyword) -> Material:
         """The material by name, or E, G and DENSITY of a general section."""
-        if "MATERIAL" in key.words:
+        if key.words.get("MATERIAL"):
             return self._material(key, key.words["MATERIAL"])
         E, G = key.real(2, 0), key.real(2, 1)
         return Isotropic(E, E / (2 * G) - 1, float(key.words.get("DENSITY", 0)), G=G)

@@ -50,11 +50,15 @@ def nodes_of(type: str) -> int:
 
 
 def faces_of(type: str, label: str) -> list[tuple[list[int], list[int]]]:
-    """(corners, nodes on edges) of a face S1, S2 ... of an element; without a label all faces."""
+    """(corners, nodes on edges) of a face S1, S2 ... or edge E1 ...; without a label all faces."""
     kind = kind_of(type)
     if DIMENSION.get(kind) == 2:
         corners = 3 if kind.startswith("triangle") else 4
-        return [(list(range(corners)), list(range(corners, min(NODES[kind], 2 * corners))))]
+        between = list(range(corners, min(NODES[kind], 2 * corners)))
+        if label[:1] == "E" and label[1:].isdecimal():
+            side = int(label[1:]) - 1
+            return [([side, (side + 1) % corners], between[side : side + 1])]
+        return [(list(range(corners)), between)]
     corners = CORNERS.get(min(NODES.get(kind, 0), 20), 0)
     every = _FACES.get(corners, ())
     if label[:1] == "S" and label[1:].isdecimal():

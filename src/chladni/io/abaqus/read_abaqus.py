@@ -71,7 +71,7 @@ def read_abaqus(path: Path, stated: Sequence[PartStatement] = ()) -> ForeignMode
         ids, parts=tuple(parts.parts), shells=shells, solids=solids, beams=beams,
         **joints.families(),
     )  # fmt: skip
-    left_out = Counter(_without_section(mesh, parts)) + joints.left_out
+    left_out = Counter(_without_section(mesh, parts)) + parts.left_out + joints.left_out
     return ForeignModel(
         made, tuple(LeftOut(what, n, "not in the deck") for what, n in left_out.items())
     )
