@@ -14,14 +14,15 @@ import numpy as np
 from ...errors import FileError
 from ...geometry.mesh_cells import NODES
 from ..damage import DAMAGED
-from .foreign_model import ForeignMesh, LeftOut
+from .foreign_model import ForeignMesh, LeftOut, numbered_mesh
 from .part_statement import PartStatement
 
-_SHELLS = {181: 4, 63: 4, 43: 4, 143: 4, 281: 8, 93: 8}  # nodes by number of the element type
-_SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
-_BEAMS = {188: 2, 189: 3, 180: 2}
-_KINDS = {4: "quad", 8: "quad8"}
-_VOLUMES = {8: "hexahedron", 20: "hexahedron20", 10: "tetra10", 4: "tetra"}
+_KINDS = {  # by the number of the element type
+    **dict.fromkeys((181, 63, 43, 143), "quad"), **dict.fromkeys((281, 93), "quad8"),
+    **dict.fromkeys((185, 45), "hexahedron"), **dict.fromkeys((186, 95), "hexahedron20"),
+    **dict.fromkeys((187, 92), "tetra10"), 285: "tetra", 188: "line", 180: "line", 189: "line3",
+}  # fmt: skip
+_STRAIGHT = {"quad8": "quad", "hexahedron20": "hexahedron", "tetra10": "tetra", "line3": "line"}
 _MASS, _NO_STIFFNESS = 21, (200, 154, 170, 174)
 _DOFS = {"UX": 1, "UY": 2, "UZ": 3, "ROTX": 4, "ROTY": 5, "ROTZ": 6}
 _MATTERS = ("CE", "CP", "CERIG", "RBE3", "TB", "SECOFFSET")
@@ -42,82 +43,61 @@ class ArchiveCommands:
 
 def read_archive(path: Path) -> ForeignMesh:
     """Mesh, sections, materials, masses and supports, in the archive's own numbers."""
-    import meshio
     from mapdl_archive import Archive
 
     try:
         made = Archive(str(path), parse_vtk=False)
-        elements, ids, points = made.elem, np.asarray(made.nnum), np.asarray(made.nodes)[:, :3]
-        types = dict(np.asarray(made.ekey).tolist())
-        reals = dict(zip(np.asarray(made.rlblock_num).tolist(), made.rlblock, strict=True))
+        ids, points = np.asarray(made.nnum, np.int64), np.asarray(made.nodes)[:, :3]
+        types, rows = dict(made.ekey.tolist()), [e.tolist() for e in made.elem]
+        reals = dict(zip(made.rlblock_num, made.rlblock, strict=True))
     except (*DAMAGED, RuntimeError) as error:
         why = "the blocks NBLOCK and EBLOCK are missing or damaged"
         raise FileError(f"{path} cannot be read as an Ansys archive: {why}") from error
-    said = _lines(path)
-    parts: dict[tuple[int, int, int, int], int] = {}
-    rows: dict[tuple[str, int], list[list[int]]] = {}
-    masses, left_out, none = [], Counter[str](), np.zeros(1)
-    for element in (np.asarray(e).tolist() for e in elements):
-        (material, kind, real, section), nodes = element[:4], element[_HEAD:]
-        code = types.get(kind, 0)
-        if code == _MASS:
-            masses.append((nodes[0], float(reals.get(real, none)[0])))
-        elif (shape := _shape(code, nodes)) is None:
-            if code not in _NO_STIFFNESS:
-                left_out[f"elements of type {code}"] += 1
-        else:
-            key = (code, material, section, real)
-            part = parts.setdefault(key, len(parts) + 1)
-            rows.setdefault((shape[0], part), []).append([element[8], *shape[1]])
-    if not rows:
-        raise FileError(f"{path} has no shells, solids or beams that are known")
-    at = {int(id): k for k, id in enumerate(ids)}
-    cells = [(kind, [[at[n] for n in row[1 : 1 + NODES[kind]]] for row in table])
-             for (kind, _), table in rows.items()]  # fmt: skip
-    data = {
-        "element": [np.array([row[0] for row in table]) for table in rows.values()],
-        "part": [np.full(len(table), part) for (_, part), table in rows.items()],
-    }
-    mesh = meshio.Mesh(points, cells, {"grid": ids}, data)
-    names = {n: said.names.get(key[2], f"material {key[1]}") for key, n in parts.items()}
-    names = {n: name if list(names.values()).count(name) == 1 else f"{name} ({n})"
-             for n, name in names.items()}  # fmt: skip
-    others = [LeftOut(what, n, "not understood") for what, n in (left_out + said.others).items()]
+    said = _commands(path)
+    parts: dict[tuple[int, ...], int] = {}  # number by type, material, real constants, section
+    cells: dict[str, list[list[int]]] = {}
+    masses = []
+    for (material, type_, real, section, *_), element, nodes in (
+        (r, r[8], r[_HEAD:]) for r in rows
+    ):
+        code = types.get(type_, 0)
+        kind = _KINDS.get(code, "")
+        if kind and 0 in nodes[: NODES[kind]]:  # without nodes on edges
+            kind = _STRAIGHT.get(kind, kind)
+        if kind:
+            part = parts.setdefault((code, material, real, section), len(parts) + 1)
+            cells.setdefault(kind, []).append([element, part, *nodes[: NODES[kind]]])
+        elif code == _MASS:
+            masses.append((nodes[0], float(reals.get(real, [0.0])[0])))
+        elif code not in _NO_STIFFNESS:
+            said.others[f"elements of type {code}"] += 1
+    names = [said.names.get(key[3], f"material {key[1]}") for key in parts]
+    names = [n if names.count(n) == 1 else f"{n} ({k})" for k, n in enumerate(names, start=1)]
     return ForeignMesh(
-        mesh, str(path), names,
-        tuple(PartStatement(str(n), _values(key, said, reals)) for key, n in parts.items()),
-        tuple((at[node], m) for node, m in masses),
-        tuple(others),
-        tuple((at[node], c) for node, c in said.supports if node in at),
-    )  # fmt: skip
+        numbered_mesh(str(path), ids, points, cells),
+        str(path),
+        dict(enumerate(names, start=1)),
+        tuple(PartStatement(str(k), _values(key, said, reals)) for key, k in parts.items()),
+        tuple(masses),
+        tuple(LeftOut(what, n, "not understood") for what, n in said.others.items()),
+        tuple(said.supports),
+    )
 
 
-def _shape(code: int, nodes: list[int]) -> tuple[str, list[int]] | None:
-    """Kind and nodes of an element; None for those that become no cells."""
-    for table, kinds in ((_SHELLS, _KINDS), (_SOLIDS, _VOLUMES)):
-        if n := table.get(code):
-            return kinds[n], nodes[:n]
-    if n := _BEAMS.get(code):
-        return ("line", "line3")[n - 2], nodes[:n]
-    return None
-
-
-def _values(
-    key: tuple[int, int, int, int], said: ArchiveCommands, reals: Reals
-) -> dict[str, float]:
+def _values(key: tuple[int, ...], said: ArchiveCommands, reals: Reals) -> dict[str, float]:
     """Properties of a part: those of its section, else of its real constants, and its material."""
-    code, material, section, real = key
+    code, material, real, section = key
     own = dict(said.sections.get(section, {}))
     stuff = said.materials.get(int(own.pop("layer", material)), {})
-    if code in _SHELLS and "t" not in own and real in reals:
-        own["t"] = float(reals[real][0])
+    if _KINDS[code].startswith("quad") and real in reals:
+        own.setdefault("t", float(reals[real][0]))
     return {"nu": 0.3, **stuff, **own} if {"E", "rho"} <= set(stuff) else own
 
 
 _MATERIAL = {"EX": "E", "NUXY": "nu", "PRXY": "nu", "DENS": "rho"}
 
 
-def _lines(path: Path) -> ArchiveCommands:
+def _commands(path: Path) -> ArchiveCommands:
     """Commands of the archive, line by line."""
     said, kind, section = ArchiveCommands(), "", 0
     block = 0  # layers of a SECBLOCK that follow

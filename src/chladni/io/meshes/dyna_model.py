@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError
 from ..dyna import (
     KeywordBlock,
     keyword_blocks,
@@ -18,10 +17,9 @@ from ..dyna import (
     shells_of,
     table,
 )
-from .foreign_model import ForeignMesh, LeftOut
+from .foreign_model import ForeignMesh, LeftOut, numbered_mesh
 from .part_statement import PartStatement
 
-_SOLIDS = {8: "hexahedron", 10: "tetra10"}
 _WIDTH = 10
 _LINEAR = (  # materials whose first line is MID, RO, E, PR
     "ELASTIC", "001", "PLASTIC_KINEMATIC", "003", "RIGID", "020", "PIECEWISE_LINEAR_PLASTICITY",
@@ -33,37 +31,23 @@ _READ = ("ELEMENT_SHELL", "ELEMENT_SOLID", "ELEMENT_MASS")
 
 def read_dyna_model(path: Path) -> ForeignMesh:
     """The mesh with its thickness, its materials and masses, in the file's own numbers."""
-    import meshio
-
     blocks = list(keyword_blocks(path))
     ids, places = nodes_of(blocks)
     names, sections = parts_of(blocks)
-    cells, element, part, thickness = [], [], [], []
     shells, t = shells_of(blocks)
-    if len(shells):
-        gauges = section_thickness(blocks)
-        gauge = np.array([gauges.get(sections.get(int(p), -1), np.nan) for p in shells[:, 1]])
-        t = np.where(t > 0, t, gauge[:, None])
-        quads = np.where(shells[:, 5:] == 0, shells[:, 4:5], shells[:, 5:])
-        cells.append(("quad", np.hstack([shells[:, 2:5], quads])))
-        element, part, thickness = [shells[:, 0]], [shells[:, 1]], [t]
-    for kind, rows in _solids(blocks).items():
-        cells.append((kind, rows[:, 2:]))
-        element.append(rows[:, 0])
-        part.append(rows[:, 1])
-        thickness.append(np.full((len(rows), 4), np.nan))
-    if not cells:
-        raise FileError(f"{path} has no *ELEMENT_SHELL and no *ELEMENT_SOLID")
-    masses = _masses(blocks)
-    asked = np.concatenate([c.ravel() for _, c in cells] + [masses[:, 1].astype(int)])
-    if len(lost := np.setdiff1d(asked, ids)):
-        raise FileError(f"{path}: an element names node {lost[0]}, which is not in *NODE")
-    rows = np.searchsorted(ids, masses[:, 1].astype(int)).tolist()
-    blocks_of = [(kind, np.searchsorted(ids, nodes)) for kind, nodes in cells]
-    data = {"element": element, "part": part, "thickness": thickness}
-    mesh = meshio.Mesh(places, blocks_of, {"grid": ids}, data)
-    lumps = tuple(zip(rows, masses[:, 2].tolist(), strict=True))
-    return ForeignMesh(mesh, str(path), names, _known(blocks), lumps, tuple(_left_out(blocks)))
+    shells[:, 5] = np.where(shells[:, 5] == 0, shells[:, 4], shells[:, 5])
+    gauges = section_thickness(blocks)
+    gauge = np.array([gauges.get(sections.get(p, -1), np.nan) for p in shells[:, 1].tolist()])
+    cells = {"quad": shells, **_solids(blocks)}
+    mesh = numbered_mesh(str(path), ids, places, cells)
+    mesh.cell_data["thickness"] = [
+        np.where(t > 0, t, gauge[:, None])
+        if b.type == "quad"
+        else np.full((len(b.data), 4), np.nan)
+        for b in mesh.cells
+    ]
+    masses = tuple((int(node), float(m)) for _, node, m in _masses(blocks))
+    return ForeignMesh(mesh, str(path), names, _known(blocks), masses, tuple(_left_out(blocks)))
 
 
 def _solids(blocks: list[KeywordBlock]) -> dict[str, np.ndarray]:

@@ -1,7 +1,7 @@
 """Models of other programs: a structure in the numbers of its file, and what was left out of it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -48,9 +48,39 @@ class ForeignMesh:
     name: str  # for sentences
     names: Mapping[int, str] = field(default_factory=dict)  # of parts by number
     known: tuple[PartStatement, ...] = ()
-    masses: tuple[tuple[int, float], ...] = ()  # (row of points, mass)
+    masses: tuple[tuple[int, float], ...] = ()  # (number of the node, mass)
     left_out: tuple[LeftOut, ...] = ()
-    supports: tuple[tuple[int, int], ...] = ()  # (row of points, component)
+    supports: tuple[tuple[int, int], ...] = ()  # (number of the node, component)
+
+
+def numbered_mesh(name: str, ids: np.ndarray, points: np.ndarray, cells: Mapping[str, Any]) -> Any:
+    """A ``meshio.Mesh`` of nodes and cells by their numbers.
+
+    Parameters
+    ----------
+    cells : by kind, rows of the number of an element, that of its part, and those of its nodes
+
+    Raises
+    ------
+    FileError
+        If there are no cells, or one names a node that is not there.
+    """
+    import meshio
+
+    if not len(ids) or not any(map(len, cells.values())):
+        raise FileError(f"{name} has no shells, solids or beams that are known")
+    tables = {kind: np.asarray(rows, dtype=np.int64) for kind, rows in cells.items() if len(rows)}
+    order = np.argsort(ids)
+    blocks = []
+    for kind, table in tables.items():
+        at = np.searchsorted(ids, table[:, 2:], sorter=order)
+        at = order[np.minimum(at, len(ids) - 1)]
+        if (lost := ids[at] != table[:, 2:]).any():
+            raise FileError(f"{name}: an element names node {table[:, 2:][lost][0]}, which is "
+                            "not there")  # fmt: skip
+        blocks.append((kind, at))
+    data = {what: [t[:, k] for t in tables.values()] for k, what in ((0, "element"), (1, "part"))}
+    return meshio.Mesh(points, blocks, {"grid": ids}, data)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,27 +248,28 @@ def _assembly(
     given: ForeignMesh, points: np.ndarray, parts: tuple[Part, ...], cells: list[ForeignCells]
 ) -> Assembly:
     """The structure over the points that it uses, ids increasing."""
-    rows = [c.nodes.ravel() for c in cells] + [np.array([r for r, _ in given.masses], int)]
-    used = np.unique(np.concatenate(rows))
-    ids = np.asarray(given.mesh.point_data.get("grid", np.arange(1, len(points) + 1)))
-    ids = ids.astype(np.int64).ravel()[used]
-    if len(np.unique(ids)) < len(ids) or ids.min() <= 0:
-        ids = used + 1
-    used, ids = used[np.argsort(ids)], np.sort(ids)
+    grid = np.asarray(given.mesh.point_data.get("grid", np.arange(1, len(points) + 1)))
+    grid = grid.astype(np.int64).ravel()
+    if len(np.unique(grid)) < len(grid) or grid.min() <= 0:
+        grid = np.arange(1, len(points) + 1)
+    used = np.isin(grid, [id for id, _ in given.masses])
+    for one in cells:
+        used[one.nodes.ravel()] = True
+    rows = np.flatnonzero(used)[np.argsort(grid[used])]
     new = np.full(len(points), -1)
-    new[used] = np.arange(len(used))
-    points = points[used]
+    new[rows] = np.arange(len(rows))
+    ids, points = grid[rows], points[rows]
     if not np.isfinite(points).all():
         raise FileError(f"{given.name}: a coordinate is not a number")
-    placed = [ForeignCells(**{**vars(c), "nodes": new[c.nodes]}) for c in cells]
-    held = [(new[row], c) for row, c in given.supports if new[row] >= 0]
-    supports = np.array(sorted(set(held)), dtype=np.int64).reshape(-1, 2)
-    masses = _masses(given, new)
-    return Assembly(ids, points, parts, *elements(placed, points), masses=masses, supports=supports)
-
-
-def _masses(given: ForeignMesh, new: np.ndarray) -> Masses:
-    node = np.array([new[row] for row, _ in given.masses], dtype=np.int64)
-    value = np.array([m for _, m in given.masses]).reshape(-1, 1, 1)
-    matrix = value * np.diag([1.0, 1, 1, 0, 0, 0])
-    return Masses(np.zeros(len(node), np.int64), node, matrix)
+    at = {id: k for k, id in enumerate(ids.tolist())}
+    held = sorted({(at[id], c) for id, c in given.supports if id in at})
+    lumped = np.array([at[id] for id, _ in given.masses], dtype=np.int64)
+    M = np.array([m for _, m in given.masses]).reshape(-1, 1, 1) * np.diag([1.0, 1, 1, 0, 0, 0])
+    return Assembly(
+        ids,
+        points,
+        parts,
+        *elements([replace(c, nodes=new[c.nodes]) for c in cells], points),
+        masses=Masses(np.zeros(len(lumped), np.int64), lumped, M),
+        supports=np.array(held, dtype=np.int64).reshape(-1, 2),
+    )

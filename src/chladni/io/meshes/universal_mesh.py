@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FileError
-from .foreign_model import ForeignMesh, LeftOut
+from .foreign_model import ForeignMesh, LeftOut, numbered_mesh
 
 _RING6, _RING8 = [0, 2, 4, 1, 3, 5], [0, 2, 4, 6, 1, 3, 5, 7]
 _KINDS: dict[int, tuple[str, list[int] | None]] = {  # kind, and where its nodes stand
@@ -36,8 +36,6 @@ _NODES, _ELEMENTS, _GROUPS = (2411, 781), (2412, 780), (2467, 2477, 2452, 2435)
 
 def read_universal_mesh(path: Path) -> ForeignMesh:
     """Nodes, elements and groups of a universal file, lengths in its own unit."""
-    import meshio
-
     ids, places = list[int](), list[list[float]]()
     elements: dict[int, list[list[int]]] = {}
     groups: dict[str, list[int]] = {}
@@ -45,9 +43,7 @@ def read_universal_mesh(path: Path) -> ForeignMesh:
         try:
             if kind in _NODES:
                 ids += [int(line[:10]) for line in lines[::2]]
-                places += [
-                    [float(x.replace("D", "E")) for x in line.split()] for line in lines[1::2]
-                ]
+                places += [[float(x.replace("D", "E")) for x in t.split()] for t in lines[1::2]]
             elif kind in _ELEMENTS:
                 _read_elements(kind, lines, elements)
             elif kind in _GROUPS:
@@ -58,29 +54,21 @@ def read_universal_mesh(path: Path) -> ForeignMesh:
         raise FileError(
             f"{path} is a universal file without a mesh: it needs the datasets 2411 and 2412"
         )
-    row = {id: k for k, id in enumerate(ids)}
-    cells, data, left_out = [], {"element": [], "part": []}, []  # type: ignore[var-annotated]
-    names = dict.fromkeys(e[1] for table in elements.values() for e in table)
-    parts = {k: str(k) for k in names}
+    parts = {part: str(part) for table in elements.values() for _, part, *_ in table}
     part_of: dict[int, int] = {}
-    for number, (name, members) in enumerate(groups.items(), start=max([*names, 0]) + 1):
+    for number, (name, members) in enumerate(groups.items(), start=max([*parts, 0]) + 1):
         parts[number] = name
-        part_of |= {id: number for id in members if id not in part_of}
+        part_of |= dict.fromkeys(set(members) - set(part_of), number)
+    cells: dict[str, list[list[int]]] = {}
+    left_out = []
     for code, table in elements.items():
-        if code not in _KINDS:
+        shape, order = _KINDS.get(code, ("", None))
+        if not shape:
             left_out.append(LeftOut(f"elements {code}", len(table), "no element has this number"))
-            continue
-        shape, order = _KINDS[code]
-        try:
-            nodes = np.array([[row[n] for n in e[2:]] for e in table])
-        except KeyError as missing:
-            raise FileError(
-                f"{path}: an element names node {missing}, which is not there"
-            ) from None
-        cells.append((shape, nodes if order is None else nodes[:, order]))
-        data["element"].append(np.array([e[0] for e in table]))
-        data["part"].append(np.array([part_of.get(e[0], e[1]) for e in table]))
-    mesh = meshio.Mesh(np.array(places), cells, {"grid": np.array(ids)}, data)
+        for id, part, *nodes in table if shape else ():
+            placed = nodes if order is None else [nodes[k] for k in order]
+            cells.setdefault(shape, []).append([id, part_of.get(id, part), *placed])
+    mesh = numbered_mesh(str(path), np.array(ids), np.array(places), cells)
     return ForeignMesh(mesh, str(path), parts, left_out=tuple(left_out))
 
 
