@@ -36,9 +36,9 @@ def run(
 ) -> None:
     """Make a Nastran deck of a model of another program.
 
-    MODEL is an input file of Abaqus or CalculiX, an Ansys archive (.cdb), an LS-DYNA keyword file,
-    a universal file, or a mesh that meshio reads: Gmsh, VTK, VTU, STL, MED, Exodus and others. The
-    deck has the numbers of the file. Whatever the deck does not have is listed.
+    MODEL is an input file of Abaqus or CalculiX, an Ansys archive (.cdb), an LS-DYNA keyword file
+    or a universal file. It may be a mesh that meshio reads: Gmsh, VTK, VTU, STL, MED and others.
+    The deck has the numbers of the file. Whatever the deck does not have is listed.
     """
     if not source.is_file():
         raise FileError(f"no file {source}{similar_names(source)}")

@@ -52,7 +52,7 @@ class Keyword:
         return value
 
     def cell(self, row: int, cell: int) -> str:
-        """The text of a cell, "" where there is none."""
+        """The text of a cell, "" for a cell that is not there."""
         return self.rows[row][cell] if row < len(self.rows) and cell < len(self.rows[row]) else ""
 
     def reals(self, row: int) -> list[float]:

@@ -32,7 +32,7 @@ Reals = Mapping[int, np.ndarray]
 
 @dataclass
 class ArchiveCommands:
-    """What the commands of an archive say."""
+    """Properties and supports that the commands of an archive state."""
 
     materials: dict[int, dict[str, float]] = field(default_factory=dict)
     sections: dict[int, dict[str, float]] = field(default_factory=dict)  # layer is its material

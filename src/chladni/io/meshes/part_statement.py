@@ -60,7 +60,7 @@ class PartStatement:
         return self.name.lower() in (name.lower(), str(number), "")
 
     def lacks(self, dimension: int) -> str:
-        """What lines (1), surfaces (2) or volumes (3) need in addition; "" for nothing."""
+        """Properties that lines (1), surfaces (2) or volumes (3) need in addition; "" for none."""
         value = self.values
         lacking = [] if {"E", "nu", "rho"} <= set(value) else ["a material"]
         if dimension == 2 and not value.get("t", 0) > 0:
