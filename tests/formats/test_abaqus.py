@@ -294,6 +294,15 @@ def test_ways_to_say_rigid_are_one(read, way):
     np.testing.assert_allclose(modes(made, 4), modes(again(read(due)), 4), rtol=1e-9)
 
 
+def test_rigid_bodies_are_joined_by_their_reference_nodes(read):
+    """Two clamped by one: a plate whose reference nodes are ends of a rigid bar to the ground."""
+    text = shell_text(plate(0.3, 0.2, 3, 2, 1e-3)) + nodes([[-0.1, 0, 0], [-0.2, 0.1, 0.1]], 98)
+    text += "*NSET, NSET=FEET\n1, 2\n*RIGID BODY, NSET=FEET, REF NODE=98\n*MPC\nBEAM, 98, 99\n"
+    due = shell_text(plate(0.3, 0.2, 3, 2, 1e-3)) + "*BOUNDARY\n1, 1, 6\n2, 1, 6\n"
+    found = modes(again(read(text + "*BOUNDARY\n99, 1, 6\n")), 4)
+    np.testing.assert_allclose(found, modes(again(read(due)), 4), rtol=1e-9)
+
+
 @pytest.mark.parametrize("way", ["coupling", "own"])
 def test_a_mean_carries_a_mass(read, way):
     """RBE3 of four corners: a lump at the centre of a free plate."""

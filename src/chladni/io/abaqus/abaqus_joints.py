@@ -114,13 +114,16 @@ class AbaqusJoints:
             raise key.fault(f"{name!r} stands for {len(rows)} nodes; one is due")
         return rows[0]
 
+    def _bound(self, row: int, component: int) -> bool:
+        """True for a motion that depends or is held."""
+        return (row, component) in self.dependent or (row, component) in self.supports
+
     def _free(self, row: int, components: Iterable[int], by: str) -> tuple[int, ...]:
         """Components that may depend, which do so from now on."""
-        wanted = [c for c in components if c <= 3 or row in self.turning]
-        taken = [c for c in wanted if (row, c) in self.dependent or (row, c) in self.supports]
-        if taken:
+        wanted = tuple(components)
+        free = tuple(c for c in wanted if not self._bound(row, c))
+        if len(free) < len(wanted):
             self.left_out[f"constraints of *{by} on motions that depend or are held already"] += 1
-        free = tuple(c for c in wanted if c not in taken)
         self.dependent |= {(row, c) for c in free}
         return free
 
@@ -235,8 +238,7 @@ class AbaqusJoints:
 
     def _mean(self, by: str, lead: int, weights: dict[int, float]) -> None:
         """RBE3: the reference follows the mean of the others in all six motions."""
-        taken = [c for c in ALL if (lead, c) in self.dependent | self.supports]
-        if taken:
+        if any(self._bound(lead, c) for c in ALL):
             self.left_out[f"*{by} whose reference node is held or depends already"] += 1
             return
         self.dependent |= {(lead, c) for c in ALL}
