@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..errors import ChladniError, FileError
@@ -13,10 +12,10 @@ from ..io.mesh_format import ABAQUS, foreign_format
 from ..io.meshes.foreign_model import ForeignModel, foreign_model
 from ..io.meshes.mesh_files import mesh_of, read_mesh
 from ..io.meshes.part_statement import PartStatement, part_statement, statements_of_table
-from ..io.nastran import Deck, read_deck, write_assembly
+from ..io.nastran import Deck, write_assembly
 from ..units import Units
 from ..units import units as unit_system
-from .loaded_model import DeckModels
+from .loaded_model import DeckModels, exported_deck
 from .unit_guess import guessed_units
 
 PartWords = Mapping[str, str] | Sequence[str] | Path | str
@@ -38,18 +37,20 @@ class ConvertedModel:
     model: ForeignModel
     units: Units | None
 
+    @property
+    def _as_written(self) -> Units:
+        """The system as the head of the deck names it; its numbers stay as they are."""
+        return Units("SI" if self.units is None else self.units.name, 1.0, 1.0)
+
     def write(self, path: Path | str) -> Path:
         """Write the deck with the numbers of the file."""
-        name = "SI" if self.units is None else self.units.name
-        return write_assembly(self.model.assembly, path, Units(name, 1.0, 1.0))
+        return write_assembly(self.model.assembly, path, self._as_written)
 
     @property
     def deck(self) -> Deck:
         """The deck that :meth:`write` writes."""
-        name = Path(self.source.stem).with_suffix(".bdf")
-        with TemporaryDirectory(prefix="chladni-") as folder:
-            deck = read_deck(self.write(Path(folder) / name))
-        return replace(deck, path=name, sources=tuple(replace(s, path=name) for s in deck.sources))
+        name = Path(f"{self.source.stem}.bdf")
+        return exported_deck(self.model.assembly, self._as_written, name)
 
     @property
     def models(self) -> DeckModels:

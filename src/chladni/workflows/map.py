@@ -19,8 +19,8 @@ from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
 from ..units import units as unit_system
-from .given_case import Source, exported_deck
-from .loaded_model import as_model
+from .given_case import Source
+from .loaded_model import as_model, exported_deck
 
 if TYPE_CHECKING:
     from ..view.mesh_grid import UnstructuredGrid

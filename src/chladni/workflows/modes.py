@@ -70,7 +70,7 @@ class NormalModes(Result):
         """The mesh of the model with a mode: ``shape`` (n, 3) [1/√kg] and ``frequency`` [Hz].
 
         Its elements have ``strain_energy_density`` [J/m³] in addition to the arrays of
-        :attr:`WorkingModel.mesh`; rigid modes have none.
+        ``WorkingModel.mesh``; rigid modes have none.
 
         Parameters
         ----------
