@@ -219,3 +219,25 @@ def test_effects_need_a_case():
     env = gym.make("chladni_envs:chladni/ParameterSelection-v0").unwrapped
     with pytest.raises(ShapeError, match="effects=True"):
         env.gain(np.zeros(env.p, bool))
+
+
+MESH = """import chladni, gymnasium
+env = gymnasium.make("chladni_envs:{}", case={})"""
+WITH_MODEL = 'chladni.load(mesh, "SI", parts=["steel"])'
+WITH_CASE = f"chladni.make_case({WITH_MODEL}.deck, recording, words=dict(units='SI'))"
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_a_converted_mesh_is_in_every_environment_in_two_lines(id):
+    """A mesh with thickness alone, with a recording of it where the environment needs one."""
+    import meshio
+
+    made = folded_panel()
+    t = [np.full(len(made.shells), 1e-3)]
+    cells = [("quad", made.shells.nodes)]
+    mesh = meshio.Mesh(made.points, cells, cell_data={"thickness": t})
+    names = {"mesh": mesh, "recording": _recorded(made)}
+    exec(MESH.format(id, WITH_MODEL if "Placement" in id else WITH_CASE), names)
+    env = names["env"]
+    env.reset(seed=0)
+    assert env.step(env.action_space.sample())[1] is not None

@@ -32,6 +32,7 @@ BUILT_IN = (  # each a module here with a function ``run``, or ``STEPS`` of a co
     "diagnose",
     "init",
     "check",
+    "convert",
     "demo",
     "calibrate",
     "correlate",

@@ -8,7 +8,12 @@ import numpy as np
 from ..arguments import checked
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import LabelError
-from ..fem.energy import mass_properties, part_energies
+from ..fem.energy import (
+    element_energies,
+    element_volumes,
+    mass_properties,
+    part_energies,
+)
 from ..fem.loose_parts import loose_grids
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
@@ -17,6 +22,7 @@ from ..units import Units
 from .loaded_model import LEAST_MODES, Model, as_model
 
 if TYPE_CHECKING:
+    from ..view.mesh_grid import UnstructuredGrid
     from .given_case import Source
 
 
@@ -58,6 +64,31 @@ class NormalModes(Result):
     def shapes(self) -> np.ndarray:
         """Mass-normalised shapes Φ (n, r) [1/√kg], over the rows of ``modal.dofs``."""
         return self.modal.shapes
+
+    @checked
+    def mesh(self, mode: int) -> "UnstructuredGrid":
+        """The mesh of the model with a mode: ``shape`` (n, 3) [1/√kg] and ``frequency`` [Hz].
+
+        Its elements have ``strain_energy_density`` [J/m³] in addition to the arrays of
+        ``WorkingModel.mesh``; rigid modes have none.
+
+        Parameters
+        ----------
+        mode : number from 1, the rigid ones counted
+        """
+        from ..view.mesh_grid import mesh_grid
+
+        if not 1 <= mode <= len(self):
+            raise LabelError(f"no mode {mode}; there are 1 to {len(self)}")
+        phi, made = self.shapes[:, [mode - 1]], self.origin.assembly
+        density = element_energies(self.origin.structure, phi)[:, 0] / element_volumes(made)
+        grid = mesh_grid(
+            made,
+            {"shape": self.origin.motion(phi)[:, :, 0]},
+            {"strain_energy_density": np.where(self.rigid[mode - 1], 0.0, density)},
+        )
+        grid.field_data["frequency"] = [float(self.frequency[mode - 1])]
+        return grid
 
 
 @checked
