@@ -39,7 +39,7 @@ def as_written(
     numbers = [calibrated_family(e) if is_strained(e, found.of(e)) else e for e in kept]
     data, fits = hypothesis.data, list[Fit]()
     made = fitted if isinstance(data, Poles) else fit  # poles have the spread of the deck itself
-    if isinstance(data, Poles) and data.listed:
+    if isinstance(data, Poles) and data.listed and data.shapes is None:
         data = data.all_paired()
     for given in (False, True):
         x = [_given(e) if given and e.kind == "calibration" else found.of(e) for e in kept]
