@@ -1,6 +1,6 @@
 """Measured mode shapes as data: each against its partner, up to a factor.
 
-An error of the model's form mixes modes. The same error gives ln f a spread s. To first order
+An error of the model's form mixes modes, and gives ln f a spread s. To first order
 (Soize 2000, :mod:`.discrepancy`) the coefficient of mode j in mode i has the variance
 s² (λ_i λ_j + λ_i²) / (λ_i - λ_j)². The measured shape has the covariance
 

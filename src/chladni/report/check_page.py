@@ -63,8 +63,8 @@ def _mesh(found: CaseCheck) -> list[Block]:
 
 
 _MESH = (
-    "Elastic modes, and their limit for an infinitely fine mesh: that of a mesh twice as fine, "
-    "extrapolated for errors that fall with the square of the element size."
+    "Elastic modes, and their limit for an infinitely fine mesh. It follows from a mesh twice as "
+    "fine: errors fall with the square of the element size."
 )
 
 
