@@ -56,7 +56,7 @@ def _with_test(job: Run, source: Path) -> None:
     found = correlate(case, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
-    job.show(correlation_page(case, found))
+    job.show(correlation_page(case, found, job.folder))
 
 
 def _with_other_modes(

@@ -137,6 +137,10 @@ class SearchContext(Protocol):
         """Fast scores; None if only natural frequencies are known."""
 
     @property
+    def tells_places(self) -> bool:
+        """True if the data tell neighbouring places apart: responses, or modes with shapes."""
+
+    @property
     def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
         """Welds and fasteners of the structure, each with the share z/(w + z) of its rows (r,)."""
 

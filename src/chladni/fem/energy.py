@@ -54,6 +54,33 @@ def part_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
     return _shares(structure, phi, 2, structure.system.K)
 
 
+def kinetic_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
+    """Share φᵀ M_p φ / φᵀ M φ of each part in the kinetic energy of each motion (parts, r).
+
+    The rest to 1 is in point masses.
+    """
+    return _shares(structure, phi, 0, structure.system.M)
+
+
+def effective_masses(structure: Structure, phi: np.ndarray, about: np.ndarray) -> np.ndarray:
+    """Effective modal mass (φᵀ M R)² / φᵀ M φ for the six rigid motions of the base (6, r).
+
+    Over all modes the rows add up to the mass and inertia that move (Craig and Kurdila 2006,
+    Fundamentals of Structural Dynamics, section 18.2). Three translations [kg], three rotations
+    [kg m²].
+
+    Parameters
+    ----------
+    phi : (n_free, r)   modes over the free dofs
+    about : (3,)        point of the rotations [m]
+    """
+    made = structure.assembly
+    R = rigid_motions(replace(made, points=made.points - about))
+    load = np.asarray(structure.T.T @ (over_all_motions(made)[0] @ R))
+    mass = np.einsum("nr,nr->r", phi, structure.system.M @ phi)
+    return np.asarray((load.T @ phi) ** 2 / mass)
+
+
 def _shares(structure: Structure, phi: np.ndarray, which: int, whole: sp.csr_array) -> np.ndarray:
     """φᵀ A_p φ / φᵀ A φ, A the M (0) or K (2) of every part."""
     u = np.asarray(structure.T @ phi)

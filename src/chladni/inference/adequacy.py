@@ -204,9 +204,10 @@ def of_poles(data: Poles, state: State) -> FitTest:
         what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
         where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
         return FitTest(often >= LEAST_P, often, what, where)
+    both = " and shapes" if data.shapes is not None else ""
     what = (
-        f"natural frequencies agree to {data.scale:.1%}; models of one structure differ by about "
-        f"{SCALE:.1%}"
+        f"natural frequencies{both} agree to {data.scale:.1%}; models of one structure differ by "
+        f"about {SCALE:.1%}"
     )
     return FitTest(closely >= LEAST_P, closely, what, "over all modes")
 

@@ -348,6 +348,8 @@ _MEANING = {
     "better. Every run of the same deck gives the same Q.",
     "frequencies": "Q: mean over the paired frequencies of |log10(f model / f test)|²; lower is "
     "better. Every run of the same deck gives the same Q.",
+    "modes": "Q: mean over the paired modes of |log10(f model / f test)|² + (1 - MAC)/ln²10; lower "
+    "is better. Every run of the same deck gives the same Q.",
 }
 
 

@@ -9,8 +9,10 @@ from ..arguments import checked
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import LabelError
 from ..fem.energy import (
+    effective_masses,
     element_energies,
     element_volumes,
+    kinetic_energies,
     mass_properties,
     part_energies,
 )
@@ -38,6 +40,9 @@ class NormalModes(Result):
     centre_of_gravity : (3,)        [m], or the deck's own
     rigid : (r,) bool
     strain_energy : (parts, r)      share of each part; nan for rigid modes
+    kinetic_energy : (parts, r)     share of each part; the rest is in point masses
+    effective_mass : (6, r)         for motions of the base along X, Y, Z [kg], and about them at
+                                    the centre of gravity [kg m²]
     parts : ((name, id), ...)
     in_si : False where a bare deck came without its unit system
     """
@@ -48,6 +53,8 @@ class NormalModes(Result):
     centre_of_gravity: np.ndarray
     rigid: np.ndarray
     strain_energy: np.ndarray
+    kinetic_energy: np.ndarray
+    effective_mass: np.ndarray
     parts: tuple[tuple[str, int], ...]
     in_si: bool
     notes: tuple[str, ...] = ()
@@ -131,6 +138,8 @@ def modes(
         centre,
         rigid,
         np.where(rigid, np.nan, part_energies(structure, phi)),
+        kinetic_energies(structure, phi),
+        effective_masses(structure, phi, np.nan_to_num(centre)),
         tuple((part.name, part.id) for part in model.assembly.parts),
         bool(model.unit),
         (*model.notes, *_notes(model, modal, count, int(still.sum())), *loose_parts(model, whole)),
