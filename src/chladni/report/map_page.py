@@ -19,6 +19,7 @@ _CAPTION = (
     "Error of t: thickness mapped onto the deck and back, compared with the file, rms. Shells "
     "without a match keep the deck's thickness."
 )
+_DARK = "The thinnest is darkest."
 _GUESS = (
     "Thinning estimated from curvature. Each part was left out and estimated from the others: "
     "the table gives the error of its thickness. The last column is the error of the unchanged "
@@ -36,8 +37,8 @@ def map_page(found: MappedDeck) -> PageParts:
     mm = on_faces(seen, 1e3 * t)
     limits = [scene.usual_limits(seen, values) for values in (mm, change)]
     maps = [
-        field(shown, mm, limits[0], "thickness", "thickness [mm]"),
-        field(shown, change, limits[1], "change", "change of thickness [%]", colours="YlGnBu_r"),
+        field(shown, mm, limits[0], "thickness", "thickness [mm]", _DARK),
+        field(shown, change, limits[1], "change", "change of thickness [%]", _DARK),
     ]
     was, now = found.mass
     facts = [("Sheets before", f"{number(was)} kg"), ("after", f"{number(now)} kg")]

@@ -156,7 +156,10 @@ def _advised(result: DiagnosisResult) -> list[Block]:
 
 def next_measurements(every: Sequence[NextMeasurement], odds: float = ODDS) -> Table:
     """Tabulate the measurements that would separate what the data cannot."""
-    rows = [(m.what, number(m.bits, 2), f"{m.settles:.0%}", f"{m.misleads:.0%}") for m in every]
+    rows = [
+        (m.what, number(m.bits, 2), f"{100 * m.settles:.0f} %", f"{100 * m.misleads:.0f} %")
+        for m in every
+    ]
     heads = ("measure", "bits", f"settles at {odds:.0f} : 1", "misleads")
     what = (
         "Each row counts the rows above it. Bits: information expected about which explanation is "
@@ -367,7 +370,7 @@ def _frequencies(result: DiagnosisResult) -> list[Block]:
     ]
     heads = ("test [Hz]", "damping [%]", "before [Hz]", "off", "after [Hz]", "off ", "MAC before",
              "MAC after")  # fmt: skip
-    return [Table(heads, rows)] if rows else []
+    return [Table(heads, rows, opens="shapes", at=range(len(rows)))] if rows else []
 
 
 def _alternatives(result: DiagnosisResult) -> list[Block]:

@@ -67,7 +67,7 @@ def quantity(value: float | None, unit: str = "", reference: float | None = None
     >>> quantity(3.1e9, "N/m2"), quantity(0.0007, "m"), quantity(0.4, "-")
     ('3.1 GN/m²', '0.7 mm', '0.4')
     """
-    scale, named = _scale(value if reference is None else reference, unit)
+    scale, named = display_unit(value if reference is None else reference, unit)
     shown = number(None if value is None else value / scale)
     return f"{shown} {named}".strip() if shown != _NONE else _NONE
 
@@ -78,7 +78,7 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
     >>> interval(3.1e9, 2.2e9, 4.4e9, "N/m2")
     '3.1 GN/m² (2.2 to 4.4)'
     """
-    scale, _ = _scale(value, unit)
+    scale, _ = display_unit(value, unit)
     text = quantity(value, unit)
     if low is None or high is None:
         return text
@@ -121,7 +121,12 @@ def counted(n: int, one: str, many: str) -> str:
     return f"{n} {one if n == 1 else many}"
 
 
-def _scale(value: float | None, unit: str) -> tuple[float, str]:
+def display_unit(value: float | None, unit: str) -> tuple[float, str]:
+    """The unit in which a value is shown, as a multiple of its own, and its name.
+
+    >>> display_unit(2.1e11, "N/m2"), display_unit(0.0012, "m")
+    ((1000000000.0, 'GN/m²'), (0.001, 'mm'))
+    """
     shown = unit_text(unit)
     if not value or not math.isfinite(value):
         return 1.0, shown

@@ -220,6 +220,8 @@ def _traces(s: Series, looks: Any, show: bool, panel: Panel) -> list[Spec]:
         "legendgroup": name, "showlegend": show, "opacity": s.opacity,
     }  # fmt: skip
     made |= _bar(s, colour, panel) if s.kind == "bars" else _scatter(s, colour, dash)
+    if s.opens:
+        made["meta"] = {"opens": s.opens}
     if s.sample is not None:
         made["customdata"] = [None if v < 0 else int(v) for v in s.sample]
     made |= _under_pointer(s, name)
@@ -316,6 +318,8 @@ def _heatmap(m: Matrix) -> Spec:
         "hoverinfo": "text",
         "hovertext": [[escape(t, False).replace("\n", "<br>") for t in row] for row in m.tips],
     }  # fmt: skip
+    if m.opens is not None:
+        made["meta"] = {"opens": m.opens[0], "sides": m.opens[1:]}
     if m.digits is not None:
         shown = np.isfinite(m.values) & (np.abs(m.values) >= m.least)
         made["texttemplate"] = "%{text}"

@@ -83,11 +83,13 @@ def mac(
     test: np.ndarray,
     found: Mapping[str, tuple[np.ndarray, np.ndarray, Sequence[tuple[int, int]]]],
     rows: str = "test",
+    opens: str = "",
 ) -> Chart:
     """MAC (test, model) of each deck, side by side; framed: pairs (row, column).
 
     Parameters
     ----------
+    opens : drawing of the modes that a click on a square opens
     test : (r,) frequencies of the rows [Hz]
     found : name: MAC (r, c), frequencies of the columns (c,) [Hz], pairs
     """
@@ -99,7 +101,8 @@ def mac(
         names, heads = ([f"{f:.1f}" for f in side] for side in (test, model))
         digits = 0 if len(model) <= _MOST_LABELS // 2 else None
         squares = Matrix(100 * value, names, heads, (0.0, 100.0), "MAC [%]", digits=digits, least=5,
-                         tips=tips, frames=pairs)  # fmt: skip
+                         tips=tips, frames=pairs,
+                         opens=(opens, rows, name) if opens else None)  # fmt: skip
         title = f"{name} [Hz]" if name in ("test", "model") else f"deck {name} [Hz]"
         return Panel((), _places(heads, title), _places(names, f"{rows} [Hz]", True),
                      matrix=squares)  # fmt: skip
@@ -126,13 +129,14 @@ def matrix(squares: Matrix, **more: Any) -> Chart:
                     height=9 + 1.5 * len(squares.rows), **more)  # fmt: skip
 
 
-def ladder(test: np.ndarray, sides: Mapping[str, np.ndarray]) -> Chart:
+def ladder(test: np.ndarray, sides: Mapping[str, np.ndarray], opens: str = "") -> Chart:
     """Deviation f_model / f_test - 1 of each mode in per cent.
 
     Parameters
     ----------
     test : (r,) [Hz]
     sides : name: frequencies of the partners (r,) [Hz]; not-a-number without one
+    opens : drawing that a click on a bar opens at its mode
     """
     at = np.arange(len(test), dtype=float)
     bars = []
@@ -140,7 +144,8 @@ def ladder(test: np.ndarray, sides: Mapping[str, np.ndarray]) -> Chart:
         off = 100 * (np.asarray(model, dtype=float) / test - 1)
         said = ["no partner" if not np.isfinite(v) else f"{v:+.3g} %" for v in off]
         tips = [f"test {f:.2f} Hz\n{name} {s}" for f, s in zip(test, said, strict=True)]
-        bars.append(Series(name, at, off, "bars", style(name).get("tint", "before"), tips=tips))
+        bars.append(Series(name, at, off, "bars", style(name).get("tint", "before"), tips=tips,
+                           opens=opens))  # fmt: skip
     axis = _places([f"{f:.4g}" for f in test], "frequency of the test [Hz]")
     width = min(max(5.0, 0.55 * len(test) + 1.6), _WIDEST)
     panel = Panel(bars, axis, ChartAxis("model - test [%]"), marks=(Mark(0.0, "x", "ink"),))
