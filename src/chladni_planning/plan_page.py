@@ -20,7 +20,7 @@ from chladni.report.blocks import (
 )
 from chladni.report.mesh_drawings import layout, mesh_of, mode_shapes
 from chladni.report.shown import Shown
-from chladni.report.words import direction, hertz, number, rounded
+from chladni.report.words import direction, fixed, hertz, number, percent, rounded
 from chladni.view import annotations, charts
 from chladni.workflows.loaded_model import Model
 
@@ -186,7 +186,7 @@ def _compared(found: Plan) -> str:
     last = list(found.log_det)[-1]
     r = len(found.modal)
     worse = [
-        f"{name} {100 * float(np.expm1((found.log_det[last] - value) / (2 * r))):+.1f} %"
+        f"{name} {percent(float(np.exp((found.log_det[last] - value) / (2 * r))), 1.0)}"
         for name, value in found.log_det.items()
         if name != last
     ]
@@ -212,7 +212,7 @@ def _layout(result: PlanSummary) -> Table:
 
 
 def _where(at: PlannedPlace) -> tuple[str, str]:
-    return "" if at.grid is None else str(at.grid), ", ".join(f"{x:.3f}" for x in at.point_m)
+    return "" if at.grid is None else str(at.grid), ", ".join(fixed(x, 3) for x in at.point_m)
 
 
 def _marker(at: PlannedPlace, text: str) -> annotations.Marker:
@@ -226,7 +226,6 @@ def _arrow(point: np.ndarray, direction: np.ndarray, text: str) -> annotations.M
 
 
 def _modes(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> list[Block]:
-    shift = found.loaded / found.modal.frequency - 1
     rows = [
         (
             str(m.mode),
@@ -234,7 +233,7 @@ def _modes(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> 
             f"{m.visibility:.2f}",
             "yes" if m.seen else "hardly",
             "yes" if m.seen_by_normals else "no, moves along the sheets",
-            f"{100 * shift[k]:.2f} %",
+            percent(found.loaded[k], m.frequency_hz),
         )
         for k, m in enumerate(result.modes)
     ]

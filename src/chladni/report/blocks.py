@@ -53,6 +53,7 @@ class Table:
     caption: str = ""
     opens: str = ""  # drawing that a click on a row opens
     at: Sequence[int | None] = ()  # part of it that belongs to each row: a mode, a channel
+    links: Sequence[str] = ()  # page to which the first cell of each row leads
     kind: str = "table"
 
     def opened(self, row: int) -> int | None:

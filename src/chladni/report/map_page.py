@@ -10,7 +10,7 @@ from ..workflows.loaded_model import on_faces
 from ..workflows.map import MappedDeck
 from .blocks import Block, Facts, PageParts, Section, Table
 from .mesh_drawings import field, mesh_of
-from .words import number
+from .words import number, percent
 
 _HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
           "was [kg]", "error of t [%]")  # fmt: skip
@@ -60,7 +60,7 @@ def _lead(found: MappedDeck) -> str:
     known = f"; error of the mapping {100 * max(errors):.2g} % rms at most" if errors else ""
     return (
         f"{found.found.source.name} mapped onto {len(parts)} parts: the sheets go from "
-        f"{number(was)} to {number(now)} kg ({100 * (now / was - 1):+.1f} %){known}."
+        f"{number(was)} to {number(now)} kg ({percent(now, was)}){known}."
     )
 
 

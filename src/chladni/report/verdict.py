@@ -22,7 +22,7 @@ from .level_blocks import level_section
 from .recording_scores import recording_scores
 from .screening_blocks import screening_section
 from .states_table import states_table
-from .words import criterion, hertz, interval, number, percent, quantity
+from .words import criterion, fixed, hertz, interval, number, percent, quantity
 
 HEADING = {
     "missing physics": "Missing physics found",
@@ -254,7 +254,7 @@ def _place(where: Location) -> list[tuple[str, str]]:
     some = ", ".join(grids[:12]) + (f" … ({len(grids)} in all)" if len(grids) > 12 else "")
     at = ""
     if where.point_m:
-        at = "(" + ", ".join(f"{round(x, 4) + 0.0:.4f}" for x in where.point_m) + ") m"
+        at = "(" + ", ".join(fixed(x, 4) for x in where.point_m) + ") m"
         at += f", within {quantity(where.radius_m, 'm')}" if where.radius_m else ""
     return [
         ("place", where.text),

@@ -331,6 +331,6 @@ def blind_note(spot: ResidualLocalisation | None) -> tuple[str, ...]:
     if spot is None or spot.blind < BLIND_SHARE:
         return ()
     return (
-        f"on {100 * spot.blind:.0f} % of the structure the test cannot detect a local loss of half "
-        "the stiffness or mass (grey in the map of the remaining gain)",
+        f"on {100 * spot.blind:.0f} % of the structure the test is blind; half the stiffness or "
+        "mass could be missing there (grey in the map of the remaining gain)",
     )

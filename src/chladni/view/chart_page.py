@@ -161,8 +161,11 @@ def _add_panel(
     if panel.matrix is not None:
         layout["shapes"] += [_frame(i, j, x, y) for i, j in panel.matrix.frames]
     note = {"showarrow": False, "font": {"size": 10, "color": "@soft"}}
-    layout["annotations"] += [{**note, "x": n.x, "y": n.y, "xref": x, "yref": y,
-                               "text": escape(n.text, False)} for n in panel.notes]  # fmt: skip
+    for n in panel.notes:
+        high = float(np.log10(n.y)) if panel.y.log else n.y  # Plotly's annotations are in decades
+        words = escape(n.text, False)
+        layout["annotations"].append({**note, "x": n.x, "y": high, "xref": x, "yref": y,
+                                      "text": words})  # fmt: skip
     if panel.title:
         layout["annotations"].append(_title(panel.title, x, y))
     if panel.equal:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .chart import Chart, ChartAxis, Mark, Matrix, Panel, Series
+from .chart import Chart, ChartAxis, Mark, Matrix, Note, Panel, Series
 
 Curves = Mapping[str, tuple[np.ndarray, np.ndarray]]  # name: frequency [Hz] (n,), complex H (n,)
 Bands = Sequence[tuple[float, float]]
@@ -158,24 +158,27 @@ def steps(
 ) -> Chart:  # fmt: skip
     """Deviation Q from the nominal model, step by step, on each side of the data.
 
-    ``floors`` are the least Q of each side, ``of`` their name.
+    ``floors`` are the least Q of each side, ``of`` their name. A Q of zero is drawn at the lower
+    edge of the logarithmic axis.
     """
     names = list(dict.fromkeys(n for q in sides.values() for n in q))
     tints = dict(zip(sides, ("neutral", "before"), strict=False))
-    bars = []
-    for side, q in sides.items():
-        known = [(k, q[n]) for k, n in enumerate(names) if n in q and np.isfinite(q[n])]
+    every = [v for q in (*sides.values(), floors or {}) for v in q.values() if v > 0]
+    low, high = min(every, default=1.0) / 2, 3 * max(every, default=1.0)
+    points, notes = [], []
+    for k, (side, q) in enumerate(sides.items()):
+        known = [(j, q[n]) for j, n in enumerate(names) if n in q and np.isfinite(q[n])]
         at, value = np.array(known, dtype=float).reshape(-1, 2).T
+        at, drawn = at + 0.12 * (2 * k - len(sides) + 1), np.maximum(value, low)
         first = value[0] if len(value) else 0.0
-        said = [f"{v:.4g}" + (f" ({100 * (v / first - 1):+.0f} %)" if k and first else "")
-                for k, v in enumerate(value)]  # fmt: skip
-        bars.append(Series(side, at, value, "bars", tints[side], labels=said))
+        said = [f"{v:.4g}" + (f" ({round(100 * (v / first - 1)):+d} %)" if j and first else "")
+                for j, v in enumerate(value)]  # fmt: skip
+        points.append(Series(side, at, drawn, "both", tints[side], size=7, tips=said))
+        notes += [Note(x, 1.25 * y, text) for x, y, text in zip(at, drawn, said, strict=True)]
     lines = [Mark(v, "x", tints[side], "dash", f"{of}, {side}")
-             for side, v in (floors or {}).items() if np.isfinite(v) and side in sides]  # fmt: skip
-    top = max((float(s.y.max()) for s in bars if len(s.y)), default=0.0)
-    panel = Panel(
-        bars, _places(names, ""), ChartAxis("Q", limits=(0, 1.22 * top or 1.0)), marks=lines
-    )
+             for side, v in (floors or {}).items() if v > 0 and side in sides]  # fmt: skip
+    axis = ChartAxis("Q", log=True, limits=(low, high))
+    panel = Panel(points, _places(names, ""), axis, marks=lines, notes=notes)
     return Chart.of(panel, size=(max(4.6, 1.9 * len(names)), 3.2))
 
 
