@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
-from chladni.inference.expected_information import Columns, Rivals, chosen
+from chladni.inference.expected_information import Predicted, Rivals, chosen, nothing
 
 RNG = np.random.default_rng(7)
 
@@ -19,9 +19,12 @@ def case(n, sizes, apart=1.0, rng=RNG):
     return factors, means
 
 
-def rivals(sizes, probability=None):
-    p = np.full(len(sizes), 1 / len(sizes)) if probability is None else np.array(probability)
-    return Rivals(Columns(tuple(sizes)), p)
+def seen(factors, means):
+    return Predicted(np.array(means), tuple(factors))
+
+
+def even(n):
+    return Rivals(np.full(n, 1 / n))
 
 
 def exact(d, p):
@@ -44,18 +47,16 @@ def test_two_of_one_covariance_have_the_information_of_their_distance(apart, p):
     shift = np.eye(6)[0]
     S = np.eye(6) + F @ F.T
     shift *= apart / np.sqrt(shift @ np.linalg.solve(S, shift))
-    two = rivals((2, 2), (p, 1 - p))
-    G = two.columns.gram([F, F], [np.zeros(6), shift])
-    assert_allclose(two.forecast(G, 40000).information, exact(apart, p), atol=0.01)
+    two = Rivals(np.array([p, 1 - p]))
+    found = two.forecast(seen([F, F], [np.zeros(6), shift]), 40000)
+    assert_allclose(found.information, exact(apart, p), atol=0.015)
 
 
 def test_density_is_that_of_the_gaussian():
     """Up to a constant common to all hypotheses, whatever their covariance."""
     factors, means = case(5, (1, 2, 3))
-    three = rivals((1, 2, 3))
-    B = np.column_stack([*factors, *(m - means[0] for m in means[1:])])
     y = RNG.normal(size=(5, 4))
-    found = three.log_density(B.T @ B, B.T @ (y - means[0][:, None]))
+    found = even(3).log_density(seen(factors, means), y)
     due = np.array([
         multivariate_normal(m, np.eye(5) + F @ F.T).logpdf(y.T)
         for m, F in zip(means, factors, strict=True)
@@ -66,8 +67,8 @@ def test_density_is_that_of_the_gaussian():
 def test_forecast_is_that_of_brute_force():
     """Data drawn sample by sample, and odds from full covariance matrices."""
     factors, means = case(4, (1, 2), 0.8)
-    two = rivals((1, 2), (0.7, 0.3))
-    found = two.forecast(two.columns.gram(factors, means), 20000)
+    two = Rivals(np.array([0.7, 0.3]))
+    found = two.forecast(seen(factors, means), 20000)
     S = [np.eye(4) + F @ F.T for F in factors]
     every = [multivariate_normal(m, C) for m, C in zip(means, S, strict=True)]
     gain, sure = 0.0, 0.0
@@ -81,37 +82,42 @@ def test_forecast_is_that_of_brute_force():
     assert_allclose(found.settled(9.0), sure, atol=0.02)
 
 
+def test_fewer_data_hold_the_same_information():
+    """What lies outside the span of the factors and of the distances tells nothing."""
+    data = seen(*case(60, (2, 3), 0.3))
+    assert data.short.mean.shape == (2, 6)
+    found = [even(2).forecast(d, 20000).information for d in (data, data.short)]
+    assert_allclose(*found, atol=0.01)
+
+
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 10**6), st.lists(st.floats(0.05, 1.0), min_size=2, max_size=3))
 def test_information_is_bounded_and_grows(seed, weights):
     """0 for what tells nothing, at most the entropy, and more with a further measurement."""
     rng = np.random.default_rng(seed)
     p = np.array(weights) / sum(weights)
-    some = rivals((2,) * len(p), p)
-    one, other = (some.columns.gram(*case(3, (2,) * len(p), 1.0, rng)) for _ in range(2))
-    nothing = some.forecast(np.zeros_like(one))
-    assert_allclose(nothing.information, 0.0, atol=1e-12)
-    assert_allclose(nothing.posterior, np.broadcast_to(p[None, :, None], nothing.posterior.shape))
-    first, both = (some.forecast(G, 4000).information for G in (one, one + other))
+    some = Rivals(p)
+    one, other = (seen(*case(3, (2,) * len(p), 1.0, rng)) for _ in range(2))
+    blind = some.forecast(nothing(one))
+    assert_allclose(blind.information, 0.0, atol=1e-12)
+    assert_allclose(blind.posterior, np.broadcast_to(p[None, :, None], blind.posterior.shape))
+    first, both = (some.forecast(data, 4000).information for data in (one, one + other))
     assert first <= -(p @ np.log(p)) + 1e-9
     assert both >= first - 0.05
 
 
 def test_what_both_do_not_know_hides_what_sets_them_apart():
     """A shared unknown along the difference of the means takes its information away."""
-    shift, two = np.array([3.0, 0.0]), rivals((1, 1))
-    for unknown, told in ((np.array([[0.0], [30.0]]), True), (np.array([[30.0], [0.0]]), False)):
-        G = two.columns.gram([unknown, unknown], [np.zeros(2), shift])
-        assert (two.forecast(G).information > 0.4) == told
+    shift = np.array([3.0, 0.0])
+    for unknown, shows in ((np.array([[0.0], [30.0]]), True), (np.array([[30.0], [0.0]]), False)):
+        data = seen([unknown, unknown], [np.zeros(2), shift])
+        assert (even(2).forecast(data).information > 0.4) == shows
 
 
 def test_choice_takes_what_tells_most_for_its_cost():
-    two = rivals((1, 1))
-    quiet = np.zeros((1, 1))
-    grams = np.array([
-        two.columns.gram([quiet, quiet], [np.zeros(1), np.array([d])]) for d in (0.0, 1.0, 2.0, 3.0)
-    ])  # fmt: skip
-    assert chosen(two, grams, np.ones(4), 2) == [3, 2]
-    assert chosen(two, grams, np.array([1.0, 1.0, 1.0, np.inf]), 1) == [2]
-    assert chosen(two, grams, np.array([1.0, 0.01, 1.0, 1.0]), 1) == [1]
-    assert chosen(two, grams[:1], np.ones(1), 1) == []
+    two, quiet = even(2), np.zeros((1, 1))
+    every = [seen([quiet, quiet], [np.zeros(1), np.array([d])]) for d in (0.0, 1.0, 2.0, 3.0)]
+    assert chosen(two, every, np.ones(4), 2) == [3, 2]
+    assert chosen(two, every, np.array([1.0, 1.0, 1.0, np.inf]), 1) == [2]
+    assert chosen(two, every, np.array([1.0, 0.01, 1.0, 1.0]), 1) == [1]
+    assert chosen(two, every[:1], np.ones(1), 1) == []

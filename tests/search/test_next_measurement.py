@@ -2,6 +2,9 @@
 
 import json
 from dataclasses import replace
+from functools import reduce
+from operator import add
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,11 +12,13 @@ from numpy.testing import assert_allclose
 from tests.builders.commands import ran, refused
 from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
 
+from chladni.decision.reasons import ALONE, BEYOND
 from chladni.fem.energy import mass_properties
 from chladni.inference.expected_information import chosen
 from chladni.output import write_npz
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import next_measurement
+from chladni.search.deciding import open_explanations
 from chladni.search.next_measurement import (
     Rival,
     _new,
@@ -57,13 +62,13 @@ def found(problem, tied):
     return outlook(problem, tied, ("here", "there"), np.ones(2))
 
 
-def test_candidates_of_every_kind_have_a_gram_matrix(found):
+def test_candidates_of_every_kind_are_predicted(found):
     kinds = {c.kind for c in found.candidates}
     assert kinds == {"sensor", "drive", "mass", "band", "weighing"}
-    assert len(found.grams) == len(found.candidates)
-    for G in found.grams:
-        assert_allclose(G, G.T)
-        assert np.linalg.eigvalsh(G)[0] > -1e-9 * max(np.trace(G), 1.0)
+    assert len(found.seen) == len(found.candidates)
+    for each in found.seen:
+        assert np.isfinite(each.mean).all()
+        assert {len(F) for F in each.factors} == {each.mean.shape[1]}
 
 
 def test_prediction_is_linear_about_the_fit(problem, tied):
@@ -100,18 +105,19 @@ def test_what_was_measured_tells_less_a_second_time(problem, tied, reduced):
 def test_a_sensor_sees_no_difference_between_twins(problem, tied):
     """Two rivals that are one predict the same, so that nothing tells them apart."""
     twins = outlook(problem, [tied[0], tied[0]], ("a", "b"), np.ones(2))
-    for G in twins.grams[::10]:
-        assert_allclose(twins.rivals.forecast(G).information, 0.0, atol=1e-6)
+    for each in twins.seen[::10]:
+        assert_allclose(twins.rivals.forecast(each).information, 0.0, atol=1e-6)
 
 
 def test_the_best_measurements_settle_what_is_tied(found):
     """Two lumps far apart: what tells most is better than weighing, and enough to settle it."""
     cost = np.array([c.cost for c in found.candidates])
-    best = chosen(found.rivals, found.grams, cost, 2)
-    every = [found.rivals.forecast(G).information for G in found.grams]
+    best = chosen(found.rivals, found.seen, cost, 2)
+    every = [found.rivals.forecast(each).information for each in found.seen]
     weighing = next(k for k, c in enumerate(found.candidates) if c.kind == "weighing")
     assert every[best[0]] > 10 * max(every[weighing], 1e-6)
-    assert found.rivals.forecast(found.grams[best].sum(axis=0)).settled(10.0) > 0.8
+    all_ = reduce(add, [found.seen[k] for k in best])
+    assert found.rivals.forecast(all_).settled(10.0) > 0.8
 
 
 def test_a_mass_put_on_is_that_of_the_changed_structure(problem, tied):
@@ -125,12 +131,38 @@ def test_a_mass_put_on_is_that_of_the_changed_structure(problem, tied):
     assert F.shape[0] == len(mean)
 
 
+@pytest.mark.parametrize(
+    ("one_of", "due"),
+    [
+        ((), []),
+        (("crack",), []),
+        (("crack", "point-mass"), ["crack", "point-mass"]),
+        ((ALONE, "point-mass"), ["point-mass", ALONE]),
+        (("point-mass", BEYOND), ["point-mass", BEYOND]),
+        ((ALONE, "crack", BEYOND), ["crack", f"{ALONE} or {BEYOND}"]),
+    ],
+)
+def test_calibration_stands_for_what_the_catalogue_lacks(one_of, due):
+    """Of explanations with a model there are two at least, or nothing is to be told apart."""
+
+    def named(name):
+        return SimpleNamespace(name=name, numbers=SimpleNamespace(whole=name))
+
+    order = [named("crack"), named("point-mass")]
+    case, decision = SimpleNamespace(null=named("")), SimpleNamespace(one_of=one_of, order=order)
+    fits, names, probability = open_explanations(case, decision)
+    assert names == due
+    assert fits == ["" if ALONE in n or BEYOND in n else n for n in due]
+    assert_allclose(probability, 1 / len(due) if due else [])
+
+
 def test_an_outlook_is_read_as_it_was_written(found, tmp_path):
     """The advice is that of the diagnosis; kinds and dofs that cannot be measured are left out."""
     write_npz(tmp_path / "outlook.npz", **arrays_of(found))
     again = read_outlook(tmp_path)
     assert again.names == found.names
-    assert advised(again) == advised(found)
+    assert [m.what for m in advised(again)] == [m.what for m in advised(found)]
+    assert_allclose(*([m.bits for m in advised(o)] for o in (again, found)), rtol=1e-4)
     first, *_ = advised(again)
     (other, *_) = advised(again, without=[first.kind])
     assert other.kind != first.kind

@@ -7,58 +7,58 @@ of the data and the hypothesis (Lindley 1956, Ann. Math. Stat. 27, 986-1005; for
 models Box and Hill 1967, Technometrics 9, 57-71):
 
 I = Σ_j p_j E[ln p(j | y) - ln p_j | j]   [nat].
-
-All densities depend on y through t = Bᵀ(y - μ_0) alone, B = [F_0, F_1, ..., μ_1 - μ_0, ...], and on
-the Gram matrix G = BᵀB.  The Gram matrix of several measurements with independent noise is the sum
-of theirs, so that a set of measurements costs no more than one.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import scipy.linalg as sl
-from scipy.special import logsumexp
+from scipy.special import entr, logsumexp
 
 DRAWS = 256  # of the data of a measurement, under each hypothesis
 SEED = 20261127
+UNSEEN = 1e-3  # of the noise: variance of predictions that tells nothing
+SETTLED = 0.01  # of the entropy: no further measurement is chosen below it
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """Places of the hypotheses in the columns of B.
+class Predicted:
+    """Data of a measurement as each hypothesis predicts them, in units of the noise.
 
     Attributes
     ----------
-    sizes : number of columns of each F_j
+    mean : (m, n) μ_j
+    factors : (n, k_j) F_j of each hypothesis
     """
 
-    sizes: tuple[int, ...]
+    mean: np.ndarray
+    factors: tuple[np.ndarray, ...]
 
-    @cached_property
-    def factors(self) -> tuple[slice, ...]:
-        """Columns of each F_j."""
-        ends = np.cumsum((0, *self.sizes))
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+    def __add__(self, other: "Predicted") -> "Predicted":
+        """Both measurements, of independent noise."""
+        each = zip(self.factors, other.factors, strict=True)
+        return Predicted(np.hstack([self.mean, other.mean]), tuple(np.vstack(F) for F in each))
 
     @property
-    def count(self) -> int:
-        """Number of columns of B."""
-        return sum(self.sizes) + len(self.sizes) - 1
+    def short(self) -> "Predicted":
+        """Nearly the same information in fewer data.
 
-    def shift(self, j: int) -> np.ndarray:
-        """Coefficients of μ_j - μ_0 in the columns of B (count,)."""
-        out = np.zeros(self.count)
-        if j:
-            out[sum(self.sizes) + j - 1] = 1.0
-        return out
+        All densities depend on y - μ_0 through its part in the span of F_j and μ_j - μ_0.  The
+        directions of least variance are left out, ``UNSEEN`` of the noise in all.
+        """
+        B = np.column_stack([*self.factors, (self.mean[1:] - self.mean[0]).T])
+        if len(B) > B.shape[1]:
+            B = np.asarray(np.linalg.qr(B, mode="r"))
+        lam, U = np.linalg.eigh(B @ B.T)
+        B = U[:, np.cumsum(np.maximum(lam, 0.0)) > UNSEEN].T @ B
+        *factors, apart = np.split(B, np.cumsum([F.shape[1] for F in self.factors]), axis=1)
+        return Predicted(np.vstack([np.zeros(len(B)), apart.T]), tuple(factors))
 
-    def gram(self, factors: Sequence[np.ndarray], means: Sequence[np.ndarray]) -> np.ndarray:
-        """G of one measurement from F_j (n, k_j) and μ_j (n,), in units of the noise."""
-        B = np.column_stack([*factors, *(m - means[0] for m in means[1:])])
-        return np.asarray(B.T @ B)
+
+def nothing(like: Predicted) -> Predicted:
+    """No data at all."""
+    return Predicted(like.mean[:, :0], tuple(F[:0] for F in like.factors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,51 +67,43 @@ class Rivals:
 
     Attributes
     ----------
-    columns : their places in B
     probability : (m,) p_j
     """
 
-    columns: Columns
     probability: np.ndarray
 
-    def log_density(self, G: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """ln p(y | j) up to a constant common to all j (m, n), from t (count, n).
+    @property
+    def entropy(self) -> float:
+        """-Σ p ln p [nat], the most that a measurement tells."""
+        return float(entr(self.probability).sum())
 
-        With Δ = y - μ_j: -½ |Δ|² - ½ ln det(I + FᵀF) + ½ Δᵀ F (I + FᵀF)⁻¹ Fᵀ Δ (Woodbury).
-        """
-        out = np.empty((len(self.probability), t.shape[1]))
-        for j, at in enumerate(self.columns.factors):
-            e = self.columns.shift(j)
-            L = np.linalg.cholesky(np.eye(at.stop - at.start) + G[at, at])
-            seen = sl.solve_triangular(L, t[at] - (G[at] @ e)[:, None], lower=True)
-            det = np.log(np.diag(L)).sum()
-            out[j] = e @ t - e @ G @ e / 2 - det + (seen**2).sum(axis=0) / 2
+    def log_density(self, seen: Predicted, y: np.ndarray) -> np.ndarray:
+        """ln p(y | j) up to a constant common to all j (m, n_draws), of data y (n, n_draws)."""
+        out = np.empty((len(self.probability), y.shape[1]))
+        for j, (mean, F) in enumerate(zip(seen.mean, seen.factors, strict=True)):
+            L = np.linalg.cholesky(np.eye(len(F)) + F @ F.T)
+            z = sl.solve_triangular(L, y - mean[:, None], lower=True)
+            out[j] = -np.log(np.diag(L)).sum() - (z**2).sum(axis=0) / 2
         return out
 
-    def posterior(self, G: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Probability of each hypothesis given the data (m, n)."""
-        log = self.log_density(G, t) + np.log(self.probability)[:, None]
+    def posterior(self, seen: Predicted, y: np.ndarray) -> np.ndarray:
+        """Probability of each hypothesis given the data (m, n_draws)."""
+        log = self.log_density(seen, y) + np.log(self.probability)[:, None]
         return np.asarray(np.exp(log - logsumexp(log, axis=0)))
 
-    def drawn(self, G: np.ndarray, j: int, known: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """T (count, n) of data under hypothesis j.
-
-        Parameters
-        ----------
-        known, noise : (count, n) standard normal, for what is unknown of the object and for noise
-        """
-        at = self.columns.factors[j]
-        mean = (G @ self.columns.shift(j))[:, None]
-        return mean + G[:, at] @ known[at] + root(G) @ noise
-
-    def forecast(self, G: np.ndarray, draws: int = DRAWS) -> "Forecast":
-        """Expect the outcome of a measurement with this Gram matrix."""
-        z = np.random.default_rng(SEED).standard_normal((2, self.columns.count, draws))
-        p = self.probability
-        each = np.stack([self.posterior(G, self.drawn(G, j, *z)) for j in range(len(p))])
-        own = each[np.arange(len(p)), np.arange(len(p))]  # (m, draws): of the true one
+    def forecast(self, seen: Predicted, draws: int = DRAWS) -> "Forecast":
+        """Expect the outcome of a measurement."""
+        rng, p = np.random.default_rng(SEED), self.probability
+        noise = rng.standard_normal((seen.mean.shape[1], draws))
+        known = rng.standard_normal((max(F.shape[1] for F in seen.factors), draws))
+        each = np.hstack([
+            mean[:, None] + F @ known[: F.shape[1]] + noise
+            for mean, F in zip(seen.mean, seen.factors, strict=True)
+        ])  # fmt: skip
+        posterior = self.posterior(seen, each).reshape(len(p), len(p), draws).swapaxes(0, 1)
+        own = posterior[np.arange(len(p)), np.arange(len(p))]  # (m, draws): of the true one
         gain = np.log(np.maximum(own, 1e-300)) - np.log(p)[:, None]
-        return Forecast(float(p @ gain.mean(axis=1)), p, each)
+        return Forecast(float(p @ gain.mean(axis=1)), p, posterior)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,35 +133,31 @@ class Forecast:
         return float(self.probability @ wrong.any(axis=1).mean(axis=1))
 
 
-def root(G: np.ndarray) -> np.ndarray:
-    """R with R Rᵀ = G, of a matrix that may be singular."""
-    lam, U = np.linalg.eigh(G)
-    return np.asarray(U * np.sqrt(np.maximum(lam, 0.0)))
-
-
 def chosen(
-    rivals: Rivals, grams: np.ndarray, cost: np.ndarray, count: int, known: np.ndarray | None = None
-) -> list[int]:
+    rivals: Rivals, measurements: Sequence[Predicted], cost: np.ndarray, count: int,
+    made: Predicted | None = None,
+) -> list[int]:  # fmt: skip
     """Choose measurements one after the other, each with the most information for its cost.
 
     Parameters
     ----------
-    grams : (c, d, d) of each candidate
     cost : (c,) of each; inf excludes it
-    known : (d, d) of measurements that are made in any case
+    made : what is measured in any case
     """
-    total = np.zeros(grams.shape[1:]) if known is None else known
     out: list[int] = []
+    total = nothing(measurements[0]) if made is None else made
     for _ in range(min(count, int(np.isfinite(cost).sum()))):
         now = rivals.forecast(total).information
+        if now > (1 - SETTLED) * rivals.entropy:
+            break
         gain = np.array([
             -np.inf if k in out or not np.isfinite(c)
-            else (rivals.forecast(total + G).information - now) / c
-            for k, (G, c) in enumerate(zip(grams, cost, strict=True))
+            else (rivals.forecast(total + seen).information - now) / c
+            for k, (seen, c) in enumerate(zip(measurements, cost, strict=True))
         ])  # fmt: skip
         best = int(np.argmax(gain))
         if not gain[best] > 0:
             break
         out.append(best)
-        total = total + grams[best]
+        total = total + measurements[best]
     return out

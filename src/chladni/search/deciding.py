@@ -9,7 +9,7 @@ import numpy as np
 
 from ..decision.decide import decide
 from ..decision.hypotheses import EffectSet, Explanation, Hypotheses, Left
-from ..decision.reasons import ALONE, Decision
+from ..decision.reasons import ALONE, BEYOND, Decision
 from ..errors import ModelError
 from ..inference.adequacy import FitTest
 from ..inference.held_out_evidence import held_out_evidence
@@ -82,10 +82,19 @@ class Evaluated(Tested):
         return as_written(self.fit, self.problem.mass_measurement)
 
     @cached_property
+    def halved(self) -> HypothesisFit:
+        """The hypothesis in the form of a deck with every shell halved."""
+        return as_written(self.fit, self.problem.mass_measurement, halved=True)
+
+    @cached_property
     def left(self) -> Left:
-        """Q of the calibrated deck and of its own, on the fitted and on the choosing data."""
-        prepared, plain = self.trial.prepared, self.trial.found.plain
-        stages = [(plain, plain.fit.state), (self.written, self.written.fit.state)]
+        """Q of the calibrated deck and of its own, on the fitted and on the choosing data.
+
+        Both have the mesh that the data prefer: an effect may be smaller than the error of a mesh.
+        """
+        prepared, found = self.trial.prepared, self.trial.found
+        decks = (found.halved[0], self.halved) if found.halved else (found.plain, self.written)
+        stages = [(deck, deck.fit.state) for deck in decks]
         choosing = prepared.held.choosing
         return Left(*((a, b) for a, b in scores_of(prepared, self.fit, stages, choosing)))
 
@@ -131,7 +140,8 @@ class Evaluated(Tested):
     def forget_model(self) -> None:
         """Keep the fit, not the vectors that were added to the basis for it."""
         self.fit = on_common_basis(self.problem, self.fit)
-        vars(self).pop("written", None)
+        for form in ("written", "halved"):
+            vars(self).pop(form, None)
         self.forgotten = True
 
 
@@ -168,12 +178,15 @@ def _effect_set(trial: Trial, s: Several, own: Evaluated) -> EffectSet:
 def open_explanations(
     case: Hypotheses, decision: Decision
 ) -> tuple[list[HypothesisFit], list[str], np.ndarray]:
-    """Explanations that the data cannot separate: fits, names and relative probabilities."""
+    """Explanations that the data cannot separate: fits, names and even probabilities.
+
+    Calibration with its errors of form stands for what the catalogue lacks as well.
+    """
     listed = [h for h in decision.order if h.name in decision.one_of][:MOST_OPEN]
-    if ALONE in decision.one_of:
-        listed.append(case.null)
+    names = [h.name for h in listed]
+    if other := [name for name in (ALONE, BEYOND) if name in decision.one_of]:
+        listed, names = [*listed, case.null], [*names, " or ".join(other)]
     if len(listed) < 2:
         return [], [], np.zeros(0)
-    gain = np.array([case.gain(h) for h in listed])
     fits = [cast(Evaluated, h.numbers).whole for h in listed]
-    return fits, [h.name or ALONE for h in listed], np.exp((gain - gain.max()) / 2)
+    return fits, names, np.full(len(listed), 1 / len(listed))

@@ -3,8 +3,7 @@
 Every explanation predicts the data of a further measurement with its own unknowns: its parameters
 and errors of form, as the recording left them (linear about its fit).  Candidates are sensors at
 further grids, drives at further grids, a known mass put on at a grid, lines above the fitted band,
-and a weighing.  Their Gram matrices add up, so that any set of them is judged at once
-(:mod:`..inference.expected_information`).
+and a weighing (:mod:`..inference.expected_information`).
 """
 
 import zipfile
@@ -19,7 +18,7 @@ import numpy as np
 from ..effects.effect_context import ElementGrids
 from ..errors import FileError, ModelError
 from ..inference.discrepancy import Form, columns, form
-from ..inference.expected_information import Columns, Rivals, chosen
+from ..inference.expected_information import Predicted, Rivals, chosen, nothing
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import prior_residuals
@@ -29,13 +28,15 @@ from ..reduced.reduced_model import Reduced, State, evaluate
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
 ODDS = 10.0
-LINES = 40  # of a recording at which a further measurement is forecast
-PLACES = 60  # grids at which sensors are tried
-MASSES = 12  # grids at which a known mass and a drive are tried
+LINES = 24  # of a recording at which a new channel is forecast
+FEW = 4  # every so many of them, where all channels are forecast
+PLACES = 40  # grids at which sensors are tried
+MASSES = 8  # grids at which a known mass and a drive are tried
 SHARE = 0.02  # of the mass of the structure: the mass that is put on
 WEIGHED = 1e-3  # [kg] standard deviation of a good weighing
 GAIN = 0.01  # relative standard deviation of the gain of a sensor or gauge
-SEEN = 1e-3  # variance of a prediction, in units of the noise, that counts
+UNSEEN = 0.01  # of the noise: mean variance of the predictions that may be left out
+MOST_FORMS = 1000  # entries of the errors of form
 ABOVE = 1.25  # times the highest line: reach of a wider band
 
 
@@ -69,15 +70,15 @@ class Outlook:
     Attributes
     ----------
     names : of the explanations
-    rivals : their probabilities, and their places in the Gram matrices
+    rivals : their probabilities
     candidates : measurements
-    grams : (c, d, d) of each, in units of its noise
+    seen : data of each candidate, as the rivals predict them
     """
 
     names: tuple[str, ...]
     rivals: Rivals
     candidates: tuple[FurtherTest, ...]
-    grams: np.ndarray
+    seen: tuple[Predicted, ...]
 
 
 def advised(
@@ -92,9 +93,9 @@ def advised(
     """
     barred = set(without)
     cost = np.array([np.inf if barred & {c.kind, c.label} else c.cost for c in known.candidates])
-    total, out = np.zeros(known.grams.shape[1:]), []
-    for k in chosen(known.rivals, known.grams, cost, count):
-        total, c = total + known.grams[k], known.candidates[k]
+    total, out = nothing(known.seen[0]), []
+    for k in chosen(known.rivals, known.seen, cost, count):
+        total, c = total + known.seen[k], known.candidates[k]
         after = known.rivals.forecast(total)
         out.append(
             NextMeasurement(
@@ -110,7 +111,10 @@ def arrays_of(known: Outlook) -> dict[str, np.ndarray]:
     nowhere = (np.nan,) * 3
     return {
         "names": np.array(known.names), "probability": known.rivals.probability,
-        "sizes": np.array(known.rivals.columns.sizes), "grams": known.grams,
+        "ends": np.cumsum([s.mean.shape[1] for s in known.seen]),
+        "mean": np.hstack([s.mean for s in known.seen]).astype(np.float32),
+        **{f"factor_{j}": np.vstack([s.factors[j] for s in known.seen]).astype(np.float32)
+           for j in range(len(known.names))},
         "kind": np.array([c.kind for c in known.candidates]),
         "what": np.array([c.what for c in known.candidates]),
         "label": np.array([c.label for c in known.candidates]),
@@ -136,17 +140,19 @@ def read_outlook(folder: Path) -> Outlook:
     try:
         with np.load(path, allow_pickle=False) as file:
             held = {name: file[name] for name in file.files}
-        sizes = tuple(int(k) for k in held["sizes"])
         where = [None if np.isnan(p).any() else tuple(p.tolist()) for p in held["point_m"]]
         each = zip(*(held[k].tolist() for k in ("kind", "what", "label")), where,
                    held["cost"].tolist(), strict=True)  # fmt: skip
-        found = Outlook(
-            tuple(held["names"].tolist()), Rivals(Columns(sizes), held["probability"]),
-            tuple(FurtherTest(*row) for row in each), held["grams"],
-        )  # fmt: skip
+        names, rows = tuple(held["names"].tolist()), len(held["ends"])
+        columns_ = [held["mean"].T, *(held[f"factor_{j}"] for j in range(len(names)))]
+        parts = zip(*(np.split(c.astype(float), held["ends"][:-1]) for c in columns_), strict=True)
+        seen = tuple(Predicted(mean.T, tuple(factors)) for mean, *factors in parts)
+        candidates = tuple(FurtherTest(*row) for row in each)
+        found = Outlook(names, Rivals(held["probability"]), candidates, seen)
+        shapes = {(len(s.mean), *(F.shape[0] - s.mean.shape[1] for F in s.factors)) for s in seen}
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise FileError(f"{path} is no outlook of a diagnosis: {error}") from error
-    if found.grams.shape[1:] != 2 * (found.rivals.columns.count,):
+    if shapes != {(len(names), *len(names) * (0,))} or rows != len(candidates):
         raise FileError(f"{path} is no outlook of a diagnosis: its matrices have another size")
     return found
 
@@ -181,14 +187,20 @@ class Rival:
     @cached_property
     def form(self) -> Form:
         """Errors of form in the modes of the state."""
-        return form(self.state, ABOVE * float(self.data.s.imag.max()))
+        return form(self.state, float(self.data.s.imag.max()))
+
+    @cached_property
+    def strong(self) -> np.ndarray:
+        """The ``MOST_FORMS`` entries of the errors of form that move the recording most."""
+        moved = (columns(self.data, self.state, self.form) ** 2).sum(axis=0)
+        return np.argsort(-moved)[:MOST_FORMS]
 
     def slopes(self, data: Responses, state: State) -> np.ndarray:
         """∂r/∂u of the residuals of some data (n, n_u), in units of their noise."""
         error = self.data.error
         size = 0.0 if error is None else error.delta
         J = data.scaled(state, True)[1]
-        return np.hstack([J, size * columns(data, state, self.form)])
+        return np.hstack([J, size * columns(data, state, self.form)[:, self.strong]])
 
     @cached_property
     def posterior(self) -> tuple[np.ndarray, np.ndarray]:
@@ -245,15 +257,16 @@ def outlook(
         return None
     rivals = [Rival(problem, h) for h in hypotheses]
     found = list(_measurements(problem, rivals))
-    sizes, factors = _compressed([seen for _, seen in found])
-    columns_ = Columns(sizes)
-    grams = np.array([
-        columns_.gram([F @ V for (_, F), V in zip(seen, factors, strict=True)],
-                      [mean for mean, _ in seen])
-        for _, seen in found
-    ])  # fmt: skip
-    known = Rivals(columns_, np.asarray(probability) / np.sum(probability))
-    return Outlook(tuple(names), known, tuple(c for c, _ in found), grams)
+    kept = _kept([seen for _, seen in found])
+    seen = tuple(
+        Predicted(
+            np.stack([mean for mean, _ in each]),
+            tuple(F @ V for (_, F), V in zip(each, kept, strict=True)),
+        ).short
+        for _, each in found
+    )
+    known = Rivals(np.asarray(probability) / np.sum(probability))
+    return Outlook(tuple(names), known, tuple(c for c, _ in found), seen)
 
 
 Seen = list[tuple[np.ndarray, np.ndarray]]  # of each rival: mean and factor
@@ -271,7 +284,7 @@ def _measurements(
     for k in range(len(places)):
         yield _placed("sensor", "a sensor at", places, k), [each.of_output(k) for each in sensors]
     if not np.any(data.direct):
-        drives = [_new(r, rivals[0], lines, data.outputs, few.rows) for r in rivals]
+        drives = [_new(r, rivals[0], lines[::FEW], data.outputs, few.rows) for r in rivals]
         for k in range(len(few)):
             yield _placed("drive", "a drive at", few, k), [each.of_input(k) for each in drives]
     heavy = SHARE * problem.setup.weight
@@ -280,12 +293,12 @@ def _measurements(
         if None not in states:
             yield (
                 _placed("mass", f"{1e3 * heavy:.3g} g put on at", few, k),
-                [_new(r, rivals[0], lines, data.outputs, data.inputs, s, states[0]).seen
+                [_new(r, rivals[0], lines[::FEW], data.outputs, data.inputs, s, states[0]).seen
                  for r, s in zip(rivals, states, strict=True)],
             )  # fmt: skip
     top = float(data.s.imag.max())
     ratio = data.s[-1].real / data.s[-1].imag
-    wider = np.linspace(top, ABOVE * top, LINES // 2 + 1)[1:] * (ratio + 1j)
+    wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
     yield (
         FurtherTest("band", f"lines up to {ABOVE * top / (2 * np.pi):.4g} Hz", cost=COSTS["band"]),
         [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals],
@@ -304,7 +317,7 @@ def _placed(kind: str, what: str, places: ElementGrids, k: int) -> FurtherTest:
 
 
 @dataclass(frozen=True, eq=False)
-class Predicted:
+class Channels:
     """Responses of several channels under one rival, in units of their noise.
 
     Attributes
@@ -343,7 +356,7 @@ class Predicted:
 def _new(
     rival: Rival, first: Rival, lines: np.ndarray, outputs: Any, inputs: Any,
     state: State | None = None, about: State | None = None,
-) -> Predicted:  # fmt: skip
+) -> Channels:  # fmt: skip
     """Responses on some lines under a rival, compared with those of the first rival."""
     given = _responses(first, lines, outputs, inputs)
     values = given.model(elsewhere(first.state if about is None else about))
@@ -352,7 +365,7 @@ def _new(
                    b=rival.model.rows(inputs, keep=False))  # fmt: skip
     mean, F = rival.predicted(rows, elsewhere(rival.state if state is None else state))
     shape = (2, *values.shape)
-    return Predicted(mean.reshape(shape), F.reshape(*shape, -1), GAIN / LN10 / given.std())
+    return Channels(mean.reshape(shape), F.reshape(*shape, -1), GAIN / LN10 / given.std())
 
 
 def elsewhere(state: State) -> State:
@@ -373,11 +386,11 @@ def _responses(rival: Rival, lines: np.ndarray, outputs: Any, inputs: Any) -> Re
     )  # fmt: skip
 
 
-def _compressed(every: Sequence[Seen]) -> tuple[tuple[int, ...], list[np.ndarray]]:
-    """Directions (n_u, k) of each rival's unknowns that any of the measurements can see."""
-    factors = []
+def _kept(every: Sequence[Seen]) -> list[np.ndarray]:
+    """Directions (n_u, k) of each rival's unknowns that the measurements can see."""
+    out = []
     for j in range(len(every[0])):
-        G = sum(F.T @ F for F in (seen[j][1] for seen in every))
+        G = sum(F.T @ F / len(F) for F in (seen[j][1] for seen in every)) / len(every)
         lam, U = np.linalg.eigh(G)
-        factors.append(U[:, lam > max(SEEN, 1e-6 * lam[-1])])
-    return tuple(V.shape[1] for V in factors), factors
+        out.append(U[:, np.cumsum(np.maximum(lam, 0.0)) > UNSEEN])
+    return out
