@@ -259,14 +259,14 @@ TITLES = PLOT + "return plot.layout.annotations.map((a) => a.text)"
 
 
 def click(page, name, x, y):
-    """Press at shares of the width and height of the area that a chart draws in."""
-    box = (
+    """Press at values of the axes of a chart."""
+    at = (
         PLOT
-        + """const b = plot.querySelector(".plot .bglayer, .draglayer .nsewdrag");
-      const { x, y, width, height } = b.getBoundingClientRect(); return [x, y, width, height]"""
+        + """const b = plot.getBoundingClientRect(), { xaxis, yaxis } = plot._fullLayout;
+      return [b.x + xaxis._offset + xaxis.l2p(arguments[1]),
+        b.y + yaxis._offset + yaxis.l2p(arguments[2])]"""
     )
-    left, top, width, height = page.run(box, name)
-    place = left + x * width, top + y * height
+    place = page.run(at, name, x, y)
     page.pointer(("pointerMove", *place), ("pointerDown",), ("pointerUp",))
 
 
@@ -281,9 +281,7 @@ def test_a_square_of_the_matrix_opens_its_pair_of_modes(page, diagnosed):
     """The second mode of the test next to the first of the given deck, which is no pair."""
     see(page, "shapes")
     see(page, "mac")
-    rows = len(diagnosed.models.test.frequency)
-    columns = page.run(PLOT + "return plot.data[0].z[0].length", "mac")
-    click(page, "mac", 0.5 / columns, 1.5 / rows)
+    click(page, "mac", 0, 1)
     f = diagnosed.models.test.frequency[1]
     _, right = page.until(TITLES + f".filter((t, k, a) => a[0].includes('{f:.2f} Hz'))", "shapes")
     value = page.run(PLOT + "return plot.data[0].z[1][0]", "mac")

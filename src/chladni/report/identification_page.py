@@ -151,7 +151,7 @@ def _paths(found: Identification) -> list[str]:
 
 
 def _places(found: Identification) -> tuple[Shown | None, dict[str, Marker]]:
-    """What shapes are drawn on, and sensors by label: of the case, else of the recordings."""
+    """The ground of the shapes, and sensors by label: of the case, else of the recordings."""
     if isinstance(case := found.origin, Case):
         return mesh_of(surface(case.assembly), case.assembly), {
             m.label: m for m in markers(case.outputs)

@@ -84,7 +84,8 @@ def spots(
             if not len(at) and len(shown.ids):
                 at = shown.seen.points[np.isin(shown.ids, where.grids)]
             if not len(at):
-                at = np.array([m.point for m in shown.outputs if m.label in where.channels])
+                marked = [m.point for m in shown.outputs if m.label in where.channels]
+                at = np.array(marked).reshape(-1, 3)
         parts = [] if len(at) else [k for k, p in enumerate(shown.parts) if p in where.parts]
         if len(at) or parts:
             found.append({"name": name, "text": text, "at": at, "radius": radius, "parts": parts,

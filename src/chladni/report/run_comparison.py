@@ -104,7 +104,7 @@ def _charts(a: FinishedRun, b: FinishedRun, names: tuple[str, str]) -> list[Bloc
 def overlaid(a: Any, b: Any, names: tuple[str, str]) -> Json | None:
     """One chart of two as pages hold them; None where their quantities differ.
 
-    Of a chart with a choice, such as of channels, the views that both have.
+    A chart with a choice, such as of channels, keeps the views that both have.
     """
     charts = [c for c in (a, b) if isinstance(c, Mapping) and c["draw"] == "chart"]
     if len(charts) < 2 or any("brush" in c or len(c.get("choices", ())) > 1 for c in charts):

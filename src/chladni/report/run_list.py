@@ -64,7 +64,7 @@ class FinishedRun:
 
 
 def contents(run: FinishedRun, name: str) -> dict[str, Any]:
-    """A JSON of a run; empty where there is none."""
+    """The data of a JSON file of a run; empty without one."""
     with suppress(OSError, ValueError, RecursionError):
         held = json.loads((run.folder / name).read_text(encoding="utf-8"))
         return held if isinstance(held, dict) else {}

@@ -141,7 +141,7 @@ def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> 
     return (
         f"the article weighs {100 * abs(off):.1f} % {'more' if off > 0 else 'less'} than the deck, "
         "so calibration changes density and thickness; trim or mastic on a whole sheet has the "
-        "same effect: the drawing, or one part weighed alone, distinguishes them",
+        "same effect; the drawing, or one part weighed alone, distinguishes them",
     )
 
 

@@ -244,7 +244,7 @@ function shapes(at, data, shared, box) {
     const [x, y, z] = [tip(0), tip(1), tip(2)], stick = (axis, k) => data.sensors.flatMap((s, i) => [s.at[k], axis[i], null]);
     return [{ x, y, z }, { x: stick(x, 0), y: stick(y, 1), z: stick(z, 2) }];
   }
-  const scale = (more) => ({ cmin: 0, cmax: 1000, colorscale: "Viridis", colorbar: { orientation: "h", thickness: 8, len: 0.4, x: 1, xanchor: "right", y: 0, yanchor: "top", tickvals: [0, 500, 1000], ticktext: ["0", "0.5", "1"], title: { text: "share of the largest motion", font: { size: 11 } } }, ...more });
+  const scale = (more) => ({ cmin: 0, cmax: 1000, colorscale: "Viridis", colorbar: { orientation: "h", thickness: 8, len: 0.5, x: 1, xanchor: "right", y: 0, yanchor: "top", tickvals: [0, 500, 1000], ticktext: ["0", "0.5", "1"], title: { text: "share of the largest motion", side: "top", font: { size: 11 } } }, ...more });
   function traces(n, scene, last) {
     const [first, second, third] = moved(n, 1), m = mode(n)?.motion, rest = places(mesh), ghost = lines(ends(mesh.edges, rest), 2, "soft");
     if (state.side[n] === "test") {
