@@ -31,6 +31,8 @@ MOST = {  # modules of ours and of SciPy that a command loads for its --help, a 
     "render": (140, 180),
     "next": (270, 207),
     "report": (270, 207),
+    "index": (270, 207),
+    "compare": (270, 207),
     "test": (335, 207),
     "bench": (415, 207),
     "blind": (470, 207),

@@ -17,11 +17,22 @@ from chladni_specimens.plates import plate
 from .test_cli import deck_text
 
 WITH_FILE = [c for c in commands() if c not in ("demo", "blind")]  # these two take no file
-CASELESS = ("report", "next", "specimen", "init", "map", "check-effect", "convert")  # no case
+CASELESS = (  # they take no case
+    "report",
+    "index",
+    "compare",
+    "next",
+    "specimen",
+    "init",
+    "map",
+    "check-effect",
+    "convert",
+)
 COMPARING = ("diagnose", "calibrate", "correlate")  # a recording with the model
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
     "map": ["formed.k"],
+    "compare": ["other"],
 }
 READERS = {  # commands that read a bare deck, and what makes them quick
     "modes": ("--count", "8"),

@@ -43,6 +43,8 @@ BUILT_IN = (  # each a module here with a function ``run``, or ``STEPS`` of a co
     "map",
     "render",
     "report",
+    "index",
+    "compare",
     "next",
 )
 OF_CHECKOUT = {"blind": "chladni_evidence.blind_command"}  # evidence/: no wheel holds it

@@ -107,7 +107,7 @@ def _along_lines(z: np.ndarray) -> np.ndarray:
 STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
 TWO_SIDED = (0, 1)  # a fit better than those of right models has overstated errors
 NAMES = (
-    "the form error must be {0:.1%}; right models have {1:.1%}",
+    "the form error must be {3:.1f} %; right models have {4:.1f} %",
     "the residual is {2:.1f} times as large as a right model leaves",
     "the residual of one spectral line is {2:.1f} times as large as a right model leaves",
     "the residual of one channel is {2:.1f} times as large as a right model leaves",
@@ -150,7 +150,9 @@ def adequacy(
         for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
     )
     usual = rows[least].median
-    what = NAMES[least].format(seen[least], usual, seen[least] / usual)
+    what = NAMES[least].format(
+        seen[least], usual, seen[least] / usual, 100 * seen[least], 100 * usual
+    )
     near = _modes_near(worst, fit.state)
     test = FitTest(better or p >= LEAST_P, p, what, where, rows, near, better)
     if damping is not None:
@@ -206,8 +208,8 @@ def of_poles(data: Poles, state: State) -> FitTest:
         return FitTest(often >= LEAST_P, often, what, where)
     both = " and shapes" if data.shapes is not None else ""
     what = (
-        f"natural frequencies{both} agree to {data.scale:.1%}; models of one structure differ by "
-        f"about {SCALE:.1%}"
+        f"natural frequencies{both} agree to {100 * data.scale:.1f} %; models of one structure "
+        f"differ by about {100 * SCALE:.1f} %"
     )
     return FitTest(closely >= LEAST_P, closely, what, "over all modes")
 

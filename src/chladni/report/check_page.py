@@ -10,7 +10,7 @@ from ..workflows.case_check import CaseCheck, CheckedDof
 from ..workflows.case_model import cords, markers
 from .blocks import Block, Facts, Items, PageParts, Section, Table
 from .mesh_drawings import layout, mesh_of
-from .words import counted, direction, hertz, number, percent
+from .words import counted, direction, fixed, hertz, number, percent
 
 
 def check_json(found: CaseCheck) -> dict[str, Any]:
@@ -92,8 +92,8 @@ def _lead(found: CaseCheck) -> str:
 
 def _table(dofs: tuple[CheckedDof, ...]) -> Table:
     rows = [
-        (d.label, d.role, d.place, *(f"{x:.4f}" for x in d.point_m),
-         direction(d.direction), f"{1e3 * d.off_mesh_m:.1f}",
+        (d.label, d.role, d.place, *(fixed(x, 4) for x in d.point_m),
+         direction(d.direction), fixed(1e3 * d.off_mesh_m, 1),
          number(1e3 * d.mass_kg, 3))
         for d in dofs
     ]  # fmt: skip

@@ -109,7 +109,7 @@ def _by_responses(
     if not ((lines[0] >= low) & (lines[0] <= fit_max)).any():
         raise FileError(
             f"[band] exclude leaves no line between {low:g} and {fit_max:g} Hz to compare with the "
-            f"model (its lines lie {0.75 * ZETA:.0%} apart); exclude less, or widen the band"
+            f"model (its lines lie {75 * ZETA:.0f} % apart); exclude less, or widen the band"
         )
     progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
@@ -153,8 +153,9 @@ def _by_responses(
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
-        f"model and test were given {ZETA:.0%} damping for the search and {ZETA_Q:.0%} for Q "
-        "(damping equalisation): modes need no pairing, and damping cannot appear as stiffness",
+        f"model and test were given {100 * ZETA:.0f} % damping for the search and "
+        f"{100 * ZETA_Q:.0f} % for Q (damping equalisation): modes need no pairing, and damping "
+        "cannot appear as stiffness",
         f"the noise of the recording: {noise_source(frf)}",
     ]
     if question.base is not None:

@@ -258,18 +258,20 @@ def _paired_shapes(
     case: Case, model: Modelled, near: ModalModel, at_sensors: tuple[np.ndarray, np.ndarray],
     pairs: ModePairs, f_test: np.ndarray, numbers: tuple[int, ...],
 ) -> PairedShapes:  # fmt: skip
-    """Return model shapes of largest entry 1, and test shapes made real and scaled to them."""
-    phi, psi = at_sensors[0][:, pairs.model], at_sensors[1][:, pairs.test]
+    """Return model shapes of largest entry 1; test shapes made real, scaled to their partners."""
+    phi, psi = at_sensors
     scale = np.maximum(np.abs(phi).max(axis=0, initial=0.0), 1e-300)
-    phi = phi / scale
-    factor = (psi.conj() * phi).sum(axis=0) / np.maximum((np.abs(psi) ** 2).sum(axis=0), 1e-300)
-    s, q = model.structure, near.shapes[:, pairs.model] / scale
-    motion = (s.T @ q).reshape(len(s.assembly.points), 6, -1)[:, :3]
+    phi, power = phi / scale, np.maximum((np.abs(psi) ** 2).sum(axis=0), 1e-300)
+    factor = np.exp(-0.5j * np.angle((psi**2).sum(axis=0))) / np.sqrt(power)
+    paired = psi[:, pairs.test]
+    factor[pairs.test] = (paired.conj() * phi[:, pairs.model]).sum(axis=0) / power[pairs.test]
+    s = model.structure
+    motion = (s.T @ (near.shapes / scale)).reshape(len(s.assembly.points), 6, -1)[:, :3]
     middle, base = s.assembly.points.mean(axis=0), case.outputs.base[:, None]
     place = np.where(base, middle, case.outputs.points)
     return PairedShapes(
-        place, case.outputs.directions, (psi * factor).real, phi, np.asarray(motion),
-        f_test[pairs.test], near.frequency[pairs.model], [numbers[i] for i in pairs.model],
+        place, case.outputs.directions, (psi * factor).real, phi, np.asarray(motion), f_test,
+        near.frequency, numbers, list(zip(pairs.test.tolist(), pairs.model.tolist(), strict=True)),
         pairs.mac,
     )  # fmt: skip
 
