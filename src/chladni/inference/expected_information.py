@@ -55,6 +55,16 @@ class Predicted:
         *factors, apart = np.split(B, np.cumsum([F.shape[1] for F in self.factors]), axis=1)
         return Predicted(np.vstack([np.zeros(len(B)), apart.T]), tuple(factors))
 
+    def after(self, made: "Predicted", y: np.ndarray) -> "Predicted":
+        """The same data after others that share their unknowns have shown y (n,)."""
+        means, factors = [], []
+        for mean, F, known, G in zip(self.mean, self.factors, made.mean, made.factors, strict=True):
+            lam, U = np.linalg.eigh(G.T @ G)
+            L = U / np.sqrt(1 + np.maximum(lam, 0.0))  # L Lᵀ = (I + GᵀG)⁻¹
+            means.append(mean + F @ (L @ (L.T @ (G.T @ (y - known)))))
+            factors.append(F @ L)
+        return Predicted(np.array(means).reshape(self.mean.shape), tuple(factors))
+
 
 def nothing(like: Predicted) -> Predicted:
     """No data at all."""
