@@ -19,6 +19,7 @@ MOST = {  # modules of ours and of SciPy that a command loads for its --help, a 
     "": (20, 0),
     "check": (430, 207),
     "calibrate": (410, 207),
+    "convert": (170, 180),
     "correlate": (375, 207),
     "demo": (410, 207),
     "diagnose": (410, 207),

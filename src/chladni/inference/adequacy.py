@@ -17,6 +17,7 @@ its modal damping would scatter more than that of one structure.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
@@ -196,9 +197,7 @@ def of_poles(data: Poles, state: State) -> FitTest:
     and of at least as many poles without a partner among the modes of ``state``. Each pole is
     spurious with its own probability.
     """
-    from scipy.stats import norm
-
-    closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
+    closely = float(ndtr(-np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
     alone = np.setdiff1d(poles, data.pairs(state)[0])
     share = np.broadcast_to(data.spurious, data.frequency.shape)[poles]
@@ -207,8 +206,9 @@ def of_poles(data: Poles, state: State) -> FitTest:
         what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
         where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
         return FitTest(often >= LEAST_P, often, what, where)
+    both = " and shapes" if data.shapes is not None else ""
     what = (
-        f"natural frequencies agree to {100 * data.scale:.1f} %; models of one structure "
+        f"natural frequencies{both} agree to {100 * data.scale:.1f} %; models of one structure "
         f"differ by about {100 * SCALE:.1f} %"
     )
     return FitTest(closely >= LEAST_P, closely, what, "over all modes")

@@ -104,9 +104,8 @@ def _slopes(data: Responses | Poles, state: State) -> np.ndarray:
     """Slopes of the whitened data; natural frequencies are paired in a wide window first."""
     if not isinstance(data, Poles):
         return data.residual(state, True)[1]
-    wide = replace(data, scale=PAIRED, strength=np.full(len(data.strength), np.inf))
-    widths = np.append((wide.std() / data.std())[data.use], 1.0)
-    return wide.scaled(state, True)[1] * widths[:, None]
+    wide = replace(data.all_paired(), scale=PAIRED)
+    return data.scaled(state, True, wide.pairs(state))[1]
 
 
 def calibration_positions(effects: Sequence[Effect]) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -47,11 +48,15 @@ _HALVES = (
     "not prove the pair: random mixtures of the model's modes may agree as well on their best "
     "half."
 )
+_ACROSS = (
+    "ΦᵀMΨ is the cross-orthogonality with the model's mass on the sensors (SEREP): 1 for the "
+    "model's own mode; the other entries are in correlation.json."
+)
 _MAC = "Modal assurance criterion in per cent; framed: the pairs of the table. Click one to see it."
 
 
-def correlation_page(case: Case, found: Correlation) -> PageParts:
-    """Sections of the page."""
+def correlation_page(case: Case, found: Correlation, folder: Path | None = None) -> PageParts:
+    """Sections of the page; the test's shapes on the whole model are written into the folder."""
     p, shown = found.pairs, _shown(case)
     drawn: list[Block] = []
     if found.mac is not None and found.mac.size:
@@ -78,7 +83,18 @@ def correlation_page(case: Case, found: Correlation) -> PageParts:
             screening_section(found.screening, folded=True),
         ],
         found.notes,
+        [] if folder is None else expanded_shapes(folder, case, found),
     )
+
+
+def expanded_shapes(folder: Path, case: Case, found: Correlation) -> list[tuple[str, str]]:
+    """Write ``expanded.vtu``: (file, what it is); nothing where shapes were not expanded."""
+    from ..io.vtu import write_vtu
+
+    if found.expanded is None:
+        return []
+    write_vtu(folder / "expanded.vtu", case.assembly, found.expanded, found.f_test)
+    return [("expanded.vtu", "the test's shapes on the whole model, for ParaView")]
 
 
 def _responses(case: Case, found: Correlation) -> tuple[list[Block], dict[str, int]]:
@@ -139,6 +155,7 @@ def _shown(case: Case) -> Shown:
 
 def _modes(found: Correlation) -> Table:
     p = found.pairs
+    across = found.cross_orthogonality
     rows = [
         (
             hertz(found.f_test[j]),
@@ -146,11 +163,14 @@ def _modes(found: Correlation) -> Table:
             str(found.numbers[i]) if found.numbers else "–",
             percent(found.f_model[i], found.f_test[j]),
             criterion(value),
+            *([] if across is None else [criterion(float(abs(across[i, j])))]),
         )
         for i, j, value in zip(p.model, p.test, p.mac, strict=True)
     ]
-    heads = ("test [Hz]", "model [Hz]", "its mode", "off", "MAC")
-    return Table(heads, rows, caption=_alone(found), opens="shapes", at=p.test.tolist())
+    heads = ["test [Hz]", "model [Hz]", "its mode", "off", "MAC"]
+    heads += [] if across is None else ["ΦᵀMΨ"]
+    caption = _alone(found) if across is None else f"{_alone(found)} {_ACROSS}"
+    return Table(tuple(heads), rows, caption=caption, opens="shapes", at=p.test.tolist())
 
 
 def _worth(found: Correlation) -> list[Block]:
@@ -251,6 +271,10 @@ def correlation_json(result: Correlation) -> dict[str, Any]:
     }
     for mode, worth in zip(held["modes"], result.likeness, strict=False):
         mode["shape"] = vars(worth)
+    if (across := result.cross_orthogonality) is not None:
+        held["cross_orthogonality"] = {
+            "model_mode": result.numbers, "test_hz": test, "values": across,
+        }  # fmt: skip
     if result.screening is not None:
         held["screening"] = screening_json(result.screening)
     if result.comac is not None:

@@ -116,7 +116,8 @@ def _on_new_structure(
     assert isinstance(data, (Responses, Poles))
     model = modelled(changed.searched(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
-    mesh = mesh_hidden(model, f_max, measured_on(changed) if rows else None)
+    seen = rows or (isinstance(data, Poles) and data.shapes is not None)
+    mesh = mesh_hidden(model, f_max, measured_on(changed) if seen else None)
     reduced = reduced_problem(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,
