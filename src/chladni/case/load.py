@@ -23,6 +23,7 @@ from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
+from ..results import ShownBriefly
 from ..units import UNITS, Units
 from .bands import covered, held_out, searched_effects
 from .case_file import request_of
@@ -41,8 +42,8 @@ OUTSIDE = "[model] outside: files of the case may lie outside of its folder"  # 
 _MASS_SD = 0.002  # of the mass, where the user gives none
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
+@dataclass(frozen=True, eq=False, repr=False)
+class Case(ShownBriefly):
     """The resolved request of the user: a model in SI, and what was measured on it.
 
     Attributes

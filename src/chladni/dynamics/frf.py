@@ -10,6 +10,7 @@ from ..arguments import checked
 from ..arrays import readonly
 from ..dofs import positions
 from ..errors import LabelError, ShapeError, named
+from ..results import ShownBriefly
 from .massless import static_solver
 from .modes import ModalModel
 from .system import System
@@ -33,8 +34,8 @@ def _coherence(gamma: np.ndarray) -> np.ndarray:
     return np.clip(gamma, 0.0, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class FRF:
+@dataclass(frozen=True, eq=False, repr=False)
+class FRF(ShownBriefly):
     """H[k, i, j]: response at output i per unit input j at frequency k.
 
     Attributes
@@ -134,8 +135,8 @@ class FRF:
         return replace(self, values=self.values * factor, quantity=quantity, variance=variance)
 
 
-@dataclass(frozen=True, eq=False)
-class Residual:
+@dataclass(frozen=True, eq=False, repr=False)
+class Residual(ShownBriefly):
     """Contribution of the omitted higher modes, R(s) = R_0 - (s² + σ) R_1 [m/N].
 
     These are two terms of the series of Σ φφᵀ/(λ_r + s²) about s² = -σ, over the omitted modes.

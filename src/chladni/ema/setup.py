@@ -9,14 +9,15 @@ import numpy as np
 from ..arrays import readonly
 from ..dynamics.frf import FRF
 from ..errors import LabelError, ShapeError, named
+from ..results import ShownBriefly
 from .time_record import TimeRecord
 
 Role = Literal["output", "input"]
 Control = Literal["force", "response"]
 
 
-@dataclass(frozen=True, eq=False)
-class PoleTable:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoleTable(ShownBriefly):
     """Identified frequencies without an FRF, as in a table of a report.
 
     Attributes
@@ -60,8 +61,8 @@ class PoleTable:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Function:
+@dataclass(frozen=True, eq=False, repr=False)
+class Function(ShownBriefly):
     """A record other than an FRF: time history, spectrum, power spectral density.
 
     ``kind`` is the term of the universal file (time, auto spectrum, cross spectrum, psd, ...).
@@ -76,8 +77,8 @@ class Function:
     unit: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Shapes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shapes(ShownBriefly):
     """Mode shapes as a file holds them (dataset 55): any scale, real or complex."""
 
     # frequency, damping: (r,) [Hz], fraction of critical
@@ -92,8 +93,8 @@ class Shapes:
             raise ShapeError(f"shapes are {self.values.shape}, labels and frequencies say {due}")
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(ShownBriefly):
     """One file of a test, or one article or level of it.
 
     Attributes
@@ -134,8 +135,8 @@ class Recording:
     control: Control = "force"
 
 
-@dataclass(frozen=True, eq=False)
-class Sensor:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensor(ShownBriefly):
     """A sensor or an exciter as the user describes it.
 
     Attributes
@@ -172,8 +173,8 @@ class SensorAccuracy:
     position: float = 1.5e-3
 
 
-@dataclass(frozen=True, eq=False)
-class TestSetup:
+@dataclass(frozen=True, eq=False, repr=False)
+class TestSetup(ShownBriefly):
     """The test as it was set up: sensors, exciters, hangers, the weighing."""
 
     __test__ = False  # not a test class, whatever its name says

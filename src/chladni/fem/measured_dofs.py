@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
+from ..results import ShownBriefly
 from .assemble import Structure
 from .base_motion import base_motion
 from .locate import Share, rows_of, shares_of
@@ -14,8 +15,8 @@ from .locate import Share, rows_of, shares_of
 _ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredDofs:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasuredDofs(ShownBriefly):
     """Measured or driven dofs: grids, free points on the nearest shell, or motion of the base."""
 
     labels: tuple[str, ...]  # (k,) text

@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..errors import LabelError, ModelError, named
+from ..results import ShownBriefly
 from .properties import Part
 
 
@@ -23,8 +24,8 @@ def _no_rows(*shape: int) -> np.ndarray:
     return np.zeros((0, *shape), dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class Shells:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shells(ShownBriefly):
     """Four- and three-node shells; a triangle repeats its third node."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -56,8 +57,8 @@ class Shells:
         return self.nodes[:, 2] == self.nodes[:, 3]
 
 
-@dataclass(frozen=True, eq=False)
-class Solids:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solids(ShownBriefly):
     """Solids of one kind: hexahedra (8 or 20 nodes), wedges (6, 15), pyramids (5, 13), tetrahedra.
 
     A row holds the corners, then the nodes on the edges (``EDGES`` of geometry.solid_shapes). An
@@ -72,8 +73,8 @@ class Solids:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Beams:
+@dataclass(frozen=True, eq=False, repr=False)
+class Beams(ShownBriefly):
     """Two-node bars, beams and rods.
 
     Attributes
@@ -96,8 +97,8 @@ class Beams:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Scalars:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scalars(ShownBriefly):
     """Scalar springs, dampers or masses between two dofs, value (c_a q_a - c_b q_b)."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -111,8 +112,8 @@ class Scalars:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Bushes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bushes(ShownBriefly):
     """Six-component springs with dampers (CBUSH), each in its own frame."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -131,8 +132,8 @@ class Bushes:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Masses:
+@dataclass(frozen=True, eq=False, repr=False)
+class Masses(ShownBriefly):
     """Concentrated masses: 6 x 6 at each node in the basic frame, offset included [SI]."""
 
     ids: np.ndarray = field(default_factory=_no_rows)
@@ -143,8 +144,8 @@ class Masses:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class RigidBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class RigidBody(ShownBriefly):
     """RBE2, RBAR and similar: dependent dofs follow the independent point as a rigid body.
 
     ``independent`` is one row with all six dofs; ``components[k]`` are the dofs (1-6) of
@@ -157,8 +158,8 @@ class RigidBody:
     components: tuple[tuple[int, ...], ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Average:
+@dataclass(frozen=True, eq=False, repr=False)
+class Average(ShownBriefly):
     """RBE3: the reference point moves as the weighted mean of the others.
 
     ``terms`` are (row, components, weight). ``moved`` are optional (row, component) pairs that are
@@ -172,8 +173,8 @@ class Average:
     moved: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Equation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equation(ShownBriefly):
     """Multi-point constraint Σ a_k q_k = 0; the first term is the dependent one."""
 
     id: int
@@ -182,8 +183,8 @@ class Equation:
     factors: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Assembly:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assembly(ShownBriefly):
     """The complete structure.
 
     Attributes

@@ -19,6 +19,7 @@ from ..geometry.grid_normals import normals_at
 from ..io.nastran.text.deck import Deck
 from ..model.analysis import Analysis
 from ..model.assembly import Assembly
+from ..results import ShownBriefly
 from ..units import UNITS, Units
 from ..units import units as unit_system
 from ..view.surface import Surface, surface
@@ -32,8 +33,8 @@ LEAST_MODES = 7  # separate six rigid motions of a free structure from the first
 SOURCES = "the path of a deck or case, what chladni.load or load_case returned, or an Assembly"
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(ShownBriefly):
     """An assembly with its matrices, built at first use."""
 
     source: Path
@@ -112,8 +113,8 @@ def load_model(
     return found.model(subcase) if isinstance(found, DeckModels) else as_model(found, command)
 
 
-@dataclass(frozen=True, eq=False)
-class DeckModels:
+@dataclass(frozen=True, eq=False, repr=False)
+class DeckModels(ShownBriefly):
     """A bare deck, its analysis requests, and its model under each subcase."""
 
     source: Path
