@@ -1,7 +1,8 @@
 """Results of all functions of the package: in words, drawn, saved, shown in a notebook."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field, fields, is_dataclass
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,12 +12,69 @@ from .arguments import checked
 from .errors import LabelError, ModelError, did_you_mean, named, plain_line
 from .output import atomic, run_folder
 
+_WIDEST = 72  # characters of one value
 
-@dataclass(frozen=True)
+
+class ShownBriefly:
+    """Data that show themselves briefly: each field with its number, its size or its type."""
+
+    def __repr__(self) -> str:
+        said = ", ".join(f"{name}={text}" for name, text in self._in_brief().items())
+        return f"{type(self).__name__}({said})"
+
+    def _repr_html_(self) -> str:
+        """Return the fields as a table for a notebook."""
+        rows = "".join(
+            f'<tr><th style="text-align:left">{escape(name)}</th>'
+            f'<td style="text-align:left">{escape(text)}</td></tr>'
+            for name, text in self._in_brief().items()
+        )
+        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+
+    def _in_brief(self) -> dict[str, str]:
+        values = {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+        return {name: in_brief(value) for name, value in values.items()}
+
+
+def in_brief(value: object) -> str:
+    """Text of a value in at most 72 characters: what is long by its size or its type.
+
+    >>> in_brief((20.0, 200.0)), in_brief(range(1000)), in_brief(["a" * 100])
+    ('(20.0, 200.0)', '1000 x int', '1 x str')
+    """
+    if hasattr(value, "shape") and hasattr(value, "dtype"):
+        return f"{value.shape} {value.dtype}"
+    if isinstance(value, Path):
+        value = str(value)
+    if isinstance(value, bytes):
+        return f"{len(value)} bytes"
+    if isinstance(value, str):
+        text = repr(value)
+        return text if len(text) <= _WIDEST else f"{text[: _WIDEST - 4]}...{text[0]}"
+    if value is None or isinstance(value, int | float | complex):
+        return repr(value)
+    if isinstance(value, Mapping | Sequence | Set):
+        plain = all(x is None or isinstance(x, int | float | complex | str) for x in value)
+        if not isinstance(value, Mapping) and plain and len(value) <= 8:
+            if len(text := repr(value)) <= _WIDEST:
+                return text
+        kinds = dict.fromkeys(type(x).__name__ for x in _held(value))
+        return f"{len(value)} x {' or '.join([*kinds][:3])}" if value else repr(value)
+    return f"{type(value).__name__}(...)" if is_dataclass(value) else type(value).__name__
+
+
+def _held(value: Mapping[Any, Any] | Sequence[Any] | Set[Any]) -> Iterable[Any]:
+    return value.values() if isinstance(value, Mapping) else value
+
+
+@dataclass(frozen=True, repr=False)
 class DrawnPicture:
     """A picture as PNG, which a notebook shows and a script saves."""
 
     png: bytes
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: a PNG of {in_brief(self.png)}>"
 
     def _repr_png_(self) -> bytes:
         """The PNG for a notebook (IPython's rich display protocol)."""
@@ -165,7 +223,5 @@ class Result:
 
     def _repr_html_(self) -> str:
         """Return the page in a frame for a notebook: its sandbox runs no scripts."""
-        from html import escape
-
         page = self._view.html(self)
         return _FRAME.format(escape(page), type(self).__name__, 36)

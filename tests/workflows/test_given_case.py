@@ -49,6 +49,14 @@ def test_arguments_ask_what_the_file_asks(case, folder):
     assert [n.replace(str(folder) + "/", "") for n in asked.notes] == list(case.notes)
 
 
+def test_units_of_a_deck_are_guessed_as_init_guesses_them(case, folder):
+    """The materials say them, for a path and for a deck that was read; a note says why."""
+    for deck in (folder / "plate.bdf", case.deck):
+        asked = given_case(deck, folder / "frf.npz", {"damping": 0.01})
+        assert asked.units.name == "SI"
+        assert asked.notes[0].startswith("units = SI: ")
+
+
 def test_arrays_ask_what_the_file_asks(case, folder):
     """FRF and places in memory, a model that was loaded: the same numbers by another way in."""
     model, frf = chladni.load(folder / "plate.bdf", "SI"), case.frfs[0]
@@ -104,7 +112,6 @@ def test_repeated_words_are_dicts(folder):
     ("words", "said"),
     [
         ({"unit": "SI"}, "no argument 'unit'; did you mean 'units'"),
-        ({}, "argument units is missing; there are SI, mm-t-s"),
         ({"units": "mm"}, "argument units = 'mm'; .* SI, mm-t-s"),
         ({"units": "SI", "band": (50, 20)}, "argument band .* the first must be below the second"),
         (

@@ -125,4 +125,4 @@ def test_every_object_fits_on_a_screen(case, diagnosed):
     for one in (case, model, found, found.test, chladni.modes(model, 8), diagnosed):
         for each in reached(one, 3):
             assert len(repr(each)) <= 2000, type(each)
-    assert "complex128 (450, 6, 1)" in repr(case.frfs[0])
+    assert "(450, 6, 1) complex128" in repr(case.frfs[0])

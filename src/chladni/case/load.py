@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import checked
-from ..arrays import OneScreen
 from ..dofs import positions
 from ..dynamics.frf import FRF
 from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
@@ -25,6 +24,7 @@ from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
+from ..results import ShownBriefly
 from ..units import UNITS, Units
 from .bands import covered, held_out, searched_effects
 from .case_file import request_of
@@ -44,7 +44,7 @@ _MASS_SD = 0.002  # of the mass, where the user gives none
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Case(OneScreen):
+class Case(ShownBriefly):
     """The resolved request of the user: a model in SI, and what was measured on it.
 
     Attributes

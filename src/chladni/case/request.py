@@ -10,6 +10,7 @@ from ..errors import FileError, did_you_mean, named, shortened
 from ..io.file_size import LEADS_OUT, lies_within
 from ..io.nastran import Deck
 from ..model.assembly import Assembly
+from ..results import ShownBriefly
 from .key import NEEDED, Key
 from .schema import ONCE, PARAMETER, RECORDING, OnceWords, ParameterWords, RecordingWords
 
@@ -25,8 +26,8 @@ class Stated(Generic[W]):
     whole: str = ""  # all of them: 'the [[parameter]] of line 21'
 
 
-@dataclass(frozen=True, eq=False)
-class Request:
+@dataclass(frozen=True, eq=False, repr=False)
+class Request(ShownBriefly):
     """A case before it is resolved, with what a program holds already in place of files."""
 
     path: Path  # of the case, as messages name it

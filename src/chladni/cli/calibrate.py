@@ -6,11 +6,24 @@ from typing import Annotated
 import typer
 
 from ..workflows.calibrate import calibrate
-from .run import CaseFolder, Out, Pictures, diagnosed, opened, started
+from .run import (
+    DeckOrCase,
+    Mass,
+    Out,
+    Pictures,
+    Recordings,
+    SensorTable,
+    Units,
+    diagnosed,
+    opened,
+    started,
+    stated,
+)
 
 
 def run(
-    source: CaseFolder,
+    source: DeckOrCase,
+    recordings: Recordings = None,
     variants: Annotated[
         bool,
         typer.Option(
@@ -25,6 +38,9 @@ def run(
             help="Draw from the posterior (needs emcee: pip install 'chladni[posterior]').",
         ),
     ] = False,
+    sensors: SensorTable = None,
+    mass: Mass = None,
+    units: Units = None,
     pictures: Pictures = False,
     out: Out = None,
 ) -> None:
@@ -34,14 +50,16 @@ def run(
     """
     if variants and sample:
         raise typer.BadParameter("--sample draws for one model; leave out --variants")
+    words = stated(sensors=sensors, mass=mass, units=units)
     if variants:
         from ..report.joint_models_page import joint_models_page
         from ..report.result_json import to_json
         from ..workflows.joint_models import joint_models
 
         with started("calibrate", source, out) as job:
-            found = joint_models(opened(source), progress=job.progress)
+            found = joint_models(opened(source, recordings or (), words), progress=job.progress)
             job.json("variants.json", to_json(found))
             job.show(joint_models_page(job.folder, found))
     else:
-        diagnosed("calibrate", source, out, partial(calibrate, sample=sample), pictures)
+        fit = partial(calibrate, sample=sample)
+        diagnosed("calibrate", source, out, fit, pictures, recordings or (), words)

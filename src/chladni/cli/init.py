@@ -12,22 +12,18 @@ from ..workflows.case_check import NO_RECORDING, check
 from ..workflows.case_draft import CaseDraft, case_text, draft, said_of, sensors_text
 from ..workflows.ready_case import refuse_without_effects
 from .console import say, watched
-from .run import Allow, Out, Units, place_of, started
+from .run import Allow, Mass, Out, Recordings, SensorTable, Units, place_of, started
 
 
 def run(
     source: Annotated[Path, typer.Argument(metavar="DECK", help="A Nastran deck.")],
-    recordings: Annotated[
-        list[Path] | None, typer.Argument(metavar="RECORDING", help="Files of FRFs or time data.")
-    ] = None,
-    sensors: Annotated[
-        Path | None, typer.Option(help="Table of sensors, in the form of chladni plan.")
-    ] = None,
+    recordings: Recordings = None,
+    sensors: SensorTable = None,
     quantity: Annotated[
         str | None,
         typer.Option(help="receptance, mobility or accelerance, if the file does not state it."),
     ] = None,
-    mass: Annotated[float | None, typer.Option(help="Weighed mass of the article [kg].")] = None,
+    mass: Mass = None,
     units: Units = None,
     allow: Allow = None,
     out: Out = None,

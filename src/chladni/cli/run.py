@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -31,6 +31,7 @@ from .console import console, say, say_results, say_table, watched
 
 if TYPE_CHECKING:
     from ..case import Case
+    from ..case.schema import CaseWords
     from ..workflows.diagnosis_result import DiagnosisResult
 
 
@@ -62,6 +63,14 @@ Units = Annotated[
     str | None,
     typer.Option(help=f"Unit system of a bare deck: {', '.join(UNITS)}."),
 ]
+Recordings = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="RECORDING", help="Files of FRFs or time data, beside a bare deck."),
+]
+SensorTable = Annotated[
+    Path | None, typer.Option(help="Table of sensors, in the form of chladni plan.")
+]
+Mass = Annotated[float | None, typer.Option(help="Weighed mass of the article [kg].")]
 Allow = Annotated[
     list[str] | None,
     typer.Option("--allow", help="Nastran card with stiffness that may be left out (repeatable)."),
@@ -149,13 +158,14 @@ class Run:
 @contextmanager
 def started(
     command: str, source: Path | str, out: Path | None, *, listed: bool = True, adds: bool = False,
-    pictures: bool = False,
+    pictures: bool = False, reads: Sequence[Path] = (),
 ) -> Iterator[Run]:  # fmt: skip
     """A run whose files appear in ``out`` only if nothing failed; by default in ./runs."""
     from ..case.files_of_source import files_of
 
     place = place_of(command, Path(source), out)
-    with run_folder(place, command, files_of(Path(source)), listed=listed, adds=adds) as folder:
+    inputs = (*files_of(Path(source)), *reads)
+    with run_folder(place, command, inputs, listed=listed, adds=adds) as folder:
         with watched() as progress:
             run = Run(command, Path(source), folder, place, progress, pictures=pictures)
             yield run
@@ -180,16 +190,27 @@ def place_of(command: str, source: Path, out: Path | None) -> Path:
     return out or Path("runs") / f"{command}-{_name(source)}"
 
 
-def opened(source: Path) -> "Case":
-    """The case of a folder or a case.toml."""
+def stated(**words: Any) -> "CaseWords":
+    """The words of a case that were given as options."""
+    return cast("CaseWords", {name: word for name, word in words.items() if word is not None})
+
+
+def opened(
+    source: Path, recordings: Sequence[Path] = (), words: "CaseWords | None" = None
+) -> "Case":
+    """The case of a folder or a case.toml, or of a deck with its recordings."""
     from ..case import load_case
     from ..io.mesh_format import refuse_foreign
+    from ..workflows.given_case import given_case
     from ..workflows.loaded_model import is_case
 
+    if recordings or words:
+        return given_case(source, list(recordings), words)
     if source.exists() and not is_case(source):
         refuse_foreign(source)
         raise FileError(
-            f"{source} is not a case; give a folder with a case.toml (chladni init drafts one)"
+            f"{source} is not a case; give a folder with a case.toml (chladni init drafts one), "
+            "or a deck with its recording"
         )
     return load_case(source)
 
@@ -200,8 +221,10 @@ def diagnosed(
     out: Path | None,
     workflow: Callable[..., "DiagnosisResult"],
     pictures: bool = False,
+    recordings: Sequence[Path] = (),
+    words: "CaseWords | None" = None,
 ) -> "DiagnosisResult":
-    """Diagnose or calibrate a case into a folder and say the verdict.
+    """Diagnose or calibrate a case, or a deck with recordings, and say the verdict.
 
     Raises
     ------
@@ -212,8 +235,8 @@ def diagnosed(
     from ..report.sentence import sentence
     from ..report.verdict import sections
 
-    with started(command, source, out) as job:
-        case = opened(source)
+    with started(command, source, out, reads=recordings) as job:
+        case = opened(source, recordings, words)
         found = workflow(case, progress=within(job.progress, 0.0, 0.85))
         stage = within(job.progress, 0.85, 1.0)
         found = write_diagnosis(job.folder, case, found, command_line(), stage, job.place, pictures)

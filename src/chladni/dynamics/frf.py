@@ -7,9 +7,10 @@ from typing import Literal, Self, get_args
 import numpy as np
 
 from ..arguments import checked
-from ..arrays import OneScreen, readonly
+from ..arrays import readonly
 from ..dofs import positions
 from ..errors import LabelError, ShapeError, named
+from ..results import ShownBriefly
 from .massless import static_solver
 from .modes import ModalModel
 from .system import System
@@ -41,7 +42,7 @@ def _coherence(gamma: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FRF(OneScreen):
+class FRF(ShownBriefly):
     """H[k, i, j]: response at output i per unit input j at frequency k.
 
     Attributes
@@ -141,8 +142,8 @@ class FRF(OneScreen):
         return replace(self, values=self.values * factor, quantity=quantity, variance=variance)
 
 
-@dataclass(frozen=True, eq=False)
-class Residual:
+@dataclass(frozen=True, eq=False, repr=False)
+class Residual(ShownBriefly):
     """Contribution of the omitted higher modes, R(s) = R_0 - (s² + σ) R_1 [m/N].
 
     These are two terms of the series of Σ φφᵀ/(λ_r + s²) about s² = -σ, over the omitted modes.

@@ -6,15 +6,16 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import OneScreen, readonly
+from ..arrays import readonly
 from ..dofs import parse, rows
 from ..errors import LabelError, ShapeError
+from ..results import ShownBriefly
 
 _RIGID_GAP = 100.0  # ratio of frequencies that does not occur between two flexible modes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModalModel(OneScreen):
+class ModalModel(ShownBriefly):
     """Modes with Φᵀ M Φ = I and Φᵀ K Φ = diag(ω_r²).
 
     Attributes

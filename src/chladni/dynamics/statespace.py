@@ -8,12 +8,13 @@ from scipy.linalg import block_diag
 
 from ..arrays import readonly
 from ..errors import LabelError, ShapeError
+from ..results import ShownBriefly
 from .frf import FRF, Quantity
 from .modes import ModalModel
 
 
-@dataclass(frozen=True, eq=False)
-class StateSpace:
+@dataclass(frozen=True, eq=False, repr=False)
+class StateSpace(ShownBriefly):
     """x' = A x + B u, y = C x + D u."""
 
     # A, B, C, D: (n, n), (n, n_in), (n_out, n), (n_out, n_in) real

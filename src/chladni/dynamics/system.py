@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import OneScreen, readonly
+from ..arrays import readonly
 from ..errors import ShapeError
+from ..results import ShownBriefly
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class System(OneScreen):
+class System(ShownBriefly):
     """Mass, viscous damping and stiffness over labelled degrees of freedom."""
 
     # M, V, K: (n, n) mass [kg], damping [N s/m], stiffness [N/m]; symmetric. K may be

@@ -9,10 +9,10 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import OneScreen
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
 from ..progress import Progress, silent
+from ..results import ShownBriefly
 from .modal_covariance import ModalCovariance, modal_covariance
 from .pole_choice import by_subspace, edited
 from .pole_fitting import PoleData, solve
@@ -27,7 +27,7 @@ AWAY = 3.0  # times the band, above or below: of a pole there damping moves H by
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identified(OneScreen):
+class Identified(ShownBriefly):
     """H(s) = s^q [Σ_r R_r/(s-p_r) + R̄_r/(s-p̄_r) + L/s² + U], with the spread of the poles."""
 
     poles: np.ndarray  # (r,) complex; p_r [rad/s], by increasing |p|

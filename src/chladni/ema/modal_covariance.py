@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ..arrays import OneScreen
+from ..results import ShownBriefly
 from .condensed_lines import affordable
 from .pole_fitting import (
     PoleData,
@@ -30,7 +30,7 @@ _SINGULAR = 1e-12  # of the largest: directions of the poles that the data do no
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModalCovariance(OneScreen):
+class ModalCovariance(ShownBriefly):
     """δp_r = L_r z, δR_rc = S_rc z + e_rc, z of unit covariance, over real and imaginary part."""
 
     pole: np.ndarray  # (r, 2, m) L, roots: Cov(p_i, p_j) = L_i L_jᵀ [rad/s]

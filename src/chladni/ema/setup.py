@@ -6,9 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import OneScreen, readonly
+from ..arrays import readonly
 from ..dynamics.frf import FRF, MOTION_OVER_FORCE
 from ..errors import LabelError, ShapeError, named
+from ..results import ShownBriefly
 from .time_record import TimeRecord
 
 Role = Literal["output", "input"]
@@ -16,7 +17,7 @@ Control = Literal["force", "response"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoleTable(OneScreen):
+class PoleTable(ShownBriefly):
     """Identified frequencies without an FRF, as in a table of a report.
 
     Attributes
@@ -60,8 +61,8 @@ class PoleTable(OneScreen):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Function:
+@dataclass(frozen=True, eq=False, repr=False)
+class Function(ShownBriefly):
     """A record other than an FRF: time history, spectrum, power spectral density.
 
     ``kind`` is the term of the universal file (time, auto spectrum, cross spectrum, psd, ...).
@@ -80,8 +81,8 @@ MOST_NODES = 100  # of a modal model: shapes of a model's modes need no more
 RIGID = 1e-3  # of the highest frequency: modes below are rigid motions
 
 
-@dataclass(frozen=True, eq=False)
-class Shapes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shapes(ShownBriefly):
     """Mode shapes as a file holds them: any scale, real or complex.
 
     Attributes
@@ -132,7 +133,7 @@ class Shapes:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(OneScreen):
+class Recording(ShownBriefly):
     """One file of a test, or one article or level of it.
 
     Attributes
@@ -205,8 +206,8 @@ class Recording(OneScreen):
         return found.sel(np.arange(len(found.frequency)), measured)
 
 
-@dataclass(frozen=True, eq=False)
-class Sensor:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensor(ShownBriefly):
     """A sensor or an exciter as the user describes it.
 
     Attributes
@@ -244,7 +245,7 @@ class SensorAccuracy:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TestSetup(OneScreen):
+class TestSetup(ShownBriefly):
     """The test as it was set up: sensors, exciters, hangers, the weighing."""
 
     __test__ = False  # not a test class, whatever its name says

@@ -8,10 +8,11 @@ import numpy as np
 from ..arrays import readonly
 from ..dynamics.frf import Quantity
 from ..errors import ShapeError
+from ..results import ShownBriefly
 
 
-@dataclass(frozen=True, eq=False)
-class TimeRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class TimeRecord(ShownBriefly):
     """Time histories of all channels of one test: hits or bursts as blocks, or one long stretch."""
 
     # (b, n_in, n) [N]; where the base was moved, its motion in the unit of the responses

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import OneScreen
 from ..dofs import rows as label_rows
 from ..dynamics.system import System
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly, picked
+from ..results import ShownBriefly
 from . import shell
 from .negative_springs import refuse_unstable
 from .shell_section import SectionArrays, section_arrays
@@ -34,7 +34,7 @@ PIECE = 1024  # elements whose matrices are in memory at a time
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Structure(OneScreen):
+class Structure(ShownBriefly):
     """The assembled matrices and the transformation from the free dofs to the motion of points."""
 
     assembly: Assembly

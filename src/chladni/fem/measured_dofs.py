@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import OneScreen
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
+from ..results import ShownBriefly
 from .assemble import Structure
 from .base_motion import base_motion
 from .locate import Share, rows_of, shares_of
@@ -16,7 +16,7 @@ _ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeasuredDofs(OneScreen):
+class MeasuredDofs(ShownBriefly):
     """Measured or driven dofs: grids, free points on the nearest shell, or motion of the base."""
 
     labels: tuple[str, ...]  # (k,) text

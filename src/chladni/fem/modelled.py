@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import OneScreen
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
 from ..errors import ModelError
 from ..model.assembly import Assembly
+from ..results import ShownBriefly
 from ..sparse.freed_memory import give_back_freed_memory
 from .assemble import Structure, structure
 
@@ -17,7 +17,7 @@ _ROUNDING = 1e-9  # tolerance, because callers compute the same band by differen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Modelled(OneScreen):
+class Modelled(ShownBriefly):
     """The matrices of an assembly and all its normal modes up to ``band``, at least the first."""
 
     structure: Structure

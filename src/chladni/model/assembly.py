@@ -11,8 +11,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..arrays import OneScreen
 from ..errors import LabelError, ModelError, named
+from ..results import ShownBriefly
 from .properties import Part
 
 
@@ -25,7 +25,7 @@ def _no_rows(*shape: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Shells(OneScreen):
+class Shells(ShownBriefly):
     """Four- and three-node shells; a triangle repeats its third node."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -61,8 +61,8 @@ class Shells(OneScreen):
         return self.nodes[:, 2] == self.nodes[:, 3]
 
 
-@dataclass(frozen=True, eq=False)
-class Solids:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solids(ShownBriefly):
     """Solids of one kind: hexahedra (8 or 20 nodes), wedges (6, 15), pyramids (5, 13), tetrahedra.
 
     A row holds the corners, then the nodes on the edges (``EDGES`` of geometry.solid_shapes). An
@@ -77,8 +77,8 @@ class Solids:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Beams:
+@dataclass(frozen=True, eq=False, repr=False)
+class Beams(ShownBriefly):
     """Two-node bars, beams and rods.
 
     Attributes
@@ -107,8 +107,8 @@ class Beams:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Scalars:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scalars(ShownBriefly):
     """Scalar springs, dampers or masses between two dofs, value (c_a q_a - c_b q_b)."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -122,8 +122,8 @@ class Scalars:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Bushes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bushes(ShownBriefly):
     """Six-component springs with dampers (CBUSH), each in its own frame."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -142,8 +142,8 @@ class Bushes:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class Masses:
+@dataclass(frozen=True, eq=False, repr=False)
+class Masses(ShownBriefly):
     """Concentrated masses: 6 x 6 at each node in the basic frame, offset included [SI]."""
 
     ids: np.ndarray = field(default_factory=_no_rows)
@@ -154,8 +154,8 @@ class Masses:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class RigidBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class RigidBody(ShownBriefly):
     """RBE2, RBAR and similar: dependent dofs follow the independent point as a rigid body.
 
     ``independent`` is one row with all six dofs; ``components[k]`` are the dofs (1-6) of
@@ -168,8 +168,8 @@ class RigidBody:
     components: tuple[tuple[int, ...], ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Average:
+@dataclass(frozen=True, eq=False, repr=False)
+class Average(ShownBriefly):
     """RBE3: the reference point moves as the weighted mean of the others.
 
     ``terms`` are (row, components, weight). ``moved`` are optional (row, component) pairs that are
@@ -183,8 +183,8 @@ class Average:
     moved: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Equation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equation(ShownBriefly):
     """Multi-point constraint Σ a_k q_k = 0; the first term is the dependent one."""
 
     id: int
@@ -194,7 +194,7 @@ class Equation:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Assembly(OneScreen):
+class Assembly(ShownBriefly):
     """The complete structure.
 
     Attributes

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import OneScreen
+from ..results import ShownBriefly
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PairedShapes(OneScreen):
+class PairedShapes(ShownBriefly):
     """Modes of test and model at the sensors, and the model's whole shapes; which are partners."""
 
     # points, directions: (k, 3) of the sensors [m], unit vectors

@@ -30,7 +30,7 @@ def diagnose(
         ``Recording``, or dicts with the keys of a [[recording]]; the first is compared
     progress : is called with a text and a share of the work
     words : units, sensors, mass, band, effects and the other words of a case, as
-        :class:`chladni.CaseWords` lists them (SI, Hz)
+        :class:`chladni.CaseWords` lists them (SI, Hz); without units a deck's materials say them
 
     Returns
     -------

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import OneScreen
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
 from ..ema.level_table import LevelTable
@@ -32,7 +31,7 @@ from ..inference.result import (
 )
 from ..io.nastran.edit.changes import Change
 from ..model.assembly import Assembly
-from ..results import Result
+from ..results import Result, ShownBriefly
 from ..search.measured_modes import MeasuredModes
 from ..search.next_measurement import Outlook
 
@@ -58,7 +57,7 @@ class ChangedDeck:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class UpdatedModels(OneScreen):
+class UpdatedModels(ShownBriefly):
     """The three structures of a diagnosis, with their responses and the recording's."""
 
     nominal: Modelled  # the deck as it was given

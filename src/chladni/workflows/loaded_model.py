@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import OneScreen
 from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import ArgumentError, FileError
@@ -21,6 +20,7 @@ from ..geometry.grid_normals import normals_at
 from ..io.nastran.text.deck import Deck
 from ..model.analysis import Analysis
 from ..model.assembly import Assembly
+from ..results import ShownBriefly
 from ..units import UNITS, Units
 from ..units import units as unit_system
 from ..view.surface import Surface, surface
@@ -35,7 +35,7 @@ SOURCES = "the path of a deck or case, what chladni.load or load_case returned, 
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(OneScreen):
+class Model(ShownBriefly):
     """An assembly with its matrices, built at first use."""
 
     source: Path
@@ -114,8 +114,8 @@ def load_model(
     return found.model(subcase) if isinstance(found, DeckModels) else as_model(found, command)
 
 
-@dataclass(frozen=True, eq=False)
-class DeckModels:
+@dataclass(frozen=True, eq=False, repr=False)
+class DeckModels(ShownBriefly):
     """A bare deck, its analysis requests, and its model under each subcase."""
 
     source: Path

@@ -7,8 +7,8 @@ from itertools import islice
 from pathlib import Path
 
 from ....arguments import checked
-from ....arrays import OneScreen
 from ....errors import FileError, named, nearest
+from ....results import ShownBriefly
 from .card_layout import tables
 from .cards import FIELDS
 from .case_control import CaseControl, case_control
@@ -23,7 +23,7 @@ SCALED = frozenset("CB1 CB2 CK1 CK2 CK3 CM1 CM2".split())  # PARAM that scale wh
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Deck(OneScreen):
+class Deck(ShownBriefly):
     """A deck: its files as they stand, its cards by name, its case control, its part names."""
 
     path: Path

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from pathlib import Path
 
-from ....arrays import OneScreen
 from ....errors import FileError
+from ....results import ShownBriefly
 from ...file_size import refuse_large, refuse_outside
 from ...mesh_format import refuse_foreign
 
@@ -33,7 +33,7 @@ class Include:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Source(OneScreen):
+class Source(ShownBriefly):
     """One file of a deck; ``bulk`` are its bulk-data lines [first, past) (0-based)."""
 
     path: Path
