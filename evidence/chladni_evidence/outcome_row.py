@@ -24,6 +24,7 @@ ALSO = {  # names that are right as well
     "local-resonator": ("rattle",),
     "friction-joint": ("joint-friction", "viscoelastic-joint"),
     "foam": ("viscoelastic-joint", "compliant-support"),
+    "rotor": ("rotating-part",),
     "rib": ("stiffness-patch", "thickness-distribution"),
 }
 KIN = (  # effects that change the same operator: the right family, if not the right name

@@ -14,6 +14,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.modal_sum import modal_sum
 from ..dynamics.reduction import Basis, beyond
 from ..effects.effect import (
     ChannelChange,
@@ -21,6 +22,7 @@ from ..effects.effect import (
     FieldChange,
     PointTerm,
     ShapeChange,
+    SpinTerm,
     count,
     of,
 )
@@ -32,6 +34,7 @@ from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
 from .field_factors import log_fields, mass_log, multiplied
 from .frequency_dependent_stiffness import Dissipated, Rising
+from .gyroscopic import Spin, spin
 from .matrix_slopes import MatrixSlopes
 from .matrix_stack import MatrixStack, stacked
 from .modal_factors import modal_factors
@@ -251,6 +254,7 @@ class State:
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
     drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
     dissipated             dissipation of effects in the modes, or None
+    spin                   spinning parts, or None; λ and φ are those at rest
     moved, dmoved          change of the modes where they are measured, outputs and inputs (p, m),
                            or None, and its derivatives by position of the parameter
     """
@@ -269,6 +273,17 @@ class State:
     moved: np.ndarray | None = None
     dmoved: Mapping[int, np.ndarray] = field(default_factory=dict)
     dissipated: Dissipated | None = None
+    spin: Spin | None = None
+
+    def between(
+        self, s: np.ndarray, d: np.ndarray, left: np.ndarray, right: np.ndarray
+    ) -> np.ndarray:
+        """Receptances (n_f, n_l, n_r) of places over the modes (., m), d = 1 / (λ + s²) (n_f, m).
+
+        They are those at places left to forces at places right, spinning parts included.
+        """
+        H = modal_sum(left, d, right)
+        return H if self.spin is None else H + self.spin.seen(s, d, left, right)
 
     @property
     def vectors(self) -> np.ndarray:
@@ -278,7 +293,10 @@ class State:
     def without_slopes(self) -> Self:
         """The state without ∂K and ∂M, which hold the matrices that they are made of."""
         lost = self.dissipated
-        return replace(self, dK=None, dM=None, dissipated=None if lost is None else lost.held)
+        return replace(
+            self, dK=None, dM=None, dissipated=None if lost is None else lost.held,
+            spin=None if self.spin is None else replace(self.spin, slopes={}),
+        )  # fmt: skip
 
     def of_last(self, k: int) -> Self:
         """The state with its slopes by the last k parameters alone."""
@@ -291,6 +309,7 @@ class State:
             ddrive=None if self.ddrive is None else self.ddrive[first:],
             dmoved={p - first: moved for p, moved in self.dmoved.items() if p >= first},
             dissipated=None if lost is None else lost.of_last(k),
+            spin=None if self.spin is None else self.spin.of_last(first),
         )  # fmt: skip
 
 
@@ -356,7 +375,7 @@ def evaluate(
     drive, ddrive = (None, None) if base is None else base.loads(phi)
     state = State(
         lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
-        *_moved(model, acting, phi[:r]), lost,
+        *_moved(model, acting, phi[:r]), lost, _spin(model, acting, phi[:r]),
     )  # fmt: skip
     return state if gradient else state.without_slopes()
 
@@ -374,6 +393,19 @@ def _moved(
             total = value if total is None else total + value
             slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
     return total, slopes
+
+
+def _spin(model: Reduced, acting: Acting, phi: np.ndarray) -> Spin | None:
+    """The spinning parts of all effects over the modes, or None."""
+    parts = [
+        (
+            term, at, model.rows(term.rows, not term.moving) @ phi,
+            {p: model.rows(rows, keep=False) @ phi for p, rows in term.moving.items()},
+        )
+        for _, at, terms in acting
+        for term in of(SpinTerm, terms)
+    ]  # fmt: skip
+    return spin(parts) if parts else None
 
 
 def _participating(
