@@ -112,8 +112,8 @@ def proposes_candidates(case: TriedFamily) -> str:
     if bool(alone) == (shy or family.effect.kind == "test"):
         raise BrokenRule(
             f"candidates(context) gives {len(alone)} where only natural frequencies are known "
-            "(context.scan is None); an effect of mass or stiffness needs candidates there, a "
-            "fault of the test and a spinning part have none"
+            "(context.scan is None); give some for an effect of mass or stiffness, and none for "
+            "a fault of the test or a spinning part"
         )
     _check_fit(family, alone, case.ground.by_poles)
     return f"{found} with FRFs, {len(alone)} with frequencies alone"

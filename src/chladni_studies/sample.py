@@ -86,7 +86,7 @@ def _computed(study: StudyModel, values: np.ndarray) -> tuple[dict[str, float], 
     columns["mass_kg" if model.unit else "mass"] = float(mass_properties(assembly)[0])
     frf = None
     if study.case is not None and study.test is not None:
-        frf, q, _ = scored(study.case, made, study.test)
+        frf, q = scored(study.case, made, study.test)
         columns["Q"] = np.nan if q is None else q.Q
     if study.settings.inputs:
         frf = wished(study.settings, model, made)

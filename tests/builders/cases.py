@@ -3,6 +3,7 @@
 import shutil
 
 import chladni
+from chladni.geometry.refine import refined
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni.model.point_masses import with_masses
@@ -40,14 +41,18 @@ def changed_case(source, to, *words):
     return to
 
 
-def write_case(folder, shells, sensors, frequency, top):
+def write_case(folder, shells, sensors, frequency, top, lump=0.02, halved=0):
     """A plate of so many shells a side with a mass on its last corner, which the deck lacks.
 
-    No two modes of the plate are alike, and none has a node at the shaker.
+    No two modes of the plate are alike, and none has a node at the shaker.  The shells of the
+    article are halved so many times.
     """
     deck, corner = plate(0.3, 0.22, shells, shells, 1e-3), (shells + 1) ** 2
     write_assembly(deck, folder / "plate.bdf")
-    write_assembly(with_masses(deck, (corner,), 0.02), folder / "article.bdf")
+    heavier = with_masses(deck, (corner,), lump)
+    for _ in range(halved):
+        heavier = refined(heavier)
+    write_assembly(heavier, folder / "article.bdf")
     article = chladni.load(folder / "article.bdf", "SI")
     made = chladni.frf(article, [f"{g}:+Z" for g in sensors], ["2:+Z"], frequency).frfs[0]
     write_npz(folder / "frf.npz", made.to("accelerance"))

@@ -35,6 +35,17 @@ def test_no_mode_loses_all_its_stiffness():
         assert_allclose(np.sort(lam[6:])[: len(due) // 2], due[: len(due) // 2], rtol=1e-6)
 
 
+def test_the_halved_mesh_is_the_mesh_error_at_one():
+    """The same state, with no parameter left."""
+    coarse = modelled(plate(0.4, 0.3, 4, 2, 1.5e-3), 4 * TOP)
+    error = mesh_errors(coarse, TOP, lambda built: built.rows(built.system.dofs[:12]))[0]
+    model = reduced_problem(coarse, TOP).model
+    a, b = evaluate(model, [error], np.ones(1)), evaluate(model, [error.halved], np.zeros(0))
+    assert_allclose(a.lam, b.lam)
+    assert_allclose(a.moved, b.moved)
+    assert b.dK.count == 0
+
+
 def test_the_softest_mode_of_a_row_of_bars_goes_to_its_limit(tmp_path):
     """f = (1.8751/L)² √(EI/ρA) / 2π, for a third more than what a mesh twice as fine changes.
 

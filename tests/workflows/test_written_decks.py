@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
+from tests.builders.cases import SENSORS, write_case
 
 import chladni
+from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import Traits, Weight
+from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.point_masses import with_masses
 from chladni.reduced.accuracy import LIMIT
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.search.preparation import ZETA_Q, prepare
 from chladni.search.written_scores import noise_Q, seen, written_Q
+from chladni.workflows import diagnosis_pipeline
 from chladni.workflows.diagnosis_pipeline import _article_mass
 from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import plate
@@ -49,6 +53,38 @@ def test_the_effect_explains_the_recording(diagnosed):
     q = diagnosed.agreement.fitted
     assert diagnosed.effects[0].name == "point-mass"
     assert q.with_effect < 0.05 * q.nominal
+
+
+def test_a_mesh_too_coarse_for_the_change_is_halved(tmp_path, monkeypatch):
+    """An article on a mesh four times as fine: the decks with halved shells are much nearer to it.
+
+    The deck on the given mesh is taken to be no better than the one before it.
+    """
+    (tmp_path / "case").mkdir()
+    write_case(tmp_path / "case", 6, SENSORS, np.linspace(15, 330, 450), 300.0, 0.003, halved=2)
+    case = replace(chladni.load_case(tmp_path / "case"), effects=("point-mass",))
+    own = chladni.diagnose(case).agreement.held_out
+    said, calls = diagnosis_pipeline.last_step_in_words, []
+
+    def once(agreement, named):
+        calls.append(agreement)
+        return "it is worse" if len(calls) == 1 else said(agreement, named)
+
+    monkeypatch.setattr(diagnosis_pipeline, "last_step_in_words", once)
+    result = chladni.diagnose(case)
+    held, mesh = result.agreement.held_out, result.models.final.model.assembly
+    assert len(mesh.shells) == 4 * len(case.assembly.shells)
+    assert held.with_effect < 0.3 * own.with_effect
+    assert held.with_effect < held.calibrated
+    assert not result.distrust
+    assert "on it it is worse; the decks that are written have every shell halved" in (
+        " ".join(result.notes)
+    )
+    written = write_diagnosis(tmp_path / "run", case, result)
+    assert {"updated.bdf", "calibrated.bdf"} <= set(written.files.values())
+    read = chladni.load(tmp_path / "run" / "updated.bdf", "SI").assembly
+    f = [normal_modes(structure(a).system, 12).frequency[6:] for a in (read, mesh)]
+    np.testing.assert_allclose(*f, rtol=1e-6)
 
 
 def test_Q_is_that_of_the_full_matrices(case):

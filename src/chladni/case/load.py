@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import checked
+from ..arrays import OneScreen
 from ..dynamics.frf import FRF
 from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
 from ..errors import ChladniError, FileError, named
@@ -41,8 +42,8 @@ OUTSIDE = "[model] outside: files of the case may lie outside of its folder"  # 
 _MASS_SD = 0.002  # of the mass, where the user gives none
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
+@dataclass(frozen=True, eq=False, repr=False)
+class Case(OneScreen):
     """The resolved request of the user: a model in SI, and what was measured on it.
 
     Attributes

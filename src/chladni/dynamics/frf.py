@@ -7,7 +7,7 @@ from typing import Literal, Self, get_args
 import numpy as np
 
 from ..arguments import checked
-from ..arrays import readonly
+from ..arrays import OneScreen, readonly
 from ..dofs import positions
 from ..errors import LabelError, ShapeError, named
 from .massless import static_solver
@@ -33,8 +33,8 @@ def _coherence(gamma: np.ndarray) -> np.ndarray:
     return np.clip(gamma, 0.0, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class FRF:
+@dataclass(frozen=True, eq=False, repr=False)
+class FRF(OneScreen):
     """H[k, i, j]: response at output i per unit input j at frequency k.
 
     Attributes

@@ -184,8 +184,8 @@ class ShapeChange:
 class SpinTerm:
     """-Rᵀ [h]× R, skew, added to the damping matrix: the moments of a spinning part on its grid.
 
-    Its angular momentum h turns with the structure, so that the rate θ' of rotation takes the
-    moment θ' x h (Meirovitch 1980, Computational Methods in Structural Dynamics, 2.10).
+    Its angular momentum h turns with the structure at the rate θ', which takes the moment θ' x h.
+    Source: Meirovitch 1980, Computational Methods in Structural Dynamics, 2.10.
     """
 
     rows: sp.csr_array  #: R (3, n), rotations about the axes of the basic frame

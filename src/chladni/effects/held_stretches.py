@@ -22,7 +22,7 @@ from .estimate import in_mm
 
 PATTERNS = 8  # motions along a line: those of the largest forces
 FEWEST = 4  # grids of a stretch
-STRETCHES = {"its first half": (0.0, 0.5), "its last half": (0.5, 1.0), "its middle": (0.25, 0.75)}
+STRETCHES = {"first half": (0.0, 0.5), "last half": (0.5, 1.0), "middle": (0.25, 0.75)}
 LEAST_PULL = 1e-3  # of the largest direction, from which a direction gives
 ALIKE = 0.9  # cosine between normals that belong to one face
 
@@ -152,8 +152,8 @@ def stretches(
             grids = assembly.ids[rows[mine]]
             how = "over the face" if tangent is None else "along the line"
             said = (
-                f"the supports of {len(grids)} grids from {grids[0]} on near ({in_mm(centre)} mm)"
-                f"{text}, each giving by itself {how}"
+                f"the {len(grids)} supports from grid {grids[0]} on near ({in_mm(centre)} mm)"
+                f"{text}; each yields on its own {how}"
             )
             pull = np.array([p for _, p in found])
             made = HeldStretch(grids, centre, said, tuple(springs), rigid, pull, not text)
@@ -173,7 +173,7 @@ def _chosen(
     for text, (first, last) in STRETCHES.items():
         mine = (place >= first) & (place <= last)
         if mine.sum() >= FEWEST:
-            yield f", {text}", mine
+            yield f", the {text} of their clamp", mine
     normal = cell_normals(assembly.points, faces)
     left = np.arange(len(faces))
     while len(left):

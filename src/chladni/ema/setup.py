@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import readonly
+from ..arrays import OneScreen, readonly
 from ..dynamics.frf import FRF
 from ..errors import LabelError, ShapeError, named
 from .time_record import TimeRecord
@@ -15,8 +15,8 @@ Role = Literal["output", "input"]
 Control = Literal["force", "response"]
 
 
-@dataclass(frozen=True, eq=False)
-class PoleTable:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoleTable(OneScreen):
     """Identified frequencies without an FRF, as in a table of a report.
 
     Attributes
@@ -92,8 +92,8 @@ class Shapes:
             raise ShapeError(f"shapes are {self.values.shape}, labels and frequencies say {due}")
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(OneScreen):
     """One file of a test, or one article or level of it.
 
     Attributes
@@ -172,8 +172,8 @@ class SensorAccuracy:
     position: float = 1.5e-3
 
 
-@dataclass(frozen=True, eq=False)
-class TestSetup:
+@dataclass(frozen=True, eq=False, repr=False)
+class TestSetup(OneScreen):
     """The test as it was set up: sensors, exciters, hangers, the weighing."""
 
     __test__ = False  # not a test class, whatever its name says

@@ -60,7 +60,7 @@ class ModeCoupling:
 
     @property
     def step(self) -> str:
-        """What to do about modes that are coupled by a spinning part or by damping; or ""."""
+        """The next measurement, if a spinning part or damping couples modes; else ""."""
         order = np.argsort(-self.complexity)[:MOST_NAMED]
         near = np.sort(self.frequency[order[self.complexity[order] > FLOOR]])
         if not len(near) or not self.coupled:

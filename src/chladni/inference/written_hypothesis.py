@@ -7,6 +7,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.joint_stiffness import calibrated_family
+from ..effects.model_errors import MeshError
 from ..errors import ModelError
 from .hypothesis_fit import HypothesisFit, fitted
 from .implausible_values import is_strained
@@ -15,7 +16,7 @@ from .pole_data import Poles
 
 
 def as_written(
-    hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
+    hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None, halved: bool = False
 ) -> HypothesisFit:
     """Fit what a deck can hold: calibrated numbers and the effects of the hypothesis.
 
@@ -32,6 +33,10 @@ def as_written(
     compensate for mesh and joints. On a coarse plate with a concealed crack E went to 264 GPa for
     210 without it, and to 212 with it.
 
+    Parameters
+    ----------
+    halved : the deck has every shell halved
+
     Raises
     ------
     ModelError
@@ -43,6 +48,7 @@ def as_written(
         e for e in found.effects if e in named or e.traits.writable or is_strained(e, found.of(e))
     ]
     numbers = [calibrated_family(e) if is_strained(e, found.of(e)) else e for e in kept]
+    mesh = [e.halved for e in found.effects if type(e) is MeshError] if halved else []
     data, fits = hypothesis.data, list[Fit]()
     made = fitted if isinstance(data, Poles) else fit  # poles have the spread of the deck itself
     if isinstance(data, Poles) and data.listed:
@@ -51,11 +57,24 @@ def as_written(
         x = [_given(e) if given and e.kind == "calibration" else found.of(e) for e in kept]
         start = np.concatenate([np.zeros(0), *x])
         with suppress(ModelError):
-            fits.append(made(hypothesis.model, numbers, data, mass_measurement, start))
+            fits.append(made(hypothesis.model, [*numbers, *mesh], data, mass_measurement, start))
     if not fits:
         raise ModelError("neither the calibrated nor the given values belong to a structure")
     best = min(fits, key=lambda f: f.neg2_log_evidence)
     return replace(hypothesis, fit=best.kept(), optima=())
+
+
+def preferred_mesh(
+    null: HypothesisFit, plain: HypothesisFit, mass_measurement: MassMeasurement | None
+) -> HypothesisFit | None:
+    """The calibrated deck with every shell halved, if it is more probable than ``plain``."""
+    if not any(type(e) is MeshError for e in null.fit.effects):
+        return None
+    try:
+        made = as_written(null, mass_measurement, halved=True)
+    except ModelError:
+        return None
+    return made if made.neg2_log_evidence < plain.neg2_log_evidence else None
 
 
 def _given(effect: Effect) -> np.ndarray:

@@ -1,13 +1,13 @@
 """Spinning parts in a reduced model: exact responses over the modes of the structure at rest.
 
-Parts of angular momenta h at rotations β (3 rows each, over the modes) make the dynamic stiffness
-A = Λ + s² + s βᵀ S β with S = -[h]×, skew. With D = 1 / (Λ + s²) and C = β D βᵀ (Woodbury):
+The dynamic stiffness is A = Λ + s² + s βᵀ S β. β (3 rows for each part) are rotations over the
+modes, S = -[h]× is skew, h the angular momentum. With D = 1 / (Λ + s²) and C = β D βᵀ (Woodbury):
 
     A⁻¹ = D - s D βᵀ S (I + s C S)⁻¹ β D.
 
-A is not symmetric: the response at o to a force at i is that at i to a force at o if all parts spin
-the other way. Poles of the undamped A lie on the imaginary axis, so damping-equalised data compare
-with it as they do without spin.
+A is not symmetric. Force and response may change places if all parts spin the other way. Poles of
+the undamped A lie on the imaginary axis, so damping-equalised data compare with it as they do
+without spin.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

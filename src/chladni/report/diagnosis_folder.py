@@ -1,19 +1,18 @@
 """The folder of a diagnosis: the updated deck, ``diagnosis.json``, pictures, the page."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
 from ..case import Case
 from ..io.nastran import changed_lines, write_deck
-from ..io.nastran.edit.changes import Change
+from ..io.nastran.export.whole_deck import write_assembly
 from ..output import write_json, write_npz
 from ..progress import Progress, silent
 from ..search.next_measurement import FILE, arrays_of
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
-from ..workflows.diagnosis_result import DiagnosisResult
+from ..workflows.diagnosis_result import ChangedDeck, DiagnosisResult
 from .blocks import Code, Section, Text, write_pictures
 from .calibration_blocks import calibration_json
 from .diagnosis_drawings import drawings
@@ -91,17 +90,17 @@ def _decks(folder: Path, case: Case, result: DiagnosisResult, home: Path) -> dic
         return found
     read = {s.path.resolve() for s in case.deck.sources}
 
-    def written(stem: str, changes: Sequence[Change]) -> str:
+    def written(stem: str, deck: ChangedDeck) -> str:
         names = (f"{stem}{k or ''}.bdf" for k in count())
         name = next(n for n in names if (home / n).resolve() not in read)
-        return write_deck(case.deck, folder / name, changes, home).name
+        if deck.whole is not None:
+            return write_assembly(deck.whole, folder / name, case.units).name
+        return write_deck(case.deck, folder / name, deck.changes or (), home).name
 
-    if models.final.changes is not None:
-        found["deck"] = written(
-            "updated" if result.searched else "calibrated", models.final.changes
-        )
-    if models.calibrated is not models.final and models.calibrated.changes is not None:
-        found["calibrated"] = written("calibrated", models.calibrated.changes)
+    if models.final.writable:
+        found["deck"] = written("updated" if result.searched else "calibrated", models.final)
+    if models.calibrated is not models.final and models.calibrated.writable:
+        found["calibrated"] = written("calibrated", models.calibrated)
     return found
 
 

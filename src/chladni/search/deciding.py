@@ -82,10 +82,19 @@ class Evaluated(Tested):
         return as_written(self.fit, self.problem.mass_measurement)
 
     @cached_property
+    def halved(self) -> HypothesisFit:
+        """The hypothesis in the form of a deck with every shell halved."""
+        return as_written(self.fit, self.problem.mass_measurement, halved=True)
+
+    @cached_property
     def left(self) -> Left:
-        """Q of the calibrated deck and of its own, on the fitted and on the choosing data."""
-        prepared, plain = self.trial.prepared, self.trial.found.plain
-        stages = [(plain, plain.fit.state), (self.written, self.written.fit.state)]
+        """Q of the calibrated deck and of its own, on the fitted and on the choosing data.
+
+        Both have the mesh that the data prefer: an effect may be smaller than the error of a mesh.
+        """
+        prepared, found = self.trial.prepared, self.trial.found
+        decks = (found.halved[0], self.halved) if found.halved else (found.plain, self.written)
+        stages = [(deck, deck.fit.state) for deck in decks]
         choosing = prepared.held.choosing
         return Left(*((a, b) for a, b in scores_of(prepared, self.fit, stages, choosing)))
 
@@ -131,7 +140,8 @@ class Evaluated(Tested):
     def forget_model(self) -> None:
         """Keep the fit, not the vectors that were added to the basis for it."""
         self.fit = on_common_basis(self.problem, self.fit)
-        vars(self).pop("written", None)
+        for form in ("written", "halved"):
+            vars(self).pop(form, None)
         self.forgotten = True
 
 

@@ -39,7 +39,8 @@ def concluded(
     )  # fmt: skip
     if not decision.named:
         return said, tuple(words.doubts())
-    return replace(said, written=order[0].written), order[0].distrust
+    halved = (*found.halved, order[0].halved) if found.halved else ()
+    return replace(said, written=order[0].written, halved=halved), order[0].distrust
 
 
 def _of(one: Explanation | None) -> Evaluated:

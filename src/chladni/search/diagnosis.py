@@ -35,7 +35,7 @@ from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_instead_of_spin, damping_test_along_effect
 from ..inference.pole_data import Poles
 from ..inference.rows_of_fits import hypothesis_of
-from ..inference.written_hypothesis import as_written
+from ..inference.written_hypothesis import as_written, preferred_mesh
 from ..progress import within
 from ..reduced.accuracy import accuracy
 from ..reduced.reduced_model import evaluate
@@ -105,6 +105,7 @@ class Diagnosis:
     sets : several effects together, each of which pays, in the order in which the sets grew
     chances : of the tests of fit that were made, by name
     written : the named effect in the form of a deck
+    halved : ``plain`` and ``written`` with every shell halved, where the data prefer that mesh
     adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, and what would settle it
     gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
@@ -122,6 +123,7 @@ class Diagnosis:
     sets: tuple[Several, ...] = ()
     chances: Mapping[str, FitChances] = field(default_factory=dict)
     written: HypothesisFit | None = None
+    halved: tuple[HypothesisFit, ...] = ()
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
     gains: tuple[float, ...] = ()
@@ -174,7 +176,9 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     plain = as_written(null, problem.mass_measurement)
-    found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=notes)
+    finer = preferred_mesh(null, plain, problem.mass_measurement)
+    halved = () if finer is None else (finer,)
+    found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=notes, halved=halved)
     found = named_by_fits(problem, found)
     whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
     found = _names_alone(problem, found, whole)

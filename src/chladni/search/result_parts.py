@@ -214,23 +214,29 @@ def agreement(
 
 
 def foretells_worse(agreement: Agreement | None, named: bool = False) -> tuple[str, ...]:
-    """Reason not to use a deck that predicts the held-out data worse than the deck before it.
-
-    An increase of Q within the noise of the recording may be chance and is accepted.
-    """
-    held = Scores() if agreement is None else agreement.held_out
-    (one, before), (last, after) = held.last_step(named).items()
-    if before is None or after is None or after <= before + (held.floor or 0.0):
-        return ()
-    known, why = held.with_nuisances, ""
-    if known is not None and known < before:
-        why = (
+    """Reason not to use a deck that predicts the held-out data worse than the deck before it."""
+    said, held = last_step_in_words(agreement, named), (agreement or Agreement()).held_out
+    known, (before, _) = held.with_nuisances, held.last_step(named).values()
+    if said and known is not None and before is not None and known < before:
+        said += (
             f"; with errors of mesh, joints and scatter Q is {known:.3g}: the deck lacks these, so "
             "refine its mesh where it bends most"
         )
+    return (said,) if said else ()
+
+
+def last_step_in_words(agreement: Agreement | None, named: bool) -> str:
+    """Sentence on a deck that predicts the held-out data worse than the deck before it; else "".
+
+    An increase of Q within the noise of the recording may be chance and is accepted.
+    """
+    held = (agreement or Agreement()).held_out
+    (one, before), (last, after) = held.last_step(named).items()
+    if before is None or after is None or after <= before + (held.floor or 0.0):
+        return ""
     return (
         f"the {last} deck predicts the held-out data worse than the {one} deck "
-        f"(Q {after:.3g}, {before:.3g} before){why}",
+        f"(Q {after:.3g}, {before:.3g} before)"
     )
 
 

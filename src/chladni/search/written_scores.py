@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.effect import ChannelChange, SpinTerm, Term, of
+from ..ema.identification import Identified, equalised
 from ..fem.modelled import Modelled
 from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.likelihood import LN10, Responses
@@ -54,6 +55,22 @@ def written_Q(
     offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
     state = replace(state, offset=offset)
     return tuple(data.Q(state, use) for use in sets)
+
+
+def equalised_deviation(
+    question: Question, found: Identified, model: Modelled, s: np.ndarray
+) -> np.ndarray:
+    """δ (n_f, n_out, n_in) of a structure on equalised lines s, as every reported Q has it."""
+    built = model.structure
+    rows = question.outputs.rows(built), question.inputs.rows(built)
+    data = Responses(
+        equalised(found, s), s, *rows, np.ones((len(s), rows[0].shape[0]), bool), found.quantity,
+        direct=question.outputs.moved_with_base(question.inputs),
+    )  # fmt: skip
+    compared, state = seen(question, data, model, float(s.imag.max()) / (2 * np.pi))
+    assert isinstance(compared, Responses)
+    delta = compared.deviation(state)
+    return delta if question.gain_known else delta - delta.real.mean()
 
 
 def gain_offset(

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import OneScreen
 
-@dataclass(frozen=True, eq=False)
-class PairedShapes:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PairedShapes(OneScreen):
     """Paired modes at the sensors, each of largest entry 1, and the model's whole shape."""
 
     # points, directions: (k, 3) of the sensors [m], unit vectors

@@ -24,14 +24,16 @@ from ..inference.pole_data import ABOVE, Poles
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
+from ..search.preparation import ZETA_Q, equalised_lines
 from ..search.silent_dofs import refuse_silent
+from ..search.written_scores import equalised_deviation
 from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
 from .given_case import Source, given_case
 from .identify import firm
 from .output_only import with_natural_frequencies
-from .question_of_case import nothing_measured
+from .question_of_case import nothing_measured, question_of
 from .screening_of_case import screened_by_model
 from .sign_of_gain import with_sign_of_gain
 from .unit_check import refuse_other_units
@@ -125,6 +127,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     progress(_identifying(len(test.outputs) * len(test.inputs), int(use.sum())), 0.4)
     found = identified(test, case.band, use=use)
     screening = screened_by_model(case, found, model, use)
+    q, notes = _quality(case, model, found, _band(case, test))
     found = found.sel(firm(found) & found.inside)
     refuse_turned_axes(case, found, model)
     phi, psi = case.outputs.rows(model.structure) @ near.shapes, driven_shapes(found)
@@ -134,7 +137,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     if M is not None and len(pairs):
         by_dof = comac(phi[:, pairs.model], psi[:, pairs.test])
     progress("responses", 0.6)
-    responses, q, notes = scored(case, model, test)
+    responses, _ = scored(case, model, test)
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
         case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
@@ -226,21 +229,42 @@ def pairs_of(at: np.ndarray, by_test: np.ndarray, modes: int) -> ModePairs:
     )  # fmt: skip
 
 
-def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:
-    """Return responses of the model, Q over the lines in use, and notes on both."""
-    use = case.lines(test.frequency) if case.band or case.exclude else test.frequency > 0
-    low, high = test.frequency[use][[0, -1]]
-    seen = test.sel(band=(max(float(low), 1e-9), float(high)))
+def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None]:
+    """Return responses of the model with its own damping, and Q over the lines in use."""
+    low, high = _band(case, test)
+    seen = test.sel(band=(max(low, 1e-9), high))
     responses = model_frf(case, model, case.damping or DAMPING, seen)
-    ends = np.linspace(low, high, BANDS + 1)
-    bands = tuple(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
     weight = case.lines(seen.frequency)[:, None, None].astype(float)
     try:
         delta = deviation(responses, seen)
-    except ChladniError as error:
-        return responses, None, (f"Q could not be calculated: {error}.",)
-    notes: tuple[str, ...] = ()
+    except ChladniError:
+        return responses, None
     if not case.gain_known:
         delta = delta - np.median(delta.real)
-        notes = ("The gain is unknown, so Q was calculated after one common factor was removed.",)
-    return responses, quality(delta, seen.frequency, bands, weight), notes
+    return responses, quality(delta, seen.frequency, weight=weight)
+
+
+def _band(case: Case, test: FRF) -> tuple[float, float]:
+    """Return the first and the last line in use [Hz]."""
+    use = case.lines(test.frequency) if case.band or case.exclude else test.frequency > 0
+    low, high = test.frequency[use][[0, -1]].tolist()
+    return low, high
+
+
+def _quality(
+    case: Case, model: Modelled, found: Identified, band: tuple[float, float]
+) -> tuple[Quality | None, tuple[str, ...]]:
+    """Return Q as a diagnosis has it, by channel and band, and notes."""
+    ends = np.linspace(*band, BANDS + 1)
+    bands = tuple(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+    try:
+        f = equalised_lines(band, case.exclude, ZETA_Q)
+        s = 2 * np.pi * f * (ZETA_Q + 1j)
+        delta = equalised_deviation(question_of(case), found, model, s)
+    except ChladniError as error:
+        return None, (f"Q could not be calculated: {error}.",)
+    note = f"Q compares responses with {ZETA_Q:.0%} damping on both sides, as in a diagnosis."
+    if case.gain_known:
+        return quality(delta, f, bands), (note,)
+    more = "The gain is unknown, so Q was calculated after one common factor was removed."
+    return quality(delta, f, bands), (note, more)

@@ -19,6 +19,7 @@ from ..ema.finding import Finding, Screening
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
+from ..geometry.refine import refined as halved
 from ..inference.calibration_result import CalibrationStudy
 from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.implausible_values import implausible_values, in_doubt, strained
@@ -55,6 +56,7 @@ from ..search.result_parts import (
     calibrated,
     foretells_worse,
     laid_on_sheets,
+    last_step_in_words,
     named_effects,
     otherwise,
     remainder,
@@ -159,6 +161,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     stages, lost = _updated(case, question, prepared, found, mended)
     progress("scores", 0.95)
     result = _result(question, prepared, found, stages)
+    if found.halved and (worse := last_step_in_words(result.agreement, bool(result.effects))):
+        stages, result = _on_preferred_mesh(case, question, prepared, found, stages, result, worse)
     result = over_levels(question, prepared, stages, result, diagnosing)
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
@@ -238,6 +242,36 @@ def _updated(
     test = measured_modes(prepared)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared), test=test)
     return replace(made, curves=_curves(case, made, test)), lost
+
+
+def _on_preferred_mesh(
+    case: Case, question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
+    result: DiagnosisResult, worse: str,
+) -> tuple[UpdatedModels, DiagnosisResult]:  # fmt: skip
+    """Return decks with every shell halved, if the data prefer that mesh and they foretell better.
+
+    ``worse`` says what is wrong with the decks on the given mesh.
+    """
+    plain, *named = found.halved
+    found = replace(found, plain=plain, written=named[0] if named else None)
+    made = models(question, found)
+
+    def deck(assembly: Assembly) -> ChangedDeck:
+        finer = halved(assembly)
+        return ChangedDeck(modelled(question.tested(finer), stages.nominal.band), None, finer)
+
+    calibrated = deck(made.calibrated)
+    final = calibrated if made.final is made.calibrated else deck(made.final)
+    better = replace(stages, calibrated=calibrated, final=final)
+    better = replace(better, curves=_curves(case, better, better.test))
+    again = _result(question, prepared, found, better)
+    if last_step_in_words(again.agreement, bool(again.effects)):
+        return stages, result
+    note = (
+        f"the mesh of the deck is too coarse to show the change: on it {worse}; the decks that "
+        "are written have every shell halved"
+    )
+    return better, replace(again, notes=(*again.notes, note))
 
 
 def as_it_is(question: Question, searched: Modelled) -> Modelled:

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..arrays import OneScreen
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
 from ..ema.level_table import LevelTable
@@ -30,6 +31,7 @@ from ..inference.result import (
     Remainder,
 )
 from ..io.nastran.edit.changes import Change
+from ..model.assembly import Assembly
 from ..results import Result
 from ..search.measured_modes import MeasuredModes
 from ..search.next_measurement import Outlook
@@ -41,15 +43,22 @@ Compared = Literal["responses", "frequencies"]
 class ChangedDeck:
     """A deck with changes, and the structure that it then describes.
 
-    ``changes`` are edits of its cards; None if no card can hold them.
+    ``changes`` are edits of its cards; None if no card can hold them.  ``whole`` is an assembly
+    that is written anew, on another mesh.
     """
 
     model: Modelled
     changes: tuple[Change, ...] | None
+    whole: Assembly | None = None
+
+    @property
+    def writable(self) -> bool:
+        """True if a file can hold it."""
+        return self.changes is not None or self.whole is not None
 
 
-@dataclass(frozen=True, eq=False)
-class UpdatedModels:
+@dataclass(frozen=True, eq=False, repr=False)
+class UpdatedModels(OneScreen):
     """The three structures of a diagnosis, with their responses and the recording's."""
 
     nominal: Modelled  # the deck as it was given

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import OneScreen
 from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import ArgumentError, FileError
@@ -32,8 +33,8 @@ LEAST_MODES = 7  # separate six rigid motions of a free structure from the first
 SOURCES = "the path of a deck or case, what chladni.load or load_case returned, or an Assembly"
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(OneScreen):
     """An assembly with its matrices, built at first use."""
 
     source: Path

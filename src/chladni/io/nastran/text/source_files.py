@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from pathlib import Path
 
+from ....arrays import OneScreen
 from ....errors import FileError
 from ...file_size import refuse_large, refuse_outside
 
@@ -30,8 +31,8 @@ class Include:
     file: int  # position in DeckFiles.sources; -1: absent, as alters above CEND may be
 
 
-@dataclass(frozen=True, eq=False)
-class Source:
+@dataclass(frozen=True, eq=False, repr=False)
+class Source(OneScreen):
     """One file of a deck; ``bulk`` are its bulk-data lines [first, past) (0-based)."""
 
     path: Path
