@@ -65,9 +65,9 @@ def damping_instead_of_spin(
     a dashpot exceed B with a probability of 1/B at most (Markov).
     """
     fit, data, model = hypothesis.fit, hypothesis.data, hypothesis.model
-    spinning = [e for e in hypothesis.effects if of(SpinTerm, e.terms(fit.of(e)))]
-    if not spinning or not isinstance(data, Responses):
+    if fit.state.spin is None or not isinstance(data, Responses):
         return test
+    spinning = [e for e in fit.effects if of(SpinTerm, e.terms(fit.of(e)))]
     rest = [e for e in fit.effects if e not in spinning]
     x, where = np.concatenate([fit.of(e) for e in rest]), problem.where
     about = baseline(model, rest, data, problem.mass_measurement, x)
