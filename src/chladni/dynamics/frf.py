@@ -15,6 +15,13 @@ from .modes import ModalModel
 from .system import System
 
 Quantity = Literal["receptance", "mobility", "accelerance", "transmissibility"]
+Recorded = Literal[  # quantities that a recording may hold; the last three are force over motion
+    "receptance", "mobility", "accelerance", "transmissibility", "dynamic-stiffness", "impedance",
+    "apparent-mass",
+]  # fmt: skip
+MOTION_OVER_FORCE: dict[str, Quantity] = {
+    "dynamic-stiffness": "receptance", "impedance": "mobility", "apparent-mass": "accelerance",
+}  # fmt: skip
 UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N", "transmissibility": "-"}
 _ORDER = {q: k for k, q in enumerate(get_args(Quantity)[:3])}  # displacement, velocity, ...
 

@@ -36,7 +36,7 @@ from ..results import Result
 from ..search.measured_modes import MeasuredModes
 from ..search.next_measurement import Outlook
 
-Compared = Literal["responses", "frequencies"]
+Compared = Literal["responses", "frequencies", "modes"]
 
 
 @dataclass(frozen=True, eq=False)
