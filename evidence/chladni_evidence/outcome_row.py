@@ -24,6 +24,7 @@ ALSO = {  # names that are right as well
     "local-resonator": ("rattle",),
     "friction-joint": ("joint-friction", "viscoelastic-joint"),
     "foam": ("viscoelastic-joint", "compliant-support"),
+    "rotor": ("rotating-part",),
     "stiffener": ("doubler", "stiffness-patch", "thickness-distribution"),
     "doubler": ("thickness-distribution",),
 }

@@ -27,6 +27,7 @@ class BenchArticle:
     hangers : (k, 3, r)         where cords hold it: along the cord, two ways across
     sites : (s, r)              opening of every site with a local force
     laws : what acts at these sites
+    gyroscopic : (r, r)         φᵀGφ of spinning parts, skew [1/s]
     masses : (n_out,)           of each sensor [kg]; 0: as its type weighs
     channels : (n_out,)         of the sensor that each is a channel of, which weighs once
     gains : (n_out,)            factor on every channel that nobody knows of (miswired, mistyped)
@@ -48,6 +49,7 @@ class BenchArticle:
     input_label: str
     sites: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     laws: tuple[LocalForce, ...] = ()
+    gyroscopic: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     masses: np.ndarray = field(default_factory=lambda: np.zeros(0))
     channels: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gains: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -59,13 +61,15 @@ class BenchArticle:
         r, n = len(self.frequency), len(self.output_labels)
         if not self.laws:
             object.__setattr__(self, "sites", np.zeros((0, r)))
+        if not len(self.gyroscopic):
+            object.__setattr__(self, "gyroscopic", np.zeros((r, r)))
         one, none = np.ones(n), np.zeros(n)
         for name, usual in (("gains", one), ("channels", one), ("masses", none)):
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, usual)
         due = {"damping": (r,), "outputs": (n, r), "mounts": (n, 3, r), "drive": (6, r),
                "hangers": (len(self.hangers), 3, r), "sites": (len(self.laws), r),
-               "gains": (n,), "channels": (n,), "masses": (n,)}  # fmt: skip
+               "gyroscopic": (r, r), "gains": (n,), "channels": (n,), "masses": (n,)}  # fmt: skip
         if self.on_table:
             due |= {"base": (r,), "with_base": (n,), "mounts_with_base": (n, 3)}
         for name, shape in due.items():
@@ -88,4 +92,5 @@ class BenchArticle:
         parts = ("outputs", "mounts", "drive", "hangers", "sites")
         seen = {part: getattr(self, part) @ Q for part in parts}
         seen["base"] = self.base @ Q if self.on_table else self.base
+        seen["gyroscopic"] = Q.T @ self.gyroscopic @ Q
         return replace(self, name=name, frequency=frequency, damping=damping, **seen)

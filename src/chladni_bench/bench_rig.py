@@ -171,6 +171,7 @@ def _bare(article: BenchArticle, n: int) -> _Matrices:
     M, C, K = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
     at = np.arange(r)
     M[at, at], C[at, at], K[at, at] = 1.0, 2 * zeta * w, w**2
+    C[:r, :r] += article.gyroscopic
     return _Matrices(M, C, K)
 
 

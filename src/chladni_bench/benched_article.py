@@ -75,7 +75,8 @@ def benched(
     """Return the test article as modes at all places of the test, with random damping.
 
     If the base moves, the article stands on a shaker table: its modes have fixed supports, and no
-    cords are attached. Dashpots and material losses add their dissipation to each mode.
+    cords are attached. Dashpots and material losses add their dissipation to each mode, spinning
+    parts couple the modes.
     """
     built = structure(assembly)
     modes = _modes(built, ABOVE * f_max)
@@ -95,13 +96,13 @@ def benched(
     f, zeta = whole.frequency.copy(), np.full(r, REST)
     f[: len(modes)][rigid_modes(modes)] = 0.0
     zeta[: len(modes)] = drawn_damping(scatter, len(modes), rng)
-    zeta = zeta + dissipated(built, phi, f)
+    zeta, V = zeta + dissipated(built, phi, f), built.system.V
     return BenchArticle(
         name="A", weight=mass_properties(assembly)[0], frequency=f, damping=zeta,
         outputs=felt @ phi, mounts=(moved @ phi).reshape(n, 3, r), drive=drive @ phi,
         hangers=(hung @ phi).reshape(-1, 3, r), output_labels=outputs.labels,
         input_label=inputs.labels[0], masses=outputs.mass, channels=outputs.channels,
-        base=(base @ phi).ravel(),
+        base=(base @ phi).ravel(), gyroscopic=phi.T @ ((V - V.T) / 2 @ phi),
         with_base=places.directions @ inputs.directions[0],
         mounts_with_base=np.tile(inputs.directions[0], (n, 1)),
     )  # fmt: skip

@@ -76,7 +76,7 @@ def by_poles(
 
     Parameters
     ----------
-    matrices : M, C, K        (n, n) symmetric, M and K positive definite
+    matrices : M, C, K        (n, n), M and K symmetric and positive definite
     load : (n, n_in)          F
     seen : P_d, P_v, P_a      (n_out, n) each
     through : (n_out, n_in)   D_0

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from chladni.effects.effect import ChannelChange, Effect, MatrixTerm, of
 from chladni.errors import AccuracyError, ModelError, named
+from chladni.reduced.gyroscopic import whirling
 from chladni.reduced.reduced_model import Reduced, State, evaluate
 
 EXACT = 1e-5  # of a slope: largest deviation from the difference of fourth order
@@ -46,7 +47,7 @@ class ActingEffect:
 
     def lam(self, x: np.ndarray) -> np.ndarray:
         """Eigenvalues ω² of the flexible modes with the effect at x [rad²/s²]."""
-        return self.state(x).lam[self.flexible]
+        return eigenvalues(self.state(x))[self.flexible]
 
     @property
     def without(self) -> State:
@@ -54,13 +55,35 @@ class ActingEffect:
         return evaluate(self.model, [], np.zeros(0), False)
 
 
+def eigenvalues(state: State) -> np.ndarray:
+    """ω² (m,) [rad²/s²], with spinning parts those of the whirling structure."""
+    if state.spin is None:
+        return state.lam
+    rows = state.spin.rows
+    return whirling(state.lam, rows.T @ state.spin.matrix @ rows)[0] ** 2
+
+
+def slopes_of_eigenvalues(state: State) -> np.ndarray:
+    """∂(ω²)/∂x (n_p, m); of whirling modes ψ 2ω² ψ*(i dG)ψ / ψ*(2ω - iG)ψ by spinning parts."""
+    assert state.dK is not None
+    assert state.dM is not None
+    if state.spin is None:
+        return np.asarray(state.dK.along(state.vectors) - state.lam * state.dM.along(state.vectors))
+    rows, out = state.spin.rows, np.zeros((state.dK.count, len(state.lam)))
+    omega, psi = whirling(state.lam, rows.T @ state.spin.matrix @ rows)
+    seen = rows @ psi
+    turned = (seen.conj() * (state.spin.matrix @ seen)).sum(axis=0)
+    size = 2 * omega * (np.abs(psi) ** 2).sum(axis=0) + turned.imag
+    for p, (L, R) in state.spin.slopes.items():
+        own = ((L @ psi).conj() * (R @ psi)).sum(axis=0)
+        out[p] = -2 * omega**2 * own.imag / np.where(size, size, 1.0)
+    return out
+
+
 def exact_slopes(acting: ActingEffect) -> str:
     """∂λ/∂x, ∂m/∂x and ∂log10 H/∂x equal differences of fourth order."""
     x, state = acting.x, acting.state(acting.x, gradient=True)
-    assert state.dK is not None
-    assert state.dM is not None
-    phi = state.vectors
-    slopes = (state.dK.along(phi) - state.lam * state.dM.along(phi))[:, acting.flexible]
+    slopes = slopes_of_eigenvalues(state)[:, acting.flexible]
     rounding = 30 * np.finfo(float).eps * float(state.lam.max())
     worst, heavier = 0.0, _weight_slopes(acting)
     for k, parameter in enumerate(acting.effect.parameters):
@@ -132,7 +155,7 @@ def idle_at_nominal(acting: ActingEffect) -> str:
     idle, without = acting.state(acting.idle), acting.without
     at = acting.flexible
     n_own = len(idle.lam) - len(without.lam)
-    moved = float(np.abs(idle.lam[at] / without.lam[at] - 1).max())
+    moved = float(np.abs(eigenvalues(idle)[at] / without.lam[at] - 1).max())
     if moved > IDLE[0]:
         raise BrokenRule(
             f"at the nominal values {_values(acting.effect, acting.idle)} the effect moves ω² by "
@@ -156,7 +179,7 @@ def idle_at_nominal(acting: ActingEffect) -> str:
 def acts(acting: ActingEffect, least: float = ACTS) -> str:
     """Where the effect acts it moves λ or the channels, and not both."""
     at, state, without = acting.flexible, acting.state(acting.x), acting.without
-    moved = float(np.abs(state.lam[at] / without.lam[at] - 1).max())
+    moved = float(np.abs(eigenvalues(state)[at] / without.lam[at] - 1).max())
     offset = 0.0 if state.offset is None else float(np.abs(state.offset).max())
     by_modes, by_channels = moved > least, offset > ACTS_ON_CHANNELS
     if by_modes and by_channels:

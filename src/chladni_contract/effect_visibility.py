@@ -3,9 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
+from chladni.dynamics.coupled import coupled_receptance
 from chladni.dynamics.eigen import normal_modes
-from chladni.dynamics.frf import transfer
 from chladni.dynamics.residual import with_residual_vectors
 from chladni.effects.family import Article, Family
 from chladni.fem.assemble import structure
@@ -62,6 +63,7 @@ def _responses(ground: EffectGround, article: Article) -> np.ndarray:
     modes = with_residual_vectors(built.system, modes, driven.T.toarray())
     lost = dissipated(built, modes.shapes, modes.frequency)
     modes = replace(modes, damping=fitted().damping + lost)
-    s = 2j * np.pi * np.linspace(LOWEST * top, top, LINES)
-    H = transfer(modes, felt @ modes.shapes, driven @ modes.shapes, s) * s[:, None, None] ** 2
-    return np.asarray(H * article.gains[:, None])
+    f, V = np.linspace(LOWEST * top, top, LINES), built.system.V
+    spun = sp.csr_array((V - V.T) / 2)  # of spinning parts; dashpots are in the damping of modes
+    H = coupled_receptance(modes, felt @ modes.shapes, driven @ modes.shapes, f, V=spun)
+    return np.asarray(H * (2j * np.pi * f[:, None, None]) ** 2 * article.gains[:, None])

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.effect import Effect, FieldChange, MatrixTerm, Parameter, of
+from chladni.effects.effect import Effect, FieldChange, MatrixTerm, Parameter, SpinTerm, of
 from chladni.effects.family import Article, Family
 from chladni.effects.search_context import Candidate, SearchContext
 from chladni.errors import ChladniError, named
@@ -22,6 +22,7 @@ from chladni.fem.energy import mass_properties
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
 from chladni.model.assembly import Assembly
+from chladni.reduced.gyroscopic import whirling
 from chladni.units import UNITS
 
 from .effect_ground import EffectGround
@@ -99,7 +100,7 @@ def _check_fit(family: Family, candidates: Sequence[Candidate], context: SearchC
 
 
 def proposes_candidates(case: TriedFamily) -> str:
-    """Candidates exist with FRFs; with frequencies alone they exist for all but faults of a test.
+    """Candidates exist with FRFs; with frequencies alone only those of mass and stiffness do.
 
     ``placed`` needs no second look: :func:`chladni.effects.best_starts` serves both searches.
     """
@@ -107,11 +108,12 @@ def proposes_candidates(case: TriedFamily) -> str:
     if family.candidates is None:
         return f"{found} with FRFs"
     alone = family.proposed(case.ground.by_poles)
-    if bool(alone) == (family.effect.kind == "test"):
+    shy = any(of(SpinTerm, acting.effect.terms(acting.x)) for acting in case.acting)
+    if bool(alone) == (shy or family.effect.kind == "test"):
         raise BrokenRule(
             f"candidates(context) gives {len(alone)} where only natural frequencies are known "
-            "(context.scan is None); an effect of the structure needs candidates there, a fault of "
-            "the test has none"
+            "(context.scan is None); give some for an effect of mass or stiffness, and none for "
+            "a fault of the test or a spinning part"
         )
     _check_fit(family, alone, case.ground.by_poles)
     return f"{found} with FRFs, {len(alone)} with frequencies alone"
@@ -326,7 +328,12 @@ def frequencies(made: Assembly, at: slice) -> np.ndarray:
 
 @lru_cache(maxsize=4)  # rules ask for those of the deck and of the article again and again
 def _lowest(made: Assembly, count: int) -> np.ndarray:
-    return normal_modes(structure(made).system, count).frequency
+    system = structure(made).system
+    modes = normal_modes(system, count)
+    if not len(made.rotors):
+        return modes.frequency
+    G = modes.shapes.T @ ((system.V - system.V.T) / 2 @ modes.shapes)
+    return whirling((2 * np.pi * modes.frequency) ** 2, G)[0] / (2 * np.pi)
 
 
 def touched_cards(before: Path, after: Path) -> set[str]:

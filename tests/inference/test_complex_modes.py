@@ -5,7 +5,7 @@ import pytest
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import identify
-from chladni.inference.complex_modes import mode_coupling
+from chladni.inference.complex_modes import ModeCoupling, mode_coupling
 
 MODES, OUTPUTS = 9, 14
 OMEGA = 2 * np.pi * np.array([20, 27, 36, 44, 57, 68, 81, 97, 112.0])
@@ -66,6 +66,21 @@ def test_a_rotor_is_recognised_by_its_complex_modes(seed):
     assert "damping" in what
     assert len(modes)
     assert row.name == "complex modes"
+
+
+@pytest.mark.parametrize(
+    ("alike", "word"), [(9, "rotating part"), (2, "damping in one place"), (5, "or for a rotating")]
+)
+def test_the_step_names_what_may_couple_modes_with_their_frequencies(alike, word):
+    f = np.array([20.0, 35.0, 50.0])
+    step = ModeCoupling(f, np.array([0.2, 0.0, 0.4]), np.full(3, 0.05), alike, 10).step
+    assert word in step
+    assert "20, 50 Hz" in step
+    assert ("damping in one place" in step) == (alike < 9)
+
+
+def test_real_modes_need_no_step():
+    assert ModeCoupling(np.array([20.0]), np.zeros(1), np.ones(1), 0, 0).step == ""
 
 
 def test_modes_that_are_real_are_silent():

@@ -52,6 +52,7 @@ class Explanation:
     neg2_log_evidence : float
     costly : its further numbers; None where none is read
     physics, channels : whether it changes the model; whether it concerns some channels only
+    in_deck : whether cards can hold one of its effects
     expected : whether the materials of the deck usually have it
     becomes, nearly : simpler effect to which it reduces at the fitted values, within its intervals
     sound : whether its fitted values are physically possible
@@ -64,6 +65,7 @@ class Explanation:
     costly: Numbers | None = None
     physics: bool = True
     channels: bool = False
+    in_deck: bool = True
     expected: bool = False
     becomes: str = ""
     nearly: str = ""
@@ -99,9 +101,11 @@ class Explanation:
     def worse(self) -> bool:
         """True if the deck with an effect has a larger Q than the calibrated deck.
 
-        Physics must not worsen the fitted data either. A fault of a few channels is compared on
-        the held-out data of these channels.
+        Physics must not worsen the fitted data either, and physics that no card holds has no deck
+        to compare. A fault of a few channels is compared on the held-out data of these channels.
         """
+        if self.physics and not self.in_deck:
+            return False
         left = self.numbers.left
         compared = (left.fitted, left.held_out) if self.physics else (left.held_out,)
         return any(with_it > calibrated for calibrated, with_it in compared)

@@ -14,8 +14,8 @@ from ..results import ShownBriefly
 class System(ShownBriefly):
     """Mass, viscous damping and stiffness over labelled degrees of freedom."""
 
-    # M, V, K: (n, n) mass [kg], damping [N s/m], stiffness [N/m]; symmetric. K may be
-    # complex where the structure has hysteretic damping.
+    # M, V, K: (n, n) mass [kg], damping [N s/m], stiffness [N/m]; symmetric, but for the
+    # skew part of V of rotors. K may be complex where the structure has hysteretic damping.
     M: sp.csr_array
     V: sp.csr_array
     K: sp.csr_array

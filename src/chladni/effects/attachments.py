@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from ..geometry.facets import cell_normals, tangents
 from ..model.assembly import Assembly
-from .effect import WIDER, Effect, Parameter, PointTerm, Traits, Weight
+from .effect import WIDER, Effect, Parameter, PointTerm, Term, Traits, Weight
 from .effect_context import EffectContext, ElementGrids, surface
 from .estimate import Estimate, Location, in_mm
 from .search_context import Candidate, SearchContext, best_places, valleys
@@ -65,8 +65,13 @@ class Patch:
     size: float  # typical distance of neighbours [m]
 
     @classmethod
-    def about(cls, where: EffectContext, k: int, directions: np.ndarray) -> Self:
-        """The neighbours of the k-th grid in the same face of a sheet, or on its line of beams."""
+    def about(
+        cls, where: EffectContext, k: int, directions: np.ndarray, turning: bool = False
+    ) -> Self:
+        """The neighbours of the k-th grid in the same face of a sheet, or on its line of beams.
+
+        Its rows are translations along the directions; ``turning``, rotations about them.
+        """
         spots = where.grids
         d = spots.point - spots.point[k]
         if spots.line[k] < 0:
@@ -82,7 +87,7 @@ class Patch:
         near = near[np.isfinite(distance[near])]
         size = float(distance[near][1 : 5 if spots.line[k] < 0 else 3].mean())
         rows = tuple(
-            where.groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
+            where.groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)), turning)
             for axis in directions
         )
         return cls(spots.grids[near], d[near] @ plane.T, plane, spots.point[k], rows, size)
@@ -145,6 +150,7 @@ class MovableAttachment(Effect):
     """x = (ln strength, place along both axes of the patch in units of its size, others)."""
 
     matrix: ClassVar[Literal["K", "M"]] = "K"
+    turning: ClassVar[bool] = False  # it acts on rotations
 
     patch: Patch = field(kw_only=True)
     direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -162,7 +168,8 @@ class MovableAttachment(Effect):
         grid, (x, y, z) = int(where.grids.grids[k]), where.grids.point[k].tolist()
         return cls(
             (unknown, *place, *others), f"at grid {grid}", grids=(grid,), point=(x, y, z),
-            trials_factor=len(where.places), patch=Patch.about(where, k, directions), **more,
+            trials_factor=len(where.places),
+            patch=Patch.about(where, k, directions, cls.turning), **more,
         )  # fmt: skip
 
     def placed(self, x: np.ndarray) -> tuple[sp.csr_array, dict[int, sp.csr_array]]:
@@ -170,7 +177,7 @@ class MovableAttachment(Effect):
         at, size = self.patch.size * x[1:3], self.patch.size
         return self.patch.at(at), {1 + k: self.patch.slope(at, k) * size for k in range(2)}
 
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+    def terms(self, x: np.ndarray) -> tuple[Term, ...]:
         """One strength in every direction, at the place."""
         rows, moving = self.placed(x)
         c = np.full(rows.shape[0], self.parameters[0].value(x[0]))

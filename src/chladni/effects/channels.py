@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .effect import ChannelChange, Effect, Parameter
+from .effect import ChannelChange, Effect, Parameter, Traits
 from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
@@ -46,6 +46,7 @@ class SensorFault(ChannelGain):
     name = "sensor-fault"
     claim = "a channel's gain or sign is wrong"
     kind = "test"
+    traits = Traits(writable=False)
 
     @property
     def channel(self) -> int:

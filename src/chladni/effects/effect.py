@@ -1,6 +1,6 @@
 """Effects: possible differences between model and test article, and their terms in the model.
 
-An effect acts on the reduced model in six ways only (:data:`Term`):
+An effect acts on the reduced model in seven ways only (:data:`Term`):
 
 - It multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
   stiffness) on groups of shells. It multiplies calibrated operators and never subtracts nominal
@@ -11,6 +11,7 @@ An effect acts on the reduced model in six ways only (:data:`Term`):
 - It adds *operators* c(p) A, c > -1, where A is the contribution of a part to K or M. Where A is a
   share of other operators or of sheets (:class:`Within`), their factors multiply it.
 - It changes the *modes* of the stiffness, K to GᵀKG (the mesh, the footprints of joints).
+- It *spins* at a grid: a skew term in the damping matrix, which couples modes.
 - It changes *channels* of the test: gain, sign.
 - It changes *shapes* at the measured places only (the mesh around a sensor).
 
@@ -179,8 +180,25 @@ class ShapeChange:
     gradient: np.ndarray  #: dc/dx (n_parameters,)
 
 
-Term = FieldChange | PointTerm | MatrixTerm | ModalFactor | ChannelChange | ShapeChange
-Kind = TypeVar("Kind", FieldChange, PointTerm, MatrixTerm, ModalFactor, ChannelChange, ShapeChange)
+@dataclass(frozen=True, eq=False)
+class SpinTerm:
+    """-Rᵀ [h]× R, skew, added to the damping matrix: the moments of a spinning part on its grid.
+
+    Its angular momentum h turns with the structure at the rate θ', which takes the moment θ' x h.
+    Source: Meirovitch 1980, Computational Methods in Structural Dynamics, 2.10.
+    """
+
+    rows: sp.csr_array  #: R (3, n), rotations about the axes of the basic frame
+    momentum: np.ndarray  #: h (3,) [kg m²/s]
+    gradient: np.ndarray  #: dh/dx (3, n_parameters)
+    grid: int  #: id of the nearest, which carries it in a structure with other dofs
+    moving: dict[int, sp.csr_array] = field(default_factory=dict)  #: ∂R/∂x that move the place
+
+
+Term = FieldChange | PointTerm | MatrixTerm | ModalFactor | ChannelChange | ShapeChange | SpinTerm
+Kind = TypeVar(
+    "Kind", FieldChange, PointTerm, MatrixTerm, ModalFactor, ChannelChange, ShapeChange, SpinTerm
+)
 
 
 class Weight(NamedTuple):

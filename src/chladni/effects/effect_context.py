@@ -146,6 +146,12 @@ class EffectContext:
         ids = np.repeat(np.asarray(grids), 3)
         return self.groups.structure.along(ids, np.tile(np.eye(3), (len(grids), 1)))
 
+    def rotations(self, grids: Sequence[int] | np.ndarray) -> sp.csr_array:
+        """Rows of all three rotations of each grid (3k, n), zero at a grid of solids alone."""
+        ids = np.repeat(np.asarray(grids), 3)
+        axes = np.tile(np.eye(3), (len(grids), 1))
+        return self.groups.structure.along(ids, axes, turning=True)
+
     def at_shares(self, shares: Sequence[Share]) -> sp.csr_array:
         """Rows (3k, n) of all three translations of places given as weighted grids."""
         each = (sum(w * self.translations([grid]) for grid, w in share) for share in shares)

@@ -22,6 +22,7 @@ from . import (
     membrane_prestress,
     open_joints,
     orthotropy,
+    rotating_part,
     sheets,
     springs,
     stiffener,
@@ -55,6 +56,7 @@ BUILT_IN = (
     open_joints.FAMILY,
     springs.SHAKER,
     adhesive.FAMILY,
+    rotating_part.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -77,6 +77,14 @@ class ResponseScan(Protocol):
         ``mass`` is a typical value, ``hertz`` are the natural frequencies of the resonator alone.
         """
 
+    def spin_scores(
+        self, about: int, places: ElementGrids, sd: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best angular momentum of a spinning part at each place, and the score: (k, 3), (k,).
+
+        The responses are linear in it; ``sd`` is that of its prior along each axis [kg m²/s].
+        """
+
     def field_scores(
         self, about: int, field: str, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -170,7 +170,7 @@ def _each_family(assembly: Assembly, residual_bending: bool) -> Iterator[Matrice
         nodes, K_e, M_e = beam.stiffness_and_mass(assembly)
         loss = _lossy(beam.loss_factors(assembly), K_e, nodes, n)
         yield blocks(M_e, nodes, n), None, blocks(K_e, nodes, n), loss
-    lumps = ("springs", "dampers", "scalar_masses", "bushes", "masses")
+    lumps = ("springs", "dampers", "scalar_masses", "bushes", "masses", "rotors")
     if any(len(getattr(assembly, name)) for name in lumps):
         from . import spring
 

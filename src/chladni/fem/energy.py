@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.facets import cell_areas
-from ..model.assembly import Assembly, Beams, Bushes, Masses, Scalars, Shells, picked
+from ..model.assembly import Assembly, Beams, Bushes, Masses, Rotors, Scalars, Shells, picked
 from . import shell
 from .assemble import PIECE, Structure, over_all_motions
 from .shell_section import section_arrays
@@ -97,7 +97,7 @@ def bare(assembly: Assembly) -> Assembly:
     none = Scalars()
     return replace(
         assembly, shells=Shells(), beams=Beams(), solids=(), springs=none, dampers=none,
-        scalar_masses=none, bushes=Bushes(), masses=Masses(), rigid=(),
+        scalar_masses=none, bushes=Bushes(), masses=Masses(), rotors=Rotors(), rigid=(),
     )  # fmt: skip
 
 

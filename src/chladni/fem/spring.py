@@ -1,4 +1,4 @@
-"""Springs, dampers, bushes and concentrated masses, assembled directly as sparse matrices (SI).
+"""Springs, dampers, bushes, concentrated masses and rotors as sparse matrices (SI).
 
 Scalar components refer to the displacement frames of their points, bushes to their own frames. The
 matrices are in the basic frame, six dofs a point in the order of ``points``.
@@ -21,7 +21,7 @@ def matrices(
     E = _relative(assembly, bushes)
     K = _scalar(assembly, springs, springs.value) + _bush(assembly, E, bushes.stiffness)
     V = _scalar(assembly, assembly.dampers, assembly.dampers.value)
-    V = V + _bush(assembly, E, bushes.viscous)
+    V = V + _bush(assembly, E, bushes.viscous) + _gyroscopic(assembly)
     lossy = _scalar(assembly, springs, springs.value * springs.damping)
     lossy = lossy + _bush(assembly, E, bushes.stiffness * bushes.loss)
     masses = assembly.scalar_masses
@@ -68,6 +68,13 @@ def _bush(assembly: Assembly, E: np.ndarray, value: np.ndarray) -> sp.csr_array:
     """Σ Eᵀ diag(value) E (6n, 6n)."""
     blocks = E.transpose(0, 2, 1) @ (value[:, :, None] * E)
     return scattered(blocks, assembly.bushes.nodes, len(assembly.ids))
+
+
+def _gyroscopic(assembly: Assembly) -> sp.csr_array:
+    """The moments h x θ' by which rotors act on their grids, skew (6n, 6n)."""
+    blocks = np.zeros((len(assembly.rotors), 6, 6))
+    blocks[:, 3:, 3:] = -cross(assembly.rotors.momentum)
+    return scattered(blocks, assembly.rotors.node[:, None], len(assembly.ids))
 
 
 def _points(assembly: Assembly) -> sp.csr_array:

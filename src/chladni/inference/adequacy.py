@@ -51,6 +51,7 @@ class FitTest:
     statistics: tuple[FitStatistic, ...] = ()
     modes_hz: tuple[float, ...] = ()  # natural frequencies nearest to what stands out
     better: bool = False  # the least likely statistic is smaller than those of right models
+    step: str = ""  # what to do about it, where it fails and modes are complex
 
     @property
     def against(self) -> float:
@@ -157,7 +158,10 @@ def adequacy(
     test = FitTest(better or p >= LEAST_P, p, what, where, rows, near, better)
     if damping is not None:
         test = _evenly_damped(test, damping.above(_first(data, fit.state)))
-    return test if coupling is None else _coupled_by_damping(test, coupling)
+    if coupling is None:
+        return test
+    test = _coupled_by_damping(test, coupling)
+    return test if test.passes else replace(test, step=coupling.step)
 
 
 def _first(data: Responses, state: State) -> float:

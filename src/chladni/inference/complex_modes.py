@@ -19,6 +19,7 @@ from scipy.special import bdtr, bdtrc
 from ..ema.identification import Identified
 from ..ema.propagation import standard_deviations
 from ..ema.shapes import driven_shapes
+from ..errors import named
 from .result import FitStatistic
 
 FEWEST = 5  # modes or outputs below which the test is not made
@@ -27,6 +28,8 @@ FLOOR = 1e-3  # of a unit shape: smallest standard deviation of a channel
 SURE = 3.0  # standard deviations
 APART = 3.0  # half-bandwidths between modes that are distinguished
 MARGIN = 1.5  # times the bound: unit shapes are not quite mass-normalised ones
+UNLIKELY = 0.05  # p below which pairs of equal signs speak of spin alone
+MOST_NAMED = 4  # modes in a sentence
 EXCUSED = 0.05  # of the modes may exceed it, where the first order fails
 
 
@@ -49,6 +52,29 @@ class ModeCoupling:
     alike: int
     coupled: int
 
+    @property
+    def skew(self) -> float:
+        """P-value of as many pairs with equal signs, which are as likely as opposite ones."""
+        return float(bdtrc(self.alike - 1, self.coupled, 0.5)) if self.coupled else 1.0
+
+    @property
+    def step(self) -> str:
+        """The next measurement, if a spinning part or damping couples modes; else ""."""
+        order = np.argsort(-self.complexity)[:MOST_NAMED]
+        near = np.sort(self.frequency[order[self.complexity[order] > FLOOR]])
+        if not len(near) or not self.coupled:
+            return ""
+        modes = f"modes near {named(f'{f:.4g}' for f in near)} Hz are coupled"
+        if self.skew < UNLIKELY:
+            return (
+                f"Stop every rotating part and measure again, as a state of its own: {modes} as "
+                "by spin, not as by damping."
+            )
+        return (
+            "Look for damping in one place (a damper, foam, a loose joint) or for a rotating part, "
+            f"and measure again without it: {modes} through their velocities."
+        )
+
     def tested(self) -> tuple[float, FitStatistic, str, tuple[float, ...]]:
         """P-value if only damping couples modes, its statistic, a description, the modes [Hz].
 
@@ -60,7 +86,7 @@ class ModeCoupling:
         ratio = self.complexity / self.bound
         over = np.flatnonzero(ratio > MARGIN)
         most = float(bdtrc(len(over) - 1, n, EXCUSED))
-        skew = float(bdtrc(self.alike - 1, self.coupled, 0.5)) if self.coupled else 1.0
+        skew = self.skew
         allowed = float(np.searchsorted(bdtr(np.arange(n + 1), n, EXCUSED), 0.995))
         row = FitStatistic("complex modes", float(len(over)), n * EXCUSED, 0.0, allowed)
         if most <= skew:

@@ -17,7 +17,6 @@ from typing import Protocol, Self
 import numpy as np
 import scipy.linalg as sl
 
-from ..dynamics.modal_sum import modal_sum
 from ..reduced.reduced_model import Reduced, State
 
 MEDIAN = 0.01  # of δ before it is learned
@@ -219,7 +218,8 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
     phi_o, phi_i, d = data.modal(state)
     H, sd = data.model(state), data.std()
     T = about.rows @ state.vectors
-    a_o, a_i = (modal_sum(T, d, phi).transpose(1, 0, 2) for phi in (phi_o, phi_i))
+    a_o = state.between(data.s, d, phi_o, T).transpose(2, 0, 1)
+    a_i = state.between(data.s, d, T, phi_i).transpose(1, 0, 2)
     a_o = a_o * (data.s**data.power)[:, None]
     std = np.where(i == j, 0.5, np.sqrt(0.5))  # half, for i = j counts twice below
     root = np.sqrt(about.lam[i] * about.lam[j])

@@ -10,7 +10,6 @@ from typing import ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
-from ..dynamics.modal_sum import modal_sum
 from ..ema.correlation import log10, wrapped
 from ..ema.identification import DERIVATIVES
 from ..reduced.matrix_slopes import spanned
@@ -94,7 +93,8 @@ class Responses:
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in).
 
-        If effects dissipate, the modes are complex (:mod:`.frequency_dependent_stiffness`).
+        If effects dissipate, the modes are complex (:mod:`.frequency_dependent_stiffness`), and so
+        they are with spinning parts (:mod:`.gyroscopic`).
         """
         H = self.receptance(state, *self.modal(state))
         return self.s[:, None, None] ** self.power * H + self.direct
@@ -104,8 +104,8 @@ class Responses:
         s: np.ndarray | None = None,
     ) -> np.ndarray:  # fmt: skip
         """Receptance of the modes of :meth:`modal`, made complex by dissipation; on lines s."""
-        H, s = modal_sum(phi_o, d, phi_i), self.s if s is None else s
-        lost = state.dissipated
+        s, lost = self.s if s is None else s, state.dissipated
+        H = state.between(s, d, phi_o, phi_i)
         return H if lost is None else H + lost.seen(s, d, phi_o, phi_i)
 
     def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -203,6 +203,8 @@ class Responses:
     ) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
+        With spinning parts D is A⁻¹ (:mod:`.gyroscopic`).
+
         Φ D φ_i and s² Φ D φ_i span few vectors; dK and dM multiply these alone. A moving base has
         dφ_i. Shapes that change where they are measured have dφ_o and dφ_i.
         """
@@ -213,8 +215,11 @@ class Responses:
         assert state.dK is not None
         assert state.dM is not None
         out = np.empty((*H.shape, state.dK.count), complex)
-        left = phi_o * d[:, None]  # φ_o D (n_f, n_out, r)
-        q = state.vectors @ np.stack([(phi * d).T for phi in phi_i])  # (n_in, m, n_f)
+        left, right = phi_o * d[:, None], phi_i * d[:, None]  # φ_o D, φ_i D (n_f, ., r)
+        if state.spin is not None:
+            left = state.spin.passed(s, d, phi_o)
+            right = state.spin.passed(s, d, phi_i, transposed=True)
+        q = state.vectors @ right.transpose(1, 2, 0)  # (n_in, m, n_f)
         span, parts = spanned(np.concatenate([*q, *(q * s**2)], axis=1))
         of_K, of_M = np.split(parts.reshape(len(span.T), 2, len(q), -1), 2, axis=1)
         slopes = np.concatenate([state.dK.times(span), state.dM.times(span)], axis=2)
@@ -231,11 +236,14 @@ class Responses:
         if state.dissipated is not None:
             for p, lost in state.dissipated.seen_slopes(s, d, phi_o, phi_i):
                 out[..., p] += lost
+        if state.spin is not None:
+            for p, spun in state.spin.seen_slopes(s, left, right):
+                out[..., p] += spun
         for p, moved in state.dmoved.items():
             moved_o, moved_i = self._of_test(moved)
-            out[..., p] += modal_sum(moved_o[outputs], d, phi_i)
+            out[..., p] += state.between(s, d, moved_o[outputs], phi_i)
             if state.drive is None:
-                out[..., p] += modal_sum(phi_o, d, moved_i)
+                out[..., p] += state.between(s, d, phi_o, moved_i)
         out /= H[..., None] * LN10
         if state.doffset is not None:
             out += state.doffset[outputs][:, None]

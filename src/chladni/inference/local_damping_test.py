@@ -1,4 +1,4 @@
-"""Test of whether a named elastic effect also dissipates.
+"""Tests of whether a named effect also dissipates, or is damping itself.
 
 A crack, a missing weld, a soft patch or a spring to ground changes stiffness alone.  A joint that
 slips or a viscous layer is compliant at the same place, foam or rubber is stiff there, and all of
@@ -6,16 +6,21 @@ these dissipate.  The damping ratio of a mode grows by half the loss factor time
 strain energy there.  Its eigenvalue moves by the same share (Ungar and Kerwin 1962, J. Acoust. Soc.
 Am. 34, 954-957).  So an elastic effect is not the full explanation where the modes that it changes
 most are also damped most, beyond the scatter of damping.
+
+A dashpot in one place makes modes complex by a symmetric coupling, a spinning part by a skew one.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from ..effects.effect import SpinTerm, of
 from ..reduced.reduced_model import evaluate
 from .adequacy import LEAST_P, FitTest
 from .damping_scatter import FEWEST, ModalDamping
-from .hypothesis_fit import HypothesisFit
+from .hypothesis_fit import HypothesisFit, UpdatingProblem
+from .likelihood import Responses
+from .scan import baseline, dashpot_scores, spin_scores
 
 NEAR_MODE = (
     0.05  # largest relative distance of natural frequencies between a pole and its model mode
@@ -49,6 +54,34 @@ def damping_test_along_effect(
         "level of excitation would distinguish them"
     )
     return replace(test, passes=False, p=p, what=what, where=hypothesis.effect.text)
+
+
+def damping_instead_of_spin(
+    test: FitTest, hypothesis: HypothesisFit, problem: UpdatingProblem
+) -> FitTest:
+    """The given test, or that a dashpot explains less than a spinning part, if it is less likely.
+
+    Both are linear about the fit without spin, each at its best place. If a part spins, the odds of
+    a dashpot exceed B with a probability of 1/B at most (Markov).
+    """
+    fit, data, model = hypothesis.fit, hypothesis.data, hypothesis.model
+    if fit.state.spin is None or not isinstance(data, Responses):
+        return test
+    spinning = [e for e in fit.effects if of(SpinTerm, e.terms(fit.of(e)))]
+    rest = [e for e in fit.effects if e not in spinning]
+    x, where = np.concatenate([fit.of(e) for e in rest]), problem.where
+    about = baseline(model, rest, data, problem.mass_measurement, x)
+    rows, sd = where.rotations(where.places.grids), spinning[0].parameters[0].scale
+    damped = dashpot_scores(about, model, data, where.places)
+    ahead = float(spin_scores(about, model, data, rows, sd)[1].min() - damped.min())
+    p = float(np.exp(-max(ahead, 0.0) / 2))
+    if p >= min(test.against, LEAST_P):
+        return test
+    return replace(
+        test, passes=False, p=p, step="" if problem.coupling is None else problem.coupling.step,
+        what="damping in one place explains the responses better than a part that spins",
+        where=f"near grid {where.places.grids[int(damped.argmin())]}", modes_hz=(),
+    )  # fmt: skip
 
 
 def shifted(hypothesis: HypothesisFit, above: float) -> tuple[np.ndarray, np.ndarray]:

@@ -32,7 +32,8 @@ def local_scores(
 ) -> np.ndarray | None:  # fmt: skip
     """Score of an effect at each start (n,); None for an effect or a base of another kind."""
     state, released = base.state, effect.release or reduced.model.following is not None
-    if released or state.drive is not None or state.dissipated is not None:
+    others = state.drive, state.dissipated, state.spin
+    if released or any(each is not None for each in others):
         return None
     every = [added for x in starts if (added := _added(base, reduced, effect, x)) is not None]
     if len(every) < len(starts):

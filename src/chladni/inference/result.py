@@ -290,6 +290,7 @@ class Adequacy:
     where : places that do not fit
     statistics : what was compared
     something_else : largest posterior odds of a cause outside the catalogue, by p
+    step : what to do about complex modes that it does not explain; "" where there is nothing
     """
 
     passes: bool
@@ -298,3 +299,4 @@ class Adequacy:
     where: tuple[LeftPlace, ...] = ()
     statistics: tuple[FitStatistic, ...] = ()
     something_else: float | None = None
+    step: str = ""

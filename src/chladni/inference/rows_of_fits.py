@@ -21,6 +21,7 @@ def hypothesis_of(fitted: HypothesisFit, numbers: Numbers | None = None) -> Expl
         numbers,
         physics=fitted.physics,
         channels=bool(fitted.channels),
+        in_deck=any(e.traits.writable for e in fitted.effects),
         expected=effect.expected,
         becomes=known.becomes,
         nearly=known.nearly,

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..dynamics.modal_sum import modal_sum
 from ..effects.effect import Effect, FieldChange, Parameter
@@ -148,7 +149,7 @@ def reanalysis(
     """
     phi_o, phi_i, d = data.modal(base.state)
     phi_b = model.rows(places.rows) @ base.state.phi
-    G_bi = modal_sum(phi_b, d, phi_i).transpose(1, 0, 2)
+    G_bi = base.state.between(data.s, d, phi_b, phi_i).transpose(1, 0, 2)
     if massive and model.base is not None:
         moved_with_base = model.base.motion.moved_with_base(places.rows)
         G_bi = G_bi + moved_with_base[:, None] / (data.s**2)[:, None]
@@ -156,7 +157,7 @@ def reanalysis(
         base,
         data,
         data.receptance(base.state, phi_o, phi_i, d),
-        modal_sum(phi_o, d, phi_b).transpose(2, 0, 1),
+        base.state.between(data.s, d, phi_o, phi_b).transpose(2, 0, 1),
         G_bi,
         (phi_b**2) @ d.T + residual_flexibility[:, None],
     )
@@ -206,8 +207,7 @@ def bending_slopes(
     groups, r = model.groups, model.vectors.shape[1]
     dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), -1)
     # stiffness changes no load of a base, and no shapes except those of the modes
-    lost = None if base.state.dissipated is None else base.state.dissipated.held
-    still = replace(base.state, doffset=None, ddrive=None, dmoved={}, dissipated=lost)
+    still = replace(base.state.without_slopes(), doffset=None, ddrive=None, dmoved={})
     out = [np.zeros((len(base.residual), 0))]
     for k in range(0, len(sets), AT_ONCE):
         chunk = sets[k : k + AT_ONCE]
@@ -225,6 +225,64 @@ def bending_slopes(
         rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
     return np.concatenate(out, axis=1)
+
+
+def spin_scores(
+    base: Baseline, model: Reduced, data: Responses, rows: sp.csr_array, sd: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Angular momentum of a spinning part at each place (k, 3), and the score with it (k,).
+
+    The responses are linear in it about none, its prior is N(0, sd²) along each axis:
+    dH = -s G_oβ S G_βi with S = -[h]×.
+
+    Parameters
+    ----------
+    rows : (3k, n)  rotations of each place about the axes of the basic frame
+    """
+    (phi_o, phi_i, d), state, s = data.modal(base.state), base.state, data.s
+    per_line = -sd * s ** (1 + data.power)
+    unit = data.model(state) * np.log(10) * data.std() / per_line[:, None, None]
+    r, Zr = base.residual, base.Z @ base.residual
+    amounts, gains = [np.zeros((0, 3))], [np.zeros(0)]
+    for first in range(0, rows.shape[0], 3 * AT_ONCE):
+        beta = model.rows(rows[first : first + 3 * AT_ONCE], keep=False) @ state.phi
+        k = len(beta) // 3
+        G_o = state.between(s, d, phi_o, beta).reshape(len(s), -1, k, 3).transpose(2, 3, 0, 1)
+        G_i = state.between(s, d, beta, phi_i).reshape(len(s), k, 3, -1).transpose(1, 2, 0, 3)
+        # a S b is h · (a x b), so entry c of the product is that of spin about the axis c
+        dH = np.cross(G_o[..., None], G_i[..., None, :], axis=1).reshape(-1, *unit.shape)
+        c = data.stacked(dH / unit)
+        c = np.pad(c, ((0, len(r) - len(c)), (0, 0)))  # the weighing does not change
+        each, Z = (v.reshape(-1, k, 3).swapaxes(0, 1) for v in (c, base.Z @ c))
+        A = np.eye(3) + each.swapaxes(1, 2) @ each - Z.swapaxes(1, 2) @ Z
+        b = (r @ each - Zr @ Z)[..., None]
+        step = np.linalg.solve(A, b)
+        amounts.append(-sd * step[..., 0])
+        gains.append((b * step).sum(axis=(1, 2)))
+    return np.concatenate(amounts), base.score(r[:, None])[0] - np.concatenate(gains)
+
+
+def dashpot_scores(
+    base: Baseline, model: Reduced, data: Responses, places: ElementGrids
+) -> np.ndarray:
+    """Score of a dashpot c ≥ 0 across each place (k,), linear in c.
+
+    Equalised responses show only how it couples different modes: dH = -s φ_o D C D φ_i with
+    C = c bᵀb off its diagonal.
+    """
+    (phi_o, phi_i, d), state, s = data.modal(base.state), base.state, data.s
+    unit = data.model(state) * np.log(10) * data.std() / -(s[:, None, None] ** (1 + data.power))
+    beta, out = model.rows(places.rows, keep=False) @ state.phi, [np.zeros(0)]
+    for first in range(0, len(beta), AT_ONCE):
+        b = beta[first : first + AT_ONCE]
+        G_o, G_i = state.between(s, d, phi_o, b), state.between(s, d, b, phi_i)
+        own = np.stack([modal_sum(phi_o * each**2, d**2, phi_i) for each in b])
+        dH = G_o.transpose(2, 0, 1)[..., None] * G_i.transpose(1, 0, 2)[:, :, None] - own
+        c = data.stacked(dH / unit)
+        c = np.pad(c, ((0, len(base.residual) - len(c)), (0, 0)))
+        amount, score = direction_scores(base, c)
+        out.append(np.where(amount > 0, score, np.inf))
+    return np.concatenate(out)
 
 
 def direction_scores(base: Baseline, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

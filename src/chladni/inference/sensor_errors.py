@@ -18,7 +18,6 @@ from typing import Self
 import numpy as np
 import scipy.sparse as sp
 
-from ..dynamics.modal_sum import modal_sum
 from ..ema.setup import SensorAccuracy
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
@@ -107,7 +106,7 @@ def _of_outputs(
     _, phi_i, d = data.modal(state)
     out = [errors.gain / scale]
     for modal, with_base in zip(errors.modal, errors.with_base, strict=True):
-        G = modal_sum(modal @ state.phi, d, phi_i)
+        G = state.between(data.s, d, modal @ state.phi, phi_i)
         out.append((data.s[:, None, None] ** data.power * G + with_base) / (H * scale))
     return np.stack(out)
 
@@ -122,7 +121,7 @@ def _of_inputs(
         one = np.arange(len(phi_i)) == i
         out.append(errors.gain / scale * one)
         for modal in errors.modal[:, i] if state.drive is None else ():
-            G = modal_sum(phi_o, d, (modal @ state.phi)[None])
+            G = state.between(data.s, d, phi_o, (modal @ state.phi)[None])
             z = data.s[:, None, None] ** data.power * G / (H * scale)
             out.append(z * one)
     return np.stack(out)

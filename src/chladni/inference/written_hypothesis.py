@@ -26,6 +26,9 @@ def as_written(
     scatter are calibrated, too: without them a deck whose adhesive is six times too soft stays 4 %
     off in frequency.
 
+    A named effect that no card can hold acts in the data: it stays in the fit, so that the numbers
+    of the deck do not compensate for it.
+
     The learned error of the model stays in the likelihood. Otherwise the parameters would
     compensate for mesh and joints. On a coarse plate with a concealed crack E went to 264 GPa for
     210 without it, and to 212 with it.
@@ -40,7 +43,10 @@ def as_written(
         If neither the found values nor the deck's own values belong to a physical structure.
     """
     found = hypothesis.fit
-    kept = [e for e in found.effects if e.traits.writable or is_strained(e, found.of(e))]
+    named = hypothesis.effects
+    kept = [
+        e for e in found.effects if e in named or e.traits.writable or is_strained(e, found.of(e))
+    ]
     numbers = [calibrated_family(e) if is_strained(e, found.of(e)) else e for e in kept]
     mesh = [e.halved for e in found.effects if type(e) is MeshError] if halved else []
     data, fits = hypothesis.data, list[Fit]()

@@ -155,6 +155,19 @@ class Masses(ShownBriefly):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Rotors(ShownBriefly):
+    """Spinning parts at grids; no card that is read or written holds one."""
+
+    ids: np.ndarray = field(default_factory=_no_rows)
+    node: np.ndarray = field(default_factory=_no_rows)
+    # (n, 3) angular momentum of the spin, in the basic frame [kg m²/s]
+    momentum: np.ndarray = field(default_factory=lambda: _none(3))
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class RigidBody(ShownBriefly):
     """RBE2, RBAR and similar: dependent dofs follow the independent point as a rigid body.
 
@@ -223,6 +236,7 @@ class Assembly(ShownBriefly):
     scalar_masses: Scalars = field(default_factory=Scalars)
     bushes: Bushes = field(default_factory=Bushes)
     masses: Masses = field(default_factory=Masses)
+    rotors: Rotors = field(default_factory=Rotors)
     rigid: tuple[RigidBody | Average | Equation, ...] = ()
     supports: np.ndarray = field(default_factory=lambda: _no_rows(2))
     axes: np.ndarray | None = None

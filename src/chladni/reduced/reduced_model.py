@@ -21,6 +21,7 @@ from ..effects.effect import (
     FieldChange,
     PointTerm,
     ShapeChange,
+    SpinTerm,
     count,
     of,
 )
@@ -31,12 +32,13 @@ from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
 from .field_factors import log_fields, mass_log, multiplied
-from .frequency_dependent_stiffness import Dissipated, Rising
-from .matrix_slopes import MatrixSlopes
+from .frequency_dependent_stiffness import Rising
+from .gyroscopic import Spin, spin
 from .matrix_stack import MatrixStack, stacked
 from .modal_factors import modal_factors
 from .real_modes import real_modes
 from .running_sums import RunningSums
+from .state import State as State
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,63 +239,6 @@ def reduce(groups: ElementGroups, basis: np.ndarray, base: BaseMotion | None = N
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class State:
-    """The reduced model at one x.
-
-    Attributes
-    ----------
-    lam : (m,)             ω² [rad²/s²]; m = r plus the degrees of freedom that effects add
-    phi : (r, m)           eigenvectors in the basis
-    own : (m - r, m)       eigenvectors at the degrees of freedom of effects
-    dK, dM                 ∂K, ∂M over the basis and dofs of effects; None where not requested
-    weight, dweight        weighed mass [kg] and its gradient (n_p,)
-    offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
-    drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
-    dissipated             dissipation of effects in the modes, or None
-    moved, dmoved          change of the modes where they are measured, outputs and inputs (p, m),
-                           or None, and its derivatives by position of the parameter
-    """
-
-    lam: np.ndarray
-    phi: np.ndarray
-    own: np.ndarray
-    dK: MatrixSlopes | None
-    dM: MatrixSlopes | None
-    weight: float
-    dweight: np.ndarray
-    offset: np.ndarray | None
-    doffset: np.ndarray | None
-    drive: np.ndarray | None = None
-    ddrive: np.ndarray | None = None
-    moved: np.ndarray | None = None
-    dmoved: Mapping[int, np.ndarray] = field(default_factory=dict)
-    dissipated: Dissipated | None = None
-
-    @property
-    def vectors(self) -> np.ndarray:
-        """Eigenvectors at all degrees of freedom, those of effects last (m, m)."""
-        return np.concatenate([self.phi, self.own])
-
-    def without_slopes(self) -> Self:
-        """The state without ∂K and ∂M, which hold the matrices that they are made of."""
-        lost = self.dissipated
-        return replace(self, dK=None, dM=None, dissipated=None if lost is None else lost.held)
-
-    def of_last(self, k: int) -> Self:
-        """The state with its slopes by the last k parameters alone."""
-        assert self.dK is not None
-        assert self.dM is not None
-        first, lost = self.dK.count - k, self.dissipated
-        return replace(
-            self, dK=self.dK.of_last(k), dM=self.dM.of_last(k), dweight=self.dweight[first:],
-            doffset=None if self.doffset is None else self.doffset[:, first:],
-            ddrive=None if self.ddrive is None else self.ddrive[first:],
-            dmoved={p - first: moved for p, moved in self.dmoved.items() if p >= first},
-            dissipated=None if lost is None else lost.of_last(k),
-        )  # fmt: skip
-
-
 def evaluate(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, gradient: bool = True
 ) -> State:
@@ -356,7 +301,7 @@ def evaluate(
     drive, ddrive = (None, None) if base is None else base.loads(phi)
     state = State(
         lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
-        *_moved(model, acting, phi[:r]), lost,
+        *_moved(model, acting, phi[:r]), lost, _spin(model, acting, phi[:r]),
     )  # fmt: skip
     return state if gradient else state.without_slopes()
 
@@ -374,6 +319,19 @@ def _moved(
             total = value if total is None else total + value
             slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
     return total, slopes
+
+
+def _spin(model: Reduced, acting: Acting, phi: np.ndarray) -> Spin | None:
+    """The spinning parts of all effects over the modes, or None."""
+    parts = [
+        (
+            term, at, model.rows(term.rows, not term.moving) @ phi,
+            {p: model.rows(rows, keep=False) @ phi for p, rows in term.moving.items()},
+        )
+        for _, at, terms in acting
+        for term in of(SpinTerm, terms)
+    ]  # fmt: skip
+    return spin(parts) if parts else None
 
 
 def _participating(

@@ -103,7 +103,7 @@ def _confirm(result: DiagnosisResult) -> list[str]:
 
 
 def _take_the_deck(result: DiagnosisResult) -> list[str]:
-    deck = result.files.get("deck")
+    deck, lost = result.files.get("deck"), _without_card(result)
     if not deck or not result.deck_changed:
         return []
     if result.distrust:
@@ -111,7 +111,15 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
     error = result.frequency_error
     if result.compared == "frequencies" and error and (error.after or 0) >= (error.before or 0):
         return [f"Do not use {deck}: its frequencies are no nearer to the test."]
+    if lost:
+        return [f"Use {deck} for the structure without {named(lost)}, which no card of it holds."]
     return [f"Use {deck}: it contains the change."]
+
+
+def _without_card(result: DiagnosisResult) -> list[str]:
+    """Names of the effects of the structure that no deck can hold."""
+    out = {f.name for f in families() if f.no_cards and f.effect.kind == "physics"}
+    return [e.name for e in result.effects if e.name in out]
 
 
 def _validate(result: DiagnosisResult) -> list[str]:
@@ -148,7 +156,7 @@ def _levels(result: DiagnosisResult) -> list[str]:
 def _look(result: DiagnosisResult) -> list[str]:
     """Advise if no effect of the catalogue fits: place first, then recording, then more data."""
     spots = [w for w in (result.adequate.where if result.adequate else ())]
-    steps = []
+    steps = [result.adequate.step] if result.adequate and result.adequate.step else []
     for w in spots:
         place = f"near grid {w.grid}" if w.grid else "there"
         parts = f" on {named(w.parts, 3)}" if w.parts else ""

@@ -24,6 +24,7 @@ from ..inference.scan import (
     field_slopes,
     oscillator_scores,
     point_scores,
+    spin_scores,
 )
 from ..parallel import in_parallel
 from ..reduced.reduced_model import evaluate
@@ -308,6 +309,14 @@ class Scan:
         reduced, base = self.context.problem.reduced, self.context.baselines[about]
         rest = reduced.flexibility(places)
         return oscillator_scores(base, reduced.model, self.data, places, mass, hertz, rest)
+
+    def spin_scores(
+        self, about: int, places: ElementGrids, sd: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best angular momentum of a spinning part at each place (k, 3), and the score (k,)."""
+        reduced, base = self.context.problem.reduced, self.context.baselines[about]
+        rows = self.context.where.rotations(places.grids)
+        return spin_scores(base, reduced.model, self.data, rows, sd)
 
     def field_scores(
         self, about: int, field: str, change: np.ndarray

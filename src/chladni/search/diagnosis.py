@@ -32,7 +32,7 @@ from ..inference.hypothesis_fit import (
     fitted,
 )
 from ..inference.likelihood import Responses
-from ..inference.local_damping_test import damping_test_along_effect
+from ..inference.local_damping_test import damping_instead_of_spin, damping_test_along_effect
 from ..inference.pole_data import Poles
 from ..inference.rows_of_fits import hypothesis_of
 from ..inference.written_hypothesis import as_written, preferred_mesh
@@ -265,14 +265,16 @@ def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
     """Test the data against the predictions of a hypothesis."""
     alone = hypothesis.effect not in hypothesis.fit.effects  # errors spread from the null as it is
     winner = hypothesis if alone else problem.about_itself(hypothesis, ROUGH)
-    lost, damping = winner.fit.state.dissipated, problem.damping
-    damping = None if damping is None else damping.beyond(winner.fit.state)
+    state, damping = winner.fit.state, problem.damping
+    complex_modes = state.dissipated is not None or state.spin is not None
+    damping = None if damping is None else damping.beyond(state)
     fits = adequacy(
         winner, problem.mass_measurement, problem.labels, damping=damping,
-        coupling=problem.coupling if lost is None else None,  # its responses have complex modes
+        coupling=None if complex_modes else problem.coupling,
     )  # fmt: skip
     if fits is None:
         return FitChances(None, np.nan, np.nan)
+    fits = damping_instead_of_spin(fits, winner, problem)
     both = damping_test_along_effect(fits, winner, damping)
     return FitChances(both, fits.against, both.p if both.p != fits.p else np.nan)
 

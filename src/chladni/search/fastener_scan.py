@@ -169,8 +169,8 @@ def loosened_receptance(
     follow = d - still + beyond[:, None] * still**2
     b = reduced.model.rows(one.joint.rows, keep=False) @ state.phi
     G = data.receptance(state, phi_o, phi_i, d)
-    G_ob = modal_sum(phi_o, d, b)
-    G_bi = modal_sum(b, d, phi_i)
+    G_ob = state.between(data.s, d, phi_o, b)
+    G_bi = state.between(data.s, d, b, phi_i)
     R = one.R + beyond[:, None, None] * one.N
     R = R - modal_sum(b, follow, b)
     return np.array(

@@ -55,7 +55,7 @@ def _named(
         _located(hypothesis, effect),
         _reported(hypothesis, effect),
         gain,
-        () if effect.kind == "test" else tuple(row.value for row in written),
+        tuple(row.value for row in written) if effect.traits.writable else (),
     )
 
 

@@ -5,6 +5,7 @@ responses.  The static loads are unit loads at sensors and shakers, as in the re
 diagnosis.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +13,13 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..dynamics.reduction import attachments, orthonormal, shifted
-from ..effects.effect import ChannelChange, of
+from ..effects.effect import ChannelChange, SpinTerm, Term, of
 from ..ema.identification import Identified, equalised
 from ..fem.modelled import Modelled
 from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.likelihood import LN10, Responses
 from ..inference.pole_data import Poles
+from ..reduced.gyroscopic import spin
 from ..reduced.reduced_model import State
 from ..reduced.reduced_problem import REACH
 from .question import Prepared, Question
@@ -38,18 +40,18 @@ def written_Q(
     sets : of samples, in the shape of ``prepared.score.use``
     real : (n,) bool       poles of the test that are modes
     fault : the named effects; faults of channels among them are removed from the recording before
-        it is compared
+        it is compared, and spinning parts are added to the structure
 
     Where the gain is unknown, the mean level over the fitted samples is removed as well.
     """
-    data, state = seen(question, prepared.score, model, prepared.problem.setup.f_max)
+    f_max, terms = prepared.problem.setup.f_max, list[Term]()
+    if fault is not None:
+        terms = [t for effect in fault.effects for t in effect.terms(fault.fit.of(effect))]
+    data, state = seen(question, prepared.score, model, f_max, of(SpinTerm, terms))
     if isinstance(data, Poles):
         return tuple(data.Q(state, use, real) for use in sets)
     n = len(data.a)
-    offset = np.zeros(n, complex)
-    if fault is not None:
-        terms = [t for effect in fault.effects for t in effect.terms(fault.fit.of(effect))]
-        offset = offset + sum(change.value for change in of(ChannelChange, terms))
+    offset = sum((change.value for change in of(ChannelChange, terms)), np.zeros(n, complex))
     offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
     state = replace(state, offset=offset)
     return tuple(data.Q(state, use) for use in sets)
@@ -82,8 +84,9 @@ def gain_offset(
 
 
 def seen(
-    question: Question, score: Responses | Poles, model: Modelled, f_max: float
-) -> tuple[Responses | Poles, State]:
+    question: Question, score: Responses | Poles, model: Modelled, f_max: float,
+    spinning: Sequence[SpinTerm] = (),
+) -> tuple[Responses | Poles, State]:  # fmt: skip
     """The data with this structure's rows in its own modes, and the state of those modes."""
     built, modes = model.structure, model.up_to(REACH * f_max)
     basis = modes.shapes
@@ -101,7 +104,12 @@ def seen(
     basis = orthonormal(built.system.M, [basis, still], kept=basis.shape[1])
     K, M = (basis.T @ (A @ basis) for A in (built.system.elastic, built.system.M))
     lam, phi = sl.eigh((K + K.T) / 2, (M + M.T) / 2)
-    return replace(score, a=rows_o @ basis, b=rows_i @ basis), _state(lam, phi)
+    state = _state(lam, phi)
+    if spinning:
+        turns = (built.along(np.full(3, t.grid), np.eye(3), turning=True) for t in spinning)
+        parts = zip(spinning, (rows @ basis @ phi for rows in turns), strict=True)
+        state = replace(state, spin=spin([(t, slice(0, 0), own, {}) for t, own in parts]))
+    return replace(score, a=rows_o @ basis, b=rows_i @ basis), state
 
 
 def _state(lam: np.ndarray, phi: np.ndarray) -> State:

@@ -208,7 +208,7 @@ def _adequate(found: Diagnosis, spot: ResidualLocalisation | None) -> Adequacy |
         place = replace(place, parts=spot.parts, grid=spot.grid, point_m=spot.point_m)
     where = () if test.passes else (place,)
     odds = odds_of_something_else(test.against, RULES.something_else)
-    return Adequacy(test.passes, test.p, test.what, where, test.statistics, odds)
+    return Adequacy(test.passes, test.p, test.what, where, test.statistics, odds, test.step)
 
 
 def article_mass(question: Question, stages: UpdatedModels, deck: HypothesisFit) -> float:

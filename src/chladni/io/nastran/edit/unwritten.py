@@ -12,7 +12,7 @@ from ....model.assembly import Assembly, Average, Equation, RigidBody, picked
 _ROUNDED = 1e-5  # of an entry: what a card of eight columns keeps of a number
 _NOTHING = 1e-9  # of the largest entry of a column
 _JOINTS = ("springs", "dampers", "scalar_masses", "masses")  # which can be added, not taken out
-_FAMILIES = ("shells", "beams", "bushes", *_JOINTS)
+_FAMILIES = ("shells", "beams", "bushes", "rotors", *_JOINTS)
 _SWITCHES = ("coupled_mass", "structural_damping", "auto_spc", "k6rot")
 _NEW = "chladni.io.nastran.write_assembly writes it as a new deck"
 

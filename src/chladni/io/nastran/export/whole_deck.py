@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ....errors import ModelError
 from ....geometry.solid_shapes import CORNERS
 from ....model.assembly import Assembly, Equation, Scalars, picked
 from ....output import write_text
@@ -37,7 +38,18 @@ def write_assembly(
     """Write a deck (SOL 103, ``count`` modes) in a unit system, SI unless given.
 
     Part names stand in ANSA's comments; element ids that occur twice are numbered anew.
+
+    Raises
+    ------
+    ModelError
+        If it has a spinning part, which no card of it can hold.
     """
+    if len(assembly.rotors):
+        grid = assembly.ids[assembly.rotors.node[0]]
+        raise ModelError(
+            f"the spinning part at grid {grid} cannot be written: no card that chladni writes "
+            "holds one; write the assembly without rotors"
+        )
     units = unit_system("SI" if units is None else units)
     ids, systems = Ids(assembly), Systems(assembly)
     body = [
