@@ -16,13 +16,14 @@ from .connected import refuse_loose
 from .connectors import CONNECTORS, with_connectors
 from .context import Context, context, parameter, real_parameter
 from .nonstructural_mass import with_nonstructural
+from .rigid_bushes import tied
 from .rigid_elements import ties
 from .sections import Parts
 from .shell_elements import SHEETS, filled_thickness, shells
 from .solid_elements import SOLIDS, solids
 from .supports import selected, supports
 
-_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D".split()
+_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D CGAP".split()
 _ELEMENTS = (  # those of one kind have no id in common
     (*SHEETS, *SOLIDS, *_STIFF, *CONNECTORS),
     "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),
@@ -87,7 +88,8 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         auto_spc=parameter(deck, "AUTOSPC") != "NO",
         k6rot=_k6rot(deck),
     )
-    return with_connectors(ctx, with_nonstructural(ctx, made, selected(deck, "NSM", subcase)))
+    made = with_nonstructural(ctx, tied(made), selected(deck, "NSM", subcase))
+    return with_connectors(ctx, made)
 
 
 def _k6rot(deck: Deck) -> float | None:
