@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....errors import FileError
-from ....model.assembly import Assembly
+from ....model.assembly import Assembly, concatenated
 from ....units import Units
 from ..export.whole_deck import is_written_here
 from ..text.deck import Deck
@@ -15,6 +15,7 @@ from .beam_elements import beams
 from .connected import refuse_loose
 from .connectors import CONNECTORS, with_connectors
 from .context import Context, context, parameter, real_parameter
+from .direct_matrices import direct
 from .nonstructural_mass import with_nonstructural
 from .rigid_bushes import tied
 from .rigid_elements import ties
@@ -74,9 +75,9 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         shells=replace(made_shells, part=at[made_shells.part]),
         solids=tuple(replace(s, part=at[s.part]) for s in made_solids),
         beams=replace(made_beams, part=at[made_beams.part]),
-        springs=springs_and_masses.springs(ctx),
-        dampers=springs_and_masses.dampers(ctx),
-        scalar_masses=springs_and_masses.scalar_masses(ctx),
+        springs=concatenated(springs_and_masses.springs(ctx), direct(ctx, "K2GG")),
+        dampers=concatenated(springs_and_masses.dampers(ctx), direct(ctx, "B2GG")),
+        scalar_masses=concatenated(springs_and_masses.scalar_masses(ctx), direct(ctx, "M2GG")),
         bushes=springs_and_masses.bushes(ctx),
         masses=springs_and_masses.masses(ctx),
         rigid=ties(ctx, selected(deck, "MPC", subcase)),

@@ -56,7 +56,7 @@ HARMLESS: Final = _by_name({  # {card: what it is for}; those that matter are no
     "cyclic symmetry, which its own solutions alone heed":
     "CYAX CYJOIN CYSUP CYSYM LOADCYH LOADCYN LOADCYT",
     "control and matrices, which act where the case control selects them":
-    "CNGRNT CAMPBLL CONTRLT CSCHD CHECKEL DMIG DMI DMIJ DMIK DTI EPOINT",
+    "CNGRNT CAMPBLL CONTRLT CSCHD CHECKEL DMI DMIJ DMIK DTI EPOINT",
     "plots, output and switches of the run":
     """PLOTEL PLOTEL3 PLOTEL4 PLOTG PLOTOPT CBARAO PLTSURF CPLSTN3 CPLSTN4 CPLSTN6 CPLSTN8 CORD3G
     CORD3R ECHOON ECHOOFF MDLPRM ITER PARAMARC OUTPUT OUTRCV ABSNMVS ABSTRCT""",
