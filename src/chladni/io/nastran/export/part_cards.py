@@ -145,7 +145,7 @@ def material_card(m: AnyMaterial, id: int, units: Units) -> list[Value]:
         G = None if m.G is None else m.G / p
         return ["MAT1", id, m.E / p, G, m.nu, rho, None, None, m.damping or None]
     if not isinstance(m, Orthotropic):
-        raise ModelError(f"an anisotropic material {m.id} of some of its parts cannot be changed")
+        raise ModelError(f"an Anisotropic material {m.id} of some of its parts cannot be changed")
     moduli: list[Value] = [m.E1 / p, m.E2 / p, m.nu12, m.G12 / p]
     moduli += [m.G1z / p or None, m.G2z / p or None]
     return ["MAT8", id, *moduli, rho, *[None] * 8, m.damping or None]
