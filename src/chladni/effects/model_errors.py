@@ -57,6 +57,13 @@ class MeshError(Effect):
     # (p, k) change of motion at the measured places by each coordinate
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
+    @property
+    def limit(self) -> np.ndarray:
+        """Natural frequencies of the modes on an infinitely fine mesh (k,) [Hz], increasing."""
+        w, V = np.linalg.eigh(LIMIT * self.log)
+        lam = np.linalg.eigvalsh(self.omega[:, None] * ((V * np.exp(w)) @ V.T) * self.omega)
+        return np.asarray(np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi))
+
     def terms(self, x: np.ndarray) -> tuple[Term, ...]:
         """x L over the modes, and x times the change of their shapes at sensors and shaker."""
         own = ModalFactor(self.rows, self.omega, x[0] * self.log, self.log[None])

@@ -6,7 +6,7 @@ interface serves natural frequencies alone (:class:`.pole_data.Poles`).
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self
+from typing import ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
@@ -77,6 +77,8 @@ class Responses:
     direct: np.ndarray | float = 0.0
     sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
     known: Whitening | None = None  # of what those errors do to the lines and channels in use
+
+    compared: ClassVar[Literal["responses"]] = "responses"
 
     @property
     def power(self) -> int:

@@ -1,36 +1,29 @@
 """Scores of effects on few degrees of freedom, without a basis of their own.
 
-The rows B of these dofs move by B Φ q + R f: Φ is the basis, f the force on them, and R their
-static flexibility beyond the basis. A stiffness A then acts as A (1 + R A)⁻¹ on B Φ q, and a mass
-moves by (1 + R A)⁻¹ B Φ q (Woodbury). The inertia of what lies beyond the basis is left out.
+The rows B of these dofs move by B Φ q + R f under forces f on them. Φ is the basis. R is their
+static flexibility beyond it. A stiffness A then acts as A (1 + R A)⁻¹ on B Φ q, and a mass moves by
+(1 + R A)⁻¹ B Φ q (Woodbury). The inertia of motions beyond the basis is left out.
 """
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..effects.effect import Effect, MatrixTerm, PointTerm, of
-from ..errors import ModelError
 from ..reduced.effect_dofs import acting_at
 from ..reduced.field_factors import log_fields, multiplied
 from ..reduced.real_modes import real_modes
 from ..reduced.reduced_model import State
 from ..reduced.reduced_problem import ReducedProblem
+from .hypothesis_fit import FAILED
 from .likelihood import Responses
 from .scan import Baseline
 
+Operator = tuple[str, sp.csr_array, float]  # the matrix it is added to, A, c of c A
 MOST_ROWS = 1000  # on which an effect may act: dense matrices of more cost as much as a basis
-
-
-@dataclass(frozen=True, eq=False)
-class _Added:
-    """What an effect adds at one x: c A of operators by their matrix, and its terms at points."""
-
-    operators: list[tuple[str, sp.csr_array, float]]
-    points: list[PointTerm]
 
 
 def local_scores(
@@ -41,38 +34,41 @@ def local_scores(
     state, released = base.state, effect.release or reduced.model.following is not None
     if released or state.drive is not None or state.dissipated is not None:
         return None
-    found = [_added(base, reduced, effect, x) for x in starts]
-    every = [added for added in found if added is not None]
-    if len(every) < len(found):
+    every = [added for x in starts if (added := _added(base, reduced, effect, x)) is not None]
+    if len(every) < len(starts):
         return None
     at = np.unique(np.concatenate([
-        np.flatnonzero(np.diff(A.indptr)) for added in every for _, A, _ in added.operators
+        np.flatnonzero(np.diff(A.indptr)) for operators, _ in every for _, A, _ in operators
     ] or [np.zeros(0, int)]))  # fmt: skip
-    points = {id(t.rows): t.rows for added in every for t in added.points}
     unit = sp.eye_array(reduced.model.vectors.shape[0]).tocsr()[at]
-    rows = sp.csr_array(sp.vstack([unit, *points.values()]))
+    known = {0: unit, **{id(t.rows): t.rows for _, points in every for t in points}}
+    ends = dict(zip(known, np.cumsum([rows.shape[0] for rows in known.values()]), strict=True))
+    rows = sp.csr_array(sp.vstack(list(known.values())))
     if rows.shape[0] > MOST_ROWS:
         return None
     b = reduced.model.vectors.seen(rows) @ state.phi
     R, out = reduced.flexibility_between(rows), np.full(len(starts), np.inf)
-    ends = dict(zip(points, np.cumsum([len(at), *(p.shape[0] for p in points.values())]),
-                    strict=False))  # fmt: skip
-    for k, (added, x) in enumerate(zip(every, starts, strict=True)):
+    for k, ((operators, points), x) in enumerate(zip(every, starts, strict=True)):
         local = {matrix: np.zeros_like(R) for matrix in "KM"}
-        for matrix, A, c in added.operators:
+        for matrix, A, c in operators:
             local[matrix][: len(at), : len(at)] += c * A[at][:, at]
-        for t in added.points:
-            own = ends[id(t.rows)] + np.arange(t.rows.shape[0])
+        for t in points:
+            own = np.arange(ends[id(t.rows)] - t.rows.shape[0], ends[id(t.rows)])
             local[t.matrix][own, own] += t.coefficient
-        with suppress(ModelError):
+        with suppress(*FAILED):
             other = _changed(state, b, R, local["K"], local["M"], effect.weight(x).mass)
             r = data.scaled(other, False)[0][:, None]
             out[k] = base.score(replace(base, state=other).with_mass(r, 0.0))[0]
     return out
 
 
-def _added(base: Baseline, reduced: ReducedProblem, effect: Effect, x: np.ndarray) -> _Added | None:
-    """The change by an effect, with what it does to terms of the base; None where it has others."""
+def _added(
+    base: Baseline, reduced: ReducedProblem, effect: Effect, x: np.ndarray
+) -> tuple[list[Operator], list[PointTerm]] | None:
+    """Operators and points of an effect, with its part in those of the base; None: it has others.
+
+    A factor of the base on modes does not multiply them here.
+    """
     terms, z = effect.terms(x), np.concatenate([base.x, x])
     points, matrices = of(PointTerm, terms), of(MatrixTerm, terms)
     plain = all(t.own is None for t in points) and not any(t.rise or t.geometric for t in matrices)
@@ -81,13 +77,13 @@ def _added(base: Baseline, reduced: ReducedProblem, effect: Effect, x: np.ndarra
     acting, groups = acting_at([*base.effects, effect], z), reduced.groups
     split = "" not in reduced.model.linear
     fields = log_fields(acting, len(groups), len(z), split)
-    change: dict[int, tuple[str, sp.csr_array, float]] = {}
+    change: dict[int, Operator] = {}
     for sign, some in ((1, acting), (-1, acting[:-1])):
         for share in multiplied(some, groups, *fields, split):
             t = share.term
             c = change.get(id(t.operator), ("", t.operator, 0.0))[2]
             change[id(t.operator)] = t.matrix, t.operator, c + sign * t.coefficient
-    return _Added([each for each in change.values() if each[2]], points)
+    return [each for each in change.values() if each[2]], points
 
 
 def _changed(

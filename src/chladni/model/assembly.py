@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..arrays import OneScreen
 from ..errors import LabelError, ModelError, named
 from .properties import Part
 
@@ -23,8 +24,8 @@ def _no_rows(*shape: int) -> np.ndarray:
     return np.zeros((0, *shape), dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class Shells:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shells(OneScreen):
     """Four- and three-node shells; a triangle repeats its third node."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -192,8 +193,8 @@ class Equation:
     factors: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Assembly:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assembly(OneScreen):
     """The complete structure.
 
     Attributes

@@ -199,6 +199,12 @@ class UpdatingContext:
         data = self.problem.data
         return Scan(self, data) if isinstance(data, Responses) else None
 
+    @property
+    def tells_places(self) -> bool:
+        """True if the data tell neighbouring places apart: responses, or modes with shapes."""
+        data = self.problem.data
+        return isinstance(data, Responses) or data.shapes is not None
+
     @cached_property
     def loosened(self) -> tuple[Loosened, ...]:
         """Welds and fasteners with what the sheets give where they are loaded."""

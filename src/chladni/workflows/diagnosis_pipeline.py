@@ -25,7 +25,6 @@ from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.implausible_values import implausible_values, in_doubt, strained
 from ..inference.joint_fit import Posterior, informed
 from ..inference.likelihood import Responses
-from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
 from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..io.nastran.edit.model_changes import changes
@@ -44,7 +43,8 @@ from ..search.diagnosis import diagnose as compared
 from ..search.frequency_table import frequency_error, frequency_rows
 from ..search.left_frequencies import left_frequencies
 from ..search.measured_modes import MeasuredModes, measured_modes
-from ..search.next_measurement import Outlook, advised, outlook
+from ..search.measurement_forecasts import outlook
+from ..search.next_measurement import Outlook, advised
 from ..search.other_recordings import scored_others
 from ..search.preparation import NOT_WEIGHED
 from ..search.question import Prepared, Question
@@ -180,7 +180,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*foretells_worse(result.agreement, bool(result.effects)), *distrust)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
-    if result.compared == "frequencies":
+    if result.compared != "responses":
         distrust = (*left_frequencies(result.frequencies, stages.final.model), *distrust)
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
@@ -191,7 +191,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     ahead = known.outlook
     return replace(
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
-        outlook=ahead, next_measurements=() if ahead is None else advised(ahead),
+        outlook=ahead, next_measurements=() if ahead is None else advised([ahead]),
     )  # fmt: skip
 
 
@@ -217,7 +217,9 @@ def _apply_held_out(
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
     case, decision = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, case, decision)
-    ahead = outlook(prepared.problem, *open_explanations(case, decision)) if diagnosing else None
+    ahead = None
+    if diagnosing:
+        ahead = outlook(prepared.problem, *open_explanations(case, decision, found))
     plain = refined(made.question, prepared, found.plain, written=True)
     found = replace(found, plain=plain.hypothesis)
     if found.found is not None:
@@ -371,7 +373,7 @@ def _result(
             *blind_note(spot),
         ),
         one_of=(found.one_of,) if found.one_of else (),
-        compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
+        compared=prepared.score.compared,
         models=stages,
         recordings=scored_others(question, prepared, [model for _, model in every]),
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....model.properties import Material
+from ....model.properties import Anisotropic, Material, ShellSection
 
 
 @dataclass(frozen=True)
@@ -14,6 +14,27 @@ class Ply:
     material: Material
     thickness: float
     angle: float
+
+
+def laminate_section(plies: list[Ply], id: int = 0, counts: str = "all") -> ShellSection:
+    """A stack smeared to equivalent membrane, bending, coupling and shear moduli.
+
+    Parameters
+    ----------
+    counts : what of the layers counts: all, membrane, bending, or smeared (their order does not)
+    """
+    t, membrane, bending, coupling, shear, rho = smear(plies)
+    bent = membrane if counts == "smeared" else bending
+    coupled = np.abs(coupling).max() > 1e-9 * np.abs(membrane).max()
+    return ShellSection(
+        t,
+        None if counts == "bending" else Anisotropic(membrane, rho=rho, id=id),
+        None if counts == "membrane" else Anisotropic(bent, rho=rho, id=id),
+        Anisotropic(np.zeros((3, 3)), shear, id=id),
+        Anisotropic(coupling, id=id) if coupled and counts == "all" else None,
+        shear_ratio=1.0,
+        rigid_shear=counts in ("bending", "smeared") or not np.any(shear),
+    )
 
 
 def smear(

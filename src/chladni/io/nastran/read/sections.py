@@ -17,7 +17,7 @@ from ....model.properties import (
 from ..text.table import Cards
 from . import bar_sections
 from .context import Context
-from .laminate import Ply, smear
+from .laminate import Ply, laminate_section, smear
 from .materials import Materials
 
 Reader = Callable[[Context, Materials, Cards, int], Section]
@@ -176,19 +176,9 @@ _LAM = {
 
 def _pcomp(ctx: Context, materials: Materials, card: Cards, pid: int) -> ShellSection:
     """PCOMP smeared to equivalent membrane, bending, coupling and shear moduli."""
-    t, membrane, bending, coupling, shear, rho = smear(_plies(ctx, materials, card))
-    counts = _LAM[card.word(0, 8)]
-    bent = membrane if counts == "smeared" else bending
-    coupled = np.abs(coupling).max() > 1e-9 * np.abs(membrane).max()
-    return ShellSection(
-        t,
-        None if counts == "bending" else Anisotropic(membrane, rho=rho, id=pid),
-        None if counts == "membrane" else Anisotropic(bent, rho=rho, id=pid),
-        Anisotropic(np.zeros((3, 3)), shear, id=pid),
-        Anisotropic(coupling, id=pid) if coupled and counts == "all" else None,
-        shear_ratio=1.0,
+    return replace(
+        laminate_section(_plies(ctx, materials, card), pid, _LAM[card.word(0, 8)]),
         nonstructural=float(card.reals(3, 0.0)[0]) * ctx.scale.inertia / ctx.scale.length**2,
-        rigid_shear=counts in ("bending", "smeared") or not np.any(shear),
         damping=float(card.reals(7, 0.0)[0]),
     )
 

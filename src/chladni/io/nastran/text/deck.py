@@ -7,6 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from ....arguments import checked
+from ....arrays import OneScreen
 from ....errors import FileError, named, nearest
 from .card_layout import tables
 from .cards import FIELDS
@@ -21,8 +22,8 @@ from .table import Cards, empty, joined
 SCALED = frozenset("CB1 CB2 CK1 CK2 CK3 CM1 CM2".split())  # PARAM that scale whole matrices
 
 
-@dataclass(frozen=True, eq=False)
-class Deck:
+@dataclass(frozen=True, eq=False, repr=False)
+class Deck(OneScreen):
     """A deck: its files as they stand, its cards by name, its case control, its part names."""
 
     path: Path
