@@ -14,8 +14,8 @@ from .springs_and_masses import skew
 def tied(made: Assembly) -> Assembly:
     """The assembly with equations in the place of infinite stiffness.
 
-    The relative motion δ = E q at the bush is zero in these components. The same number of dofs of
-    B follow, or of A where B is the ground or follows something already.
+    The relative motion δ = E q at the bush is zero in these components. Dofs of B follow, one for
+    each of them, or dofs of A where B is the ground or follows something already.
     """
     stiff = np.isinf(made.bushes.stiffness)
     if not stiff.any():
