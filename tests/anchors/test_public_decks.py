@@ -21,6 +21,7 @@ READ_NOW = {  # of those refused before, linear structure of known elements: kg 
     "r4_conn_exa.bdf": 3.0998678e-5,  # CWELD
     "static.bdf": 3.325e-4,  # a CHEXA of 20 nodes, 2660 kg/m³ times 2.5 x 5 x 10 mm³
     "laminate_elstrn_fiber_center.bdf": 0.0015098776,
+    "v12902.bdf": 20.0,  # CGAP, closed
     "random_test_bar_plus_tri.bdf": 25.900053,
 }
 

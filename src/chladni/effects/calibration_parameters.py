@@ -5,15 +5,18 @@ Their optimum is the null hypothesis of every diagnosis, never a finding.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
 from ..fem.derivative import Slope
 from ..model.assembly import Assembly
 from ..model.properties import (
+    Anisotropic,
+    AnisotropicSolid,
+    AnyMaterial,
     BeamSection,
     Isotropic,
-    Material,
     Orthotropic,
     Part,
     ShellSection,
@@ -39,7 +42,8 @@ REASONS = {  # of the priors, by the field
 }
 OF_FIELDS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
 SHEET, TUBE = ("E", "rho", "t"), ("E", "rho", "wall")  # of a part of shells, and of beams
-MODULI = "E", "G", "E1", "E2", "G12", "G1z", "G2z", "Q"  # of isotropic to anisotropic materials
+M = TypeVar("M", bound=AnyMaterial)
+MODULI = "E", "G", "E1", "E2", "G12", "G1z", "G2z", "Q", "C"  # of all materials
 _AREAS = ("area", "I1", "I2", "I12", "J")  # proportional to the wall of a thin tube
 
 
@@ -91,7 +95,7 @@ def calibration_parameter(
     )  # fmt: skip
 
 
-def alloy_of(material: Material | None) -> str:
+def alloy_of(material: AnyMaterial | None) -> str:
     """Class of an isotropic material by its E and rho, a key of ``ALLOYS``; "" for any other.
 
     Ranges and scatter of E and rho: JCSS (2001), Probabilistic Model Code, parts 2.1 and 3.2 (E of
@@ -145,7 +149,7 @@ def thickness_of(part: Part) -> str:
     return "t" if isinstance(section, ShellSection) else ""
 
 
-def material_of(part: Part) -> Material | None:
+def material_of(part: Part) -> AnyMaterial | None:
     """Material of a part; of a sheet that of its membrane, or of its bending."""
     section = part.section
     if isinstance(section, ShellSection):
@@ -156,9 +160,13 @@ def material_of(part: Part) -> Material | None:
 def value(part: Part, quantity: str) -> float:
     """The deck's value of a field of a part [SI]; the wall of a part of beams is 1.
 
-    E of an orthotropic sheet is sqrt(E1 E2).
+    E of an orthotropic sheet is sqrt(E1 E2), that of an anisotropic solid the geometric mean along
+    its axes.
     """
     section, material = part.section, material_of(part)
+    if isinstance(material, AnisotropicSolid) and quantity == "E":
+        compliance = np.linalg.pinv(material.C)
+        return float(np.prod(1 / np.diag(compliance)[:3]) ** (1 / 3))
     if isinstance(section, SolidSection) or quantity not in (*SHEET, *TUBE):
         return float(getattr(material, quantity))
     if quantity not in (TUBE if isinstance(section, BeamSection) else SHEET):
@@ -174,7 +182,9 @@ def value(part: Part, quantity: str) -> float:
         return material.E
     if isinstance(material, Orthotropic):
         return float(np.sqrt(material.E1 * material.E2))
-    return float(np.sqrt(material.Q[0, 0] * material.Q[1, 1])) if material is not None else 0.0
+    if isinstance(material, Anisotropic):
+        return float(np.sqrt(material.Q[0, 0] * material.Q[1, 1]))
+    return 0.0
 
 
 def with_scaled(
@@ -200,13 +210,13 @@ def scaled(part: Part, quantity: str, factor: float) -> Part:
     if quantity == "t":
         assert isinstance(section, ShellSection)
         return part.with_section(thickness=section.thickness * factor)
-    materials = {n: m for n, m in vars(section).items() if isinstance(m, Material)}
+    materials = {n: m for n, m in vars(section).items() if isinstance(m, AnyMaterial)}
     return part.with_section(
         **{n: scaled_material(m, quantity, factor) for n, m in materials.items()}
     )
 
 
-def scaled_material(material: Material, quantity: str, factor: float) -> Material:
+def scaled_material(material: M, quantity: str, factor: float) -> M:
     """Multiply the numbers that a material has of a field."""
     names = MODULI if quantity == "E" else (quantity,)
     known = {n: v for n in names if (v := getattr(material, n, None)) is not None}

@@ -31,7 +31,10 @@ def refuse_unstable(assembly: Assembly, K: sp.csr_array, dofs: np.ndarray) -> No
         return  # the modes themselves decide
     if count:
         motions = "1 eigenvalue is" if count == 1 else f"{count} eigenvalues are"
+        own = ids[ids > 0]  # elements of a direct matrix have no id
+        who = [f"spring {named(own)} (CELAS, CBUSH)"] if len(own) else []
+        who += ["the matrix K2GG"] if len(own) < len(ids) else []
         raise ModelError(
-            f"spring {named(ids)} (CELAS, CBUSH) has a negative stiffness, and the structure is "
+            f"{' or '.join(who)} has a negative stiffness, and the structure is "
             f"unstable with it: {motions} negative; correct its sign or stiffness, or remove it"
         )

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import ModelError, named
 from ..geometry.solid_shapes import CORNERS, FAMILIES, ShapeFamily, jacobians, with_middles
 from ..model.assembly import Assembly, Solids
-from ..model.properties import Isotropic, SolidSection
+from ..model.properties import AnisotropicSolid, Isotropic, SolidSection
 
 LEAST = 1e-9  # share of the trace of C: small to a stiffness, large to rounding
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # of strain components
@@ -58,7 +58,12 @@ def _sections(assembly: Assembly, solids: Solids) -> tuple[list[SolidSection], n
 
 
 def elasticity(material: object) -> np.ndarray:
-    """C (6, 6) of σ = C ε, ε = (εx εy εz γxy γyz γzx), λ = E nu / (1+nu)(1-2nu) [Pa]."""
+    """C (6, 6) of σ = C ε, ε = (εx εy εz γxy γyz γzx), λ = E nu / (1+nu)(1-2nu) [Pa].
+
+    An anisotropic solid has its own.
+    """
+    if isinstance(material, AnisotropicSolid):
+        return material.C
     if not isinstance(material, Isotropic):
         raise ModelError(f"solids need an isotropic material, not {type(material).__name__}")
     E, nu, G = material.E, material.nu, material.shear_modulus

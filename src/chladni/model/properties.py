@@ -86,7 +86,18 @@ class Anisotropic:
         return self.G
 
 
+@dataclass(frozen=True, eq=False)
+class AnisotropicSolid:
+    """A solid given by its stiffness (MAT9)."""
+
+    C: np.ndarray  # (6, 6) of σ = C ε, ε = (εx εy εz γxy γyz γzx), basic frame [Pa]
+    rho: float = 0.0
+    damping: float = 0.0
+    id: int = 0
+
+
 Material = Isotropic | Orthotropic | Anisotropic
+AnyMaterial = Material | AnisotropicSolid
 
 
 @dataclass(frozen=True)
@@ -113,7 +124,7 @@ class SolidSection:
     (incompatible modes, as OptiStruct).
     """
 
-    material: Material
+    material: AnyMaterial
     full: bool = False
     modes: int = 21
 

@@ -6,7 +6,15 @@ import numpy as np
 
 from ....errors import ModelError
 from ....model.assembly import Assembly, Shells
-from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
+from ....model.properties import (
+    Anisotropic,
+    AnisotropicSolid,
+    AnyMaterial,
+    Isotropic,
+    Orthotropic,
+    Part,
+    ShellSection,
+)
 from ....units import Units
 from .. import Add, Deck, Replace, SetColumns, SetField, units_of
 from ..export.numbering import Systems
@@ -60,7 +68,7 @@ def changes(
     return [*out, *support_changes(deck, before, after)]
 
 
-def _uses(deck: Deck, assembly: Assembly) -> Iterator[tuple[int, str, Material]]:
+def _uses(deck: Deck, assembly: Assembly) -> Iterator[tuple[int, str, AnyMaterial]]:
     """(position of the part, field of the section, material) of all that name a material."""
     stacked = laminated(deck, assembly)
     for k, part in enumerate(assembly.parts):
@@ -76,7 +84,7 @@ def _materials(
 ) -> list[Change]:
     """Cards of materials changed; where only some users of one changed, a card of their own."""
     known = {(k, name): m for k, name, m in _uses(deck, before)}
-    users: dict[int, dict[Material, list[tuple[int, str]]]] = {}
+    users: dict[int, dict[AnyMaterial, list[tuple[int, str]]]] = {}
     for k, name, material in _uses(deck, after):
         if (old := known.get((k, name))) is None:
             raise ModelError(
@@ -113,18 +121,23 @@ def _of_material(deck: Deck, part: Part, name: str, material: int, split: Split)
     )
 
 
-def _equal(a: Material, b: Material) -> bool:
+def _equal(a: AnyMaterial, b: AnyMaterial) -> bool:
     """The same numbers."""
     if isinstance(a, Anisotropic) and isinstance(b, Anisotropic):
         same = np.array_equal(a.Q, b.Q) and np.array_equal(a.G, b.G)
         return same and (a.rho, a.damping, a.id) == (b.rho, b.damping, b.id)
+    if isinstance(a, AnisotropicSolid) and isinstance(b, AnisotropicSolid):
+        same = np.array_equal(a.C, b.C)
+        return same and (a.rho, a.damping, a.id) == (b.rho, b.damping, b.id)
     return a == b
 
 
-def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> list[Change]:
+def _edited(deck: Deck, id: int, was: AnyMaterial, now: AnyMaterial, units: Units) -> list[Change]:
     """One card's values, or another card in its place."""
     if isinstance(now, Orthotropic) and isinstance(was, Isotropic):
         return [Replace("MAT1", id, material_card(now, id, units))]
+    if isinstance(was, AnisotropicSolid) and isinstance(now, AnisotropicSolid):
+        return list(_solid_stiffness(deck, was, now, units))
     if isinstance(now, Anisotropic) and id in ids_of(deck, "MAT2"):
         return list(_stiffness(id, was, now, units))
     if type(was) is not type(now) or isinstance(now, Anisotropic):
@@ -133,7 +146,7 @@ def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> 
     return list(_numbers(id, was, now, units))
 
 
-def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Change]:
+def _numbers(id: int, was: AnyMaterial, now: AnyMaterial, units: Units) -> Iterator[Change]:
     """Fields of MAT1 or MAT8 whose values differ."""
     names = {"rho": ("RHO", units.density), "damping": ("GE", 1.0)}
     if isinstance(now, Isotropic):
@@ -149,13 +162,31 @@ def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Ch
             yield SetField(kind, id, field, b / unit)
 
 
-def _stiffness(id: int, was: Material, now: Anisotropic, units: Units) -> Iterator[Change]:
+def _stiffness(id: int, was: AnyMaterial, now: Anisotropic, units: Units) -> Iterator[Change]:
     """G11 to G33 and RHO of a MAT2."""
+    assert not isinstance(was, AnisotropicSolid)
+    Q = was.plane_stress()
     for i, j in zip(*np.triu_indices(3), strict=True):
-        if not np.isclose(was.plane_stress()[i, j], now.Q[i, j], rtol=1e-9, atol=0):
+        if not np.isclose(Q[i, j], now.Q[i, j], rtol=1e-9, atol=0):
             yield SetField("MAT2", id, f"G{i + 1}{j + 1}", float(now.Q[i, j] / units.stress))
     if not np.isclose(was.rho, now.rho, rtol=1e-9, atol=0):
         yield SetField("MAT2", id, "RHO", now.rho / units.density)
+
+
+def _solid_stiffness(
+    deck: Deck, was: AnisotropicSolid, now: AnisotropicSolid, units: Units
+) -> Iterator[Change]:
+    """G11 to G66 of a MAT9 times one factor, whatever its axes, and RHO."""
+    factor = float(now.C.trace() / was.C.trace())
+    if not np.allclose(now.C, factor * was.C, rtol=1e-9, atol=1e-9 * np.abs(now.C).max()):
+        raise ModelError(f"{deck.path}: material {now.id} changed by more than one factor")
+    table = deck["MAT9"]
+    card = table.single(int(np.flatnonzero(table.integers(1) == was.id)[0]))
+    for k in range(2, 23):
+        if factor != 1 and card.word(0, k):
+            yield SetField("MAT9", was.id, k, card.real(0, k) * factor)
+    if not np.isclose(was.rho, now.rho, rtol=1e-9, atol=0):
+        yield SetField("MAT9", was.id, "RHO", now.rho / units.density)
 
 
 def _axes(before: Assembly, after: Assembly, free: FreeIds) -> list[Change]:

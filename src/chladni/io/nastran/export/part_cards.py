@@ -8,9 +8,10 @@ from ....errors import ModelError
 from ....model.assembly import Assembly
 from ....model.properties import (
     Anisotropic,
+    AnisotropicSolid,
+    AnyMaterial,
     BeamSection,
     Isotropic,
-    Material,
     Orthotropic,
     Part,
     ShellSection,
@@ -37,9 +38,9 @@ class _Library:
     """Materials in use; a shear material given by G alone is one of its own."""
 
     def __init__(self) -> None:
-        self.found: list[tuple[Material, bool]] = []
+        self.found: list[tuple[AnyMaterial, bool]] = []
 
-    def add(self, material: Material | None, shear: bool = False) -> int | None:
+    def add(self, material: AnyMaterial | None, shear: bool = False) -> int | None:
         """Position of a material (from 0), entered when new."""
         if material is None:
             return None
@@ -120,8 +121,12 @@ def beam_card(s: BeamSection, pid: int, mid: Value, units: Units) -> tuple[str, 
     return "PBEAM", [pid, mid, A, I1, I2, I12, J, nsm, *points, *more]
 
 
-def _material(m: Material, as_shear: bool, id: int, units: Units) -> list[str]:
-    """MAT1, MAT8 or MAT2."""
+def _material(m: AnyMaterial, as_shear: bool, id: int, units: Units) -> list[str]:
+    """MAT1, MAT8, MAT2 or MAT9."""
+    if isinstance(m, AnisotropicSolid):
+        upper = (m.C / units.stress)[np.triu_indices(6)].tolist()
+        more = [m.rho / units.density or None, *[None] * 7, m.damping or None]
+        return card("MAT9", [id, *upper, *more], _EXACT)
     if not isinstance(m, Anisotropic):
         name, *values = material_card(m, id, units)
         return card(str(name), values, _EXACT)
@@ -133,7 +138,7 @@ def _material(m: Material, as_shear: bool, id: int, units: Units) -> list[str]:
     return card("MAT2", [id, *upper, rho, *[None] * 4, m.damping or None], _EXACT)
 
 
-def material_card(m: Material, id: int, units: Units) -> list[Value]:
+def material_card(m: AnyMaterial, id: int, units: Units) -> list[Value]:
     """MAT1 or MAT8 as (name, field, field, ...)."""
     p, rho = units.stress, m.rho / units.density or None
     if isinstance(m, Isotropic):

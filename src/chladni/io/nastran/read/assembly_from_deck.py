@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....errors import FileError
-from ....model.assembly import Assembly
+from ....model.assembly import Assembly, concatenated
 from ....units import Units
 from ..export.whole_deck import is_written_here
 from ..text.deck import Deck
@@ -15,14 +15,16 @@ from .beam_elements import beams
 from .connected import refuse_loose
 from .connectors import CONNECTORS, with_connectors
 from .context import Context, context, parameter, real_parameter
+from .direct_matrices import direct
 from .nonstructural_mass import with_nonstructural
+from .rigid_bushes import tied
 from .rigid_elements import ties
 from .sections import Parts
 from .shell_elements import SHEETS, filled_thickness, shells
 from .solid_elements import SOLIDS, solids
 from .supports import selected, supports
 
-_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D".split()
+_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D CGAP".split()
 _ELEMENTS = (  # those of one kind have no id in common
     (*SHEETS, *SOLIDS, *_STIFF, *CONNECTORS),
     "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),
@@ -73,9 +75,9 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         shells=replace(made_shells, part=at[made_shells.part]),
         solids=tuple(replace(s, part=at[s.part]) for s in made_solids),
         beams=replace(made_beams, part=at[made_beams.part]),
-        springs=springs_and_masses.springs(ctx),
-        dampers=springs_and_masses.dampers(ctx),
-        scalar_masses=springs_and_masses.scalar_masses(ctx),
+        springs=concatenated(springs_and_masses.springs(ctx), direct(ctx, "K2GG")),
+        dampers=concatenated(springs_and_masses.dampers(ctx), direct(ctx, "B2GG")),
+        scalar_masses=concatenated(springs_and_masses.scalar_masses(ctx), direct(ctx, "M2GG")),
         bushes=springs_and_masses.bushes(ctx),
         masses=springs_and_masses.masses(ctx),
         rigid=ties(ctx, selected(deck, "MPC", subcase)),
@@ -87,7 +89,8 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         auto_spc=parameter(deck, "AUTOSPC") != "NO",
         k6rot=_k6rot(deck),
     )
-    return with_connectors(ctx, with_nonstructural(ctx, made, selected(deck, "NSM", subcase)))
+    made = with_nonstructural(ctx, tied(made), selected(deck, "NSM", subcase))
+    return with_connectors(ctx, made)
 
 
 def _k6rot(deck: Deck) -> float | None:

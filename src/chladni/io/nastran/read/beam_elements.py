@@ -84,6 +84,8 @@ def _oriented(ctx: Context, parts: Parts, cards: Cards) -> Beams:
     nodes = ctx.rows(cards, cards.ids(3, 2))
     pid = cards.properties(int(_defaults(ctx, cards, 2) or 0))
     part = parts.of(_FAMILY[cards.name], cards, pid)
+    if cards.name == "CBEAM" and np.any(warps := cards.ids(17, 2, 0).any(axis=1)):
+        raise cards.refuse(int(np.argmax(warps)), "warping (SA, SB) is not supported")
     flags = _flags(ctx, cards)
     up = _up(ctx, cards, nodes, flags)
     offset = _offsets(ctx, cards, nodes, flags, up)

@@ -16,25 +16,24 @@ class Ply:
     angle: float
 
 
-def laminate_section(plies: list[Ply], id: int = 0, lay: str = "") -> ShellSection:
+def laminate_section(plies: list[Ply], id: int = 0, counts: str = "all") -> ShellSection:
     """A stack smeared to equivalent membrane, bending, coupling and shear moduli.
 
     Parameters
     ----------
-    lay : LAM of PCOMP, one of "", SYM, MEM, BEND and SMEAR
+    counts : what of the layers counts: all, membrane, bending, or smeared (their order does not)
     """
     t, membrane, bending, coupling, shear, rho = smear(plies)
-    bent = membrane if lay == "SMEAR" else bending
+    bent = membrane if counts == "smeared" else bending
     coupled = np.abs(coupling).max() > 1e-9 * np.abs(membrane).max()
-    keep = coupled and lay not in ("SMEAR", "MEM", "BEND")
     return ShellSection(
         t,
-        None if lay == "BEND" else Anisotropic(membrane, rho=rho, id=id),
-        None if lay == "MEM" else Anisotropic(bent, rho=rho, id=id),
+        None if counts == "bending" else Anisotropic(membrane, rho=rho, id=id),
+        None if counts == "membrane" else Anisotropic(bent, rho=rho, id=id),
         Anisotropic(np.zeros((3, 3)), shear, id=id),
-        Anisotropic(coupling, id=id) if keep else None,
+        Anisotropic(coupling, id=id) if coupled and counts == "all" else None,
         shear_ratio=1.0,
-        rigid_shear=not np.any(shear),
+        rigid_shear=counts in ("bending", "smeared") or not np.any(shear),
     )
 
 

@@ -1,16 +1,16 @@
-"""Materials: MAT1, MAT2, MAT8 to the model's types, in SI."""
+"""Materials: MAT1, MAT2, MAT8, MAT9 to the model's types, in SI."""
 
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic
+from ....model.properties import Anisotropic, AnisotropicSolid, Isotropic, Material, Orthotropic
 from ....units import Units
 from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context
 
-_OTHER = ("MAT3", "MAT9", "MAT10", "MAT11", "MATHE", "MATHP", "MATORT", "MAT4", "MAT5")
+_OTHER = ("MAT3", "MAT10", "MAT11", "MATHE", "MATHP", "MATORT", "MAT4", "MAT5")
 
 
 class Materials:
@@ -19,8 +19,8 @@ class Materials:
     def __init__(self, ctx: Context) -> None:
         self._scale = ctx.scale
         self._cards: dict[int, tuple[Cards, int]] = {}
-        self._made: dict[int, Material] = {}
-        for name in ("MAT1", "MAT2", "MAT8"):
+        self._made: dict[int, Material | AnisotropicSolid] = {}
+        for name in _MAKERS:
             for cards in ctx.deck.present(name):
                 for i, id in enumerate(cards.unique()):
                     self._claim(int(id), cards, i)
@@ -37,7 +37,7 @@ class Materials:
             raise cards.refuse(i, f"the id is already taken by {other.name} at {other.where(j)}")
         self._cards[id] = (cards, i)
 
-    def get(self, asker: Cards, i: int, id: int) -> Material:
+    def get(self, asker: Cards, i: int, id: int) -> Material | AnisotropicSolid:
         """The material that card i of ``asker`` names."""
         if id not in self._cards:
             if id in self._foreign:
@@ -54,13 +54,19 @@ class Materials:
     def sheet(self, asker: Cards, i: int, id: int) -> Material:
         """A material for shells, whose plane stiffness needs |ν| < 1."""
         found = self.get(asker, i, id)
+        if isinstance(found, AnisotropicSolid):
+            raise asker.refuse(i, f"material {id} is a MAT9, which only solids have")
         if isinstance(found, Isotropic):
             self._refuse_ratio(asker, i, found, 1.0, "shells")
         return found
 
-    def solid(self, asker: Cards, i: int, id: int) -> Isotropic:
-        """A material for solids, which take MAT1 with -1 < ν < 0.5."""
-        found = self.isotropic(asker, i, id)
+    def solid(self, asker: Cards, i: int, id: int) -> Isotropic | AnisotropicSolid:
+        """A material for solids, which take MAT9, and MAT1 with -1 < ν < 0.5."""
+        found = self.get(asker, i, id)
+        if isinstance(found, AnisotropicSolid):
+            return found
+        if not isinstance(found, Isotropic):
+            raise asker.refuse(i, f"material {id} is neither a MAT1 nor a MAT9")
         self._refuse_ratio(asker, i, found, 0.5, "solids")
         return found
 
@@ -186,8 +192,18 @@ def _anisotropic(card: Cards, scale: Units) -> Anisotropic:
     )
 
 
-_MAKERS: dict[str, Callable[[Cards, Units], Material]] = {
+def _solid(card: Cards, scale: Units) -> AnisotropicSolid:
+    """MAT9: MID G11 G12... G16 G22... G66 RHO A1... A6 TREF GE."""
+    C, upper = np.zeros((6, 6)), np.triu_indices(6)
+    C[upper] = C.T[upper] = card.block(2, 21, 0.0)[0] * scale.stress
+    if np.linalg.eigvalsh(C)[0] < -1e-9 * np.abs(C).max():
+        raise card.refuse(0, "its stiffness matrix is not positive")
+    return AnisotropicSolid(C, _density(card, 23, scale), card.real(0, 31, 0.0), card.integer(0, 1))
+
+
+_MAKERS: dict[str, Callable[[Cards, Units], Material | AnisotropicSolid]] = {
     "MAT1": _isotropic,
     "MAT2": _anisotropic,
     "MAT8": _orthotropic,
+    "MAT9": _solid,
 }

@@ -5,11 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....model.properties import BeamSection, Part, Section, ShellSection, SolidSection
+from ....model.properties import (
+    Anisotropic,
+    AnisotropicSolid,
+    BeamSection,
+    Part,
+    Section,
+    ShellSection,
+    SolidSection,
+)
 from ..text.table import Cards
 from . import bar_sections
 from .context import Context
-from .laminate import Ply, laminate_section
+from .laminate import Ply, laminate_section, smear
 from .materials import Materials
 
 Reader = Callable[[Context, Materials, Cards, int], Section]
@@ -127,7 +135,7 @@ def _pshell(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
 
 
 def _plies(ctx: Context, materials: Materials, card: Cards) -> list[Ply]:
-    """Layers of a PCOMP, mirrored where LAM is SYM; blanks repeat the layer below.
+    """Layers of a PCOMP as LAM has them (:data:`_LAM`); blanks repeat the layer below.
 
     A PCOMPG begins each layer with its global number and has one layer a line.
     """
@@ -145,16 +153,31 @@ def _plies(ctx: Context, materials: Materials, card: Cards) -> list[Ply]:
         plies.append(Ply(materials.sheet(card, 0, mid), t * ctx.scale.length, angle))
     if not plies:
         raise card.refuse(0, "the laminate has no layers")
-    return plies + plies[::-1] if fields[7:8] in (["SYM"], ["SYMEM"]) else plies
+    lay = card.word(0, 8)
+    if lay not in _LAM:
+        known = ", ".join(name for name in _LAM if name)
+        raise card.refuse(0, f"LAM {lay!r} is not understood; there are {known}")
+    if lay != "SMCORE":
+        return plies + plies[::-1] if lay.startswith("SY") else plies
+    if not plies[1:]:
+        raise card.refuse(0, "SMCORE needs the layers of its faces and, last, a core")
+    t, membrane, _, _, shear, rho = smear(plies[:-1])
+    face = Ply(Anisotropic(membrane, shear, rho), t / 2, 0.0)
+    return [face, plies[-1], face]
+
+
+# LAM: what of the layers counts (MSC Nastran Quick Reference Guide, PCOMP). SY... mirrors them.
+# SMEAR ignores their order and is rigid in shear. SMCORE halves all others about the last.
+_LAM = {
+    "": "all", "SYM": "all", "MEM": "membrane", "SYMEM": "membrane", "BEND": "bending",
+    "SYBEND": "bending", "SMEAR": "smeared", "SYSMEAR": "smeared", "SMCORE": "all",
+}  # fmt: skip
 
 
 def _pcomp(ctx: Context, materials: Materials, card: Cards, pid: int) -> ShellSection:
     """PCOMP smeared to equivalent membrane, bending, coupling and shear moduli."""
-    lay = card.words(8)[0].decode("latin-1")
-    if lay not in ("", "SYM", "MEM", "BEND", "SMEAR"):
-        raise card.refuse(0, f"LAM {lay!r} is not understood; there are SYM, MEM, BEND, SMEAR")
     return replace(
-        laminate_section(_plies(ctx, materials, card), pid, lay),
+        laminate_section(_plies(ctx, materials, card), pid, _LAM[card.word(0, 8)]),
         nonstructural=float(card.reals(3, 0.0)[0]) * ctx.scale.inertia / ctx.scale.length**2,
         damping=float(card.reals(7, 0.0)[0]),
     )
@@ -169,11 +192,26 @@ def _shift(ctx: Context, card: Cards) -> float:
 
 
 def _psolid(ctx: Context, materials: Materials, card: Cards, _: int) -> SolidSection:
-    """PSOLID; ISOP FULL is plain 2x2x2 integration."""
+    """PSOLID; ISOP FULL is plain 2x2x2 integration, CORDM turns a MAT9."""
     if card.words(7)[0] in (b"PFLUID", b"FFLUID"):
         raise card.refuse(0, "fluid elements are not supported")
     material = materials.solid(card, 0, int(card.integers(2)[0]))
+    if isinstance(material, AnisotropicSolid) and (cid := card.integer(0, 3, 0)):
+        frame = None if cid < 0 else ctx.frames.get(cid, card, 0)
+        if frame is None or frame.kind != "R":
+            what = "the element's own axes" if frame is None else f"system {cid}, which is curved"
+            raise card.refuse(0, f"CORDM {cid}: {what}, is not supported for a MAT9")
+        material = replace(material, C=_turned(material.C, frame.axes))
     return SolidSection(material, bool(card.words(6)[0] in (b"FULL", b"1")))
+
+
+def _turned(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """C (6, 6) in the basic frame of one in axes (3, 3), unit vectors as rows."""
+    place = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # of tensor components
+    tensor = C[place[:, :, None, None], place]
+    tensor = np.einsum("ia,jb,kc,ld,ijkl->abcd", *[axes] * 4, tensor, optimize=True)
+    i, j = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
+    return np.asarray(tensor[i[:, None], j[:, None], i, j])
 
 
 def _pquad1(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSection:

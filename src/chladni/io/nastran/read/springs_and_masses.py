@@ -240,8 +240,12 @@ def _no_scalar(ctx: Context, cards: Cards, node: np.ndarray) -> None:
 
 
 def bushes(ctx: Context) -> Bushes:
-    """CBUSH with PBUSH, CBUSH1D with PBUSH1D, CVISC with PVISC."""
+    """CBUSH with PBUSH, CBUSH1D with PBUSH1D, CVISC with PVISC, CGAP with PGAP.
+
+    The stiffness of a component that is RIGID is infinite, see :func:`.rigid_bushes.tied`.
+    """
     found = [_cbush(ctx, c) for c in ctx.deck.present("CBUSH")]
+    found += [_cgap(ctx, c) for c in ctx.deck.present("CGAP")]
     found += [cbush1d(ctx, c) for c in ctx.deck.present("CBUSH1D")]
     found += [cvisc(ctx, c) for c in ctx.deck.present("CVISC")]
     return concatenated(*(found or [Bushes()]))
@@ -262,18 +266,47 @@ def _pbush(ctx: Context) -> dict[int, dict[str, np.ndarray]]:
                 if key == "M" and card.block(k + 1, 1, 0.0).any():
                     raise card.refuse(0, "a mass M is not supported; write it as a CONM2")
                 if key in ("K", "B", "GE"):
-                    rows[key] = _stiffest(card, k)
+                    rows[key] = _six(card, k)
             if "GE" in rows and np.count_nonzero(rows["GE"]) == 1 and rows["GE"][0]:
                 rows["GE"] = np.full(6, rows["GE"][0])  # GE1 alone stands for all
     return out
 
 
-def _stiffest(card: Cards, k: int) -> np.ndarray:
-    """Six values after a key; RIGID counts as a very stiff spring."""
-    words = [card.words(k + j)[0] for j in range(1, 7)]
-    if b"RIGID" in words:
-        raise card.refuse(0, "RIGID is not supported; give the stiffness as a number")
-    return card.block(k + 1, 6, 0.0)[0]
+def _six(card: Cards, k: int) -> np.ndarray:
+    """Six values after a key, infinite where RIGID."""
+    rigid = [card.word(0, k + j) == "RIGID" for j in range(1, 7)]
+    each = [np.inf if stiff else card.real(0, k + j, 0.0) for j, stiff in enumerate(rigid, 1)]
+    return np.array(each)
+
+
+def _cgap(ctx: Context, cards: Cards) -> Bushes:
+    """CGAP as a linear solution has it: closed KA and KT, open KB, as U0 says at rest.
+
+    EID PID GA GB X1 X2 X3 CID, the fields of a CBUSH; PGAP: PID U0 F0 KA KB KT MU1 MU2. A gap
+    without an initial opening U0 is closed (MSC Nastran Quick Reference Guide, PGAP).
+    """
+    properties, s = ctx.deck["PGAP"], ctx.scale
+    known = {int(p): i for i, p in enumerate(properties.unique())}
+    nodes = np.stack([ctx.rows(cards, cards.integers(k, 0), ground=True) for k in (3, 4)], axis=1)
+    nodes = np.where((nodes[:, 0] < 0)[:, None], nodes[:, ::-1], nodes)
+    K = np.zeros((len(cards), 6))
+    for i, pid in enumerate(cards.properties().tolist()):
+        if pid not in known:
+            there = ", ".join(map(str, sorted(known)[:8])) or "none"
+            raise cards.refuse(i, f"there is no PGAP {pid}; there are {there}")
+        card = properties.single(known[pid])
+        KA = card.real(0, 4, 0.0)
+        K[i, 0] = card.real(0, 5, _OPEN * KA)
+        if card.real(0, 2, 0.0) <= 0:
+            K[i, :3] = KA, *[card.real(0, 6, card.real(0, 7, 0.0) * KA)] * 2
+    axial = K * np.array([1.0, 0, 0, 0, 0, 0])  # across, a gap is as stiff in all directions
+    frame = np.array([_bush_frame(ctx, cards, i, nodes[i], axial[i]) for i in range(len(cards))])
+    place, none = _middle(ctx, nodes, 0.5) * s.length, np.zeros((len(cards), 6))
+    return Bushes(cards.integers(1), nodes, frame, place, K * s.force / s.length, none, none)
+
+
+_BEYOND = 1e60  # stands for an infinite stiffness where the frame of a bush is chosen
+_OPEN = 1e-14  # stiffness of an open gap over that of a closed one
 
 
 def _cbush(ctx: Context, cards: Cards) -> Bushes:
@@ -289,7 +322,10 @@ def _cbush(ctx: Context, cards: Cards) -> Bushes:
     K, B, GE = (
         np.array([known[p].get(key, np.zeros(6)) for p in pid.tolist()]) for key in ("K", "B", "GE")
     )
-    frame = np.array([_bush_frame(ctx, cards, i, nodes[i], K[i] + B[i]) for i in range(len(cards))])
+    if not (np.isfinite(B).all() and np.isfinite(GE).all()):
+        raise cards.refuse(0, "B or GE is RIGID, which only a stiffness K can be")
+    used = np.minimum(K, _BEYOND) + B
+    frame = np.array([_bush_frame(ctx, cards, i, nodes[i], used[i]) for i in range(len(cards))])
     place = _bush_place(ctx, cards, nodes) * s.length
     return Bushes(cards.integers(1), nodes, frame, place, K * work, B * work * s.time, GE)
 
@@ -335,12 +371,17 @@ def _direction(
 
 def _bush_place(ctx: Context, cards: Cards, nodes: np.ndarray) -> np.ndarray:
     """Where the spring sits: at the fraction S from A to B, or at S1-S3 in system OCID."""
-    A = ctx.places[nodes[:, 0]]
-    B = np.where((nodes[:, 1] < 0)[:, None], A, ctx.places[nodes[:, 1]])
     s, ocid = cards.reals(9, 0.5), cards.integers(10, -1)
-    place = A + s[:, None] * (B - A)
+    place = _middle(ctx, nodes, s[:, None])
     for i in np.flatnonzero(ocid >= 0):
         one = cards.single(int(i))
         frame = ctx.frames.get(int(ocid[i]), cards, int(i))
         place[i] = frame.place(one.block(11, 3, 0.0))[0]
     return place
+
+
+def _middle(ctx: Context, nodes: np.ndarray, s: np.ndarray | float) -> np.ndarray:
+    """Places (n, 3) at the fraction s from A to B, at A where B is the ground."""
+    A = ctx.places[nodes[:, 0]]
+    B = np.where((nodes[:, 1] < 0)[:, None], A, ctx.places[nodes[:, 1]])
+    return np.asarray(A + s * (B - A))

@@ -131,6 +131,7 @@ def refuse_unknown(deck: Deck, found: Sequence[Unknown]) -> None:
     )
 
 
+DIRECT = ("K2GG", "B2GG", "M2GG")  # matrices of DMIG that are read
 _MOST = 40  # names in one sentence
 
 
@@ -167,9 +168,10 @@ def _scaled(deck: Deck) -> Iterator[Unknown]:
 
 def _matrices(deck: Deck) -> Iterator[Unknown]:
     chosen = {m for case in deck.case.subcases for m in case.matrices.items()}
-    for name, matrix in sorted(chosen)[:1]:
-        why = f"the case control selects {name} = {matrix}; direct input matrices (DMIG) are not"
-        yield Unknown("DMIG", str(deck.path), f"{why} understood")
+    unread = sorted((name, matrix) for name, matrix in chosen if name not in DIRECT)
+    for name, matrix in unread[:1]:
+        why = f"the case control selects {name} = {matrix}; of direct input matrices (DMIG)"
+        yield Unknown("DMIG", str(deck.path), f"{why} {', '.join(DIRECT)} are understood")
 
 
 def _commands_unknown(deck: Deck) -> Iterator[Unknown]:
