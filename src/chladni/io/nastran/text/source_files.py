@@ -9,7 +9,6 @@ from pathlib import Path
 from ....errors import FileError
 from ....results import ShownBriefly
 from ...file_size import refuse_large, refuse_outside
-from ...mesh_format import refuse_foreign
 
 BOM = b"\xef\xbb\xbf"  # some editors begin a file with it
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
@@ -231,6 +230,8 @@ def _entered(path: Path, above: tuple[Path, ...], prefix: str) -> Path:
 
 def _read(path: Path, prefix: str) -> bytes:
     """The bytes of a text file, or one sentence about why not."""
+    from ...mesh_format import refuse_foreign
+
     if path.is_dir():
         raise FileError(f"{prefix}{path} is a folder, not a deck")
     if path.exists() and not path.is_file():
