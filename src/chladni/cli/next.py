@@ -115,8 +115,7 @@ def _planned(made: PlannedTests) -> None:
         f"{', '.join(question.inputs.labels)}, {low:.4g} to {high:.4g} Hz"
     )
     for t in made.tests:
-        p = float(t.probability[t.names.index(t.name)])
-        say(f"an article with {t.name}: odds of the right name {odds_of(p)}")
+        say(f"an article with {t.name}: odds of the right name {odds_of(t.of_truth)}")
     n = len(made.tests) - len(made.open)
     say(f"the planned test settles {n} of {len(made.tests)} articles at {made.odds:g} : 1")
 
