@@ -150,8 +150,13 @@ _FILES = """\
   move together, and so does everything that is held to ground.
 - Tables are UTF-8, UTF-16 or CP1252, separated by commas, semicolons or tabs. Numbers have a
   decimal point. Where semicolons or tabs separate, they may have a decimal comma.
-- Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (noted,
+- Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (shown,
   never fitted), `state` (the first is compared, or the one `use` names).
+- Modes with shapes (a modal model): dataset 55 of a universal file, OP2 and punch files (`.op2`,
+  `.pch`). As `.csv`, as `identify` writes `shapes.csv`: columns `label`, `mode`, `frequency_hz`,
+  `real`; optional `imag`, `real_sd`, `imag_sd`, `damping`, `frequency_sd_hz`. As `.npz` or `.mat`:
+  arrays `frequency_hz` (r,), `shapes` (n_out, r), `outputs`; optional `damping`, `shapes_sd`,
+  `frequency_sd_hz`.
 - Time data, whose FRFs are estimated as `chladni test` does it. Hits, bursts, multisines, random
   and stepped sine are recognised.
 
@@ -170,13 +175,18 @@ _FILES = """\
   optional `role`, `scale`. A `.wav` needs it.
 - Universal file: FRFs and coherence (58, 58b), nodes (15, 2411), lines (2412, 82), axes of nodes
   (2420), shapes (55), header and units (151, 164). Other datasets are named and not used. Shapes
-  alone give their frequencies as a table of poles; `chladni correlate DECK --modes` compares the
-  shapes.
+  are used where the file has no FRFs.
 
 Several recordings are distinguished by article, level and state, as the files or `[[recording]]`
 say. For one article, level and state, other shaker places are stacked as inputs of one test. Equal
 places are repeats. Repeats and articles give a measured spread, below which no fit has to go;
 levels do not. The first is fitted, the others score the decks.
+
+Shapes may have any scale and sign, real or complex; a complex shape is turned to be as real as it
+can be. Files of one article, level and state are set-ups of one test, as are shapes of one file at
+different nodes. They need channels in common, and are merged by these. The scatter there is the
+standard deviation of the shapes, unless `shape_sd` or the file states one; else it is learned.
+Close modes may mix: between these the subspace counts, and no shape of its own.
 
 From three levels on `identify` and `diagnose` fit elements of friction, play and stretching to each
 mode: cubic spring, gap, slider, micro-slip, drag. From four on they predict levels that are held

@@ -60,7 +60,7 @@ LIBRARIES = {
     "parallel": {"threadpoolctl"},
     "sparse": {"pymetis", "sksparse"},
     "geometry": {"pyvista", "trimesh"},
-    "io": {"meshio", "pandas", "pyyeti", "pyuff", "trimesh", "xarray"},
+    "io": {"mapdl_archive", "meshio", "pandas", "pyyeti", "pyuff", "trimesh", "xarray"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},

@@ -11,7 +11,7 @@ from chladni_planning import best_layout, rattle_margin, shaking
 
 from . import drawing
 from .reset_first import refuse_before_reset
-from .sensor_placement import Reset, Step, of_case, with_notes
+from .sensor_placement import Reset, Step, kept_labels, of_case, with_notes
 from .small_specimens import ModalSpecimen, plate
 
 if TYPE_CHECKING:
@@ -33,6 +33,8 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         Change of -log10 κ, with κ the condition number of the Hankel values (Echaniz Granado 2015,
         table 2), limited to 1e6; at the first step -log10 κ itself. The rewards add up to
         ``info["score"]`` = -log10 κ.
+    Info
+        ``info["labels"]`` names the chosen places.
     End
         Terminated with ``n_actuators`` chosen, truncated after four times as many steps.
 
@@ -145,4 +147,5 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             "score": float(self.score),
             "condition": float(10**-self.score),
             "kept": self.chosen.copy(),
+            "labels": kept_labels(self.specimen.labels, self.chosen),
         }

@@ -114,4 +114,5 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         return np.clip(out, -1.0, 1.0)
 
     def _info(self) -> dict[str, Any]:
-        return {"score": float(np.log10(self.start / self.Q)), "Q": self.Q, "x": self.x.copy()}
+        score = float(np.log10(self.start / self.Q))
+        return {"score": score, "Q": self.Q, "x": self.x.copy(), "labels": self.question.names}

@@ -11,7 +11,7 @@ from chladni_planning import Linearised
 
 from . import drawing
 from .reset_first import refuse_before_reset
-from .sensor_placement import Reset, Step
+from .sensor_placement import Reset, Step, kept_labels
 
 if TYPE_CHECKING:
     from chladni.case import Case
@@ -148,6 +148,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
             "action_mask": self.action_masks().astype(np.int8),
             "score": float(self.score),
             "kept": self.freed.copy(),
+            "labels": kept_labels(self.names, self.freed),
         }
 
 

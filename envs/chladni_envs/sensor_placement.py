@@ -27,6 +27,12 @@ def of_case(case: "Source", modes: int, units: str | None = None) -> ModalSpecim
     return specimen(case, modes, units=units)
 
 
+def kept_labels(labels: tuple[str, ...], kept: np.ndarray) -> tuple[str, ...]:
+    """Labels of the kept candidates; their positions from 0 where candidates have no labels."""
+    at = np.flatnonzero(kept).tolist()
+    return tuple(labels[k] if labels else str(k) for k in at)
+
+
 def with_notes(info: dict[str, Any], notes: tuple[str, ...]) -> dict[str, Any]:
     """Add the sentences on the deck of an environment to the info of a reset."""
     return {**info, "notes": "; ".join(notes)} if notes else info
@@ -47,6 +53,8 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         Change of log det F. The rewards of an episode add up to the score ``info["score"]``: log
         det of the layout less that of the start (all candidates, or the faint prior). Layouts
         compare by ``info["log_det"]``.
+    Info
+        ``info["labels"]`` names the places kept, as ``info["kept"]`` masks them.
     End
         Terminated with ``n_sensors`` kept (or without a legal action); truncated after four times
         the number of steps needed.
@@ -58,6 +66,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     n_sensors : int               by default five for four modes
     moves : "delete" or "add"
     points : (n, 2) or (n, 3)     places [m], for pictures
+    labels : n texts              of the candidates; those of a case are known
     noise, prior, rules : as in :func:`chladni_planning.effective_independence`
     unusable : float              share of candidates that are unusable, drawn at each reset
     case : folder, deck or model  its mesh gives candidates and modes (phi is then None)
@@ -78,6 +87,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         *,
         moves: Literal["delete", "add"] = "delete",
         points: np.ndarray | None = None,
+        labels: tuple[str, ...] = (),
         noise: np.ndarray | None = None,
         prior: np.ndarray | None = None,
         rules: Rules | None = None,
@@ -92,9 +102,12 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         if phi is None:
             specimen = plate() if case is None else of_case(case, modes, units)
             phi, points, self.outline = specimen.phi, specimen.points, specimen.outline
-            self.notes = specimen.notes
+            self.notes, labels = specimen.notes, labels or specimen.labels
+        self.labels = tuple(labels)
         self.candidates = candidates(phi, noise, prior)
         n = len(self.candidates)
+        if self.labels and len(self.labels) != n:
+            raise LabelError(f"{len(self.labels)} labels were given for {n} candidates")
         usual = min(n, -(-5 * self.candidates.unknowns // 4))
         self.n_sensors = usual if n_sensors is None else n_sensors
         if moves not in ("delete", "add"):
@@ -155,4 +168,5 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             "log_det": float(self.walk.log_det),
             "score": float(self.walk.log_det - self.start),
             "kept": self.walk.kept.copy(),
+            "labels": kept_labels(self.labels, self.walk.kept),
         }

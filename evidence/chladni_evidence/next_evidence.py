@@ -102,7 +102,8 @@ def _choice(
 
 
 def courses(
-    deck: Assembly, layout: tuple[MeasuredDofs, ...], band: tuple[float, float], effects: Sequence[str],
+    deck: Assembly, layout: tuple[MeasuredDofs, ...], band: tuple[float, float],
+    effects: Sequence[str],
     articles: int, seed: int, odds: float = ODDS,
 ) -> Iterator[Course | FirstTest]:  # fmt: skip
     """First tests, and for those that are open the course of each agent.

@@ -24,11 +24,12 @@ ALSO = {  # names that are right as well
     "local-resonator": ("rattle",),
     "friction-joint": ("joint-friction", "viscoelastic-joint"),
     "foam": ("viscoelastic-joint", "compliant-support"),
-    "rib": ("stiffness-patch", "thickness-distribution"),
+    "stiffener": ("doubler", "stiffness-patch", "thickness-distribution"),
+    "doubler": ("thickness-distribution",),
 }
 KIN = (  # effects that change the same operator: the right family, if not the right name
     {"thickness-distribution", "orthotropic-material", "stiffness-patch", "crack",
-     "membrane-prestress"},
+     "membrane-prestress", "doubler", "stiffener"},
     {"weld-missing", "weld-compliance", "adhesive-stiffness", "hem-contact", "contact-stiffness",
      "over-constraint", "viscoelastic-joint", "joint-friction", "rattle", "friction-joint"},
     {"point-mass", "mass-patch", "sensor-mass"},

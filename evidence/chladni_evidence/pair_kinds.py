@@ -30,8 +30,8 @@ HEMS = (
 # kinds that are a form of an effect of the catalogue
 CALLED = {
     "hem-stretch": "hem-contact", "weld-run": "weld-missing", "seam": "crack",
-    "doubler": "thickness-distribution", "soft-clamp": "compliant-support",
-    "stretched-sheet": "membrane-prestress",
+    "soft-clamp": "compliant-support", "stretched-sheet": "membrane-prestress",
+    "rib": "stiffener",
 }  # fmt: skip
 
 HIDDEN = {**CATALOGUED, **JOINTS}

@@ -16,7 +16,8 @@ arguments. The command of the same name takes the same road, so that numbers are
 ``modes``, ``frf``, ``plan`` and ``study`` need a model alone, ``identify`` and
 ``evaluate_recordings`` a recording alone. Whatever takes a deck takes its path with ``units=``, a
 loaded model, or an ``Assembly`` in SI. ``load`` gives a model with ``.modes(count)``,
-``.frf(output, input, frequency)``, ``.show(mode)``, ``.variant(t=0.8e-3)`` and ``.write(path)``.
+``.frf(output, input, frequency)``, ``.show(mode)``, ``.variant(t=0.8e-3)``, ``.write(path)`` and
+``.mesh`` for pyvista. It takes models and meshes of other programs as well.
 
 Every result has ``summary()``, ``plot(name)`` and ``save(folder)``, and shows itself in a notebook.
 

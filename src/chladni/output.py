@@ -5,6 +5,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from errno import ENOSPC
 from importlib.metadata import PackageNotFoundError, version
 from itertools import count
@@ -125,7 +126,7 @@ def run_folder(
         If ``out`` is a file, in use, or of another command; if the place cannot be written to; if
         a file is in the way, in which case all results are kept in a folder of their own.
     """
-    out = Path(out)
+    out, inputs = Path(out), tuple(inputs)
     with _made(out), locked(out) as here:
         before = _earlier(here, command)
         for killed in out.glob(f"{_SCRATCH}*"):  # nobody else is at work here
@@ -135,7 +136,7 @@ def run_folder(
             yield part
             stays = before - _files(part) if adds else set()
             if listed:
-                _list(part, command, stays)
+                _list(part, command, stays, next(iter(inputs), None))
             _move(part, here, before - stays, {p.resolve() for p in inputs})
         except OSError as error:
             if error.errno != ENOSPC:
@@ -243,10 +244,11 @@ def _files(part: Path) -> set[str]:
     return {p.relative_to(part).as_posix() for p in part.rglob("*") if p.is_file()}
 
 
-def _list(part: Path, command: str, stays: set[str]) -> None:
+def _list(part: Path, command: str, stays: set[str], source: Path | None) -> None:
     """Write which files are the command's, with those of earlier runs that stay."""
-    files = sorted({*_files(part), *stays, LIST})
-    write_json(part / LIST, {"command": command, "version": own_version(), "files": files})
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    about = {"command": command, "version": own_version(), "written": now, "source": source}
+    write_json(part / LIST, {**about, "files": sorted({*_files(part), *stays, LIST})})
 
 
 def _move(part: Path, here: OwnFolder, before: set[str], inputs: set[Path]) -> None:

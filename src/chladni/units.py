@@ -67,3 +67,22 @@ def units(name: str | Units) -> Units:
     if name not in UNITS:
         raise FileError(f"no unit system {name!r}; there are {', '.join(UNITS)}")
     return UNITS[name]
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number with so many significant digits, whole up to a million.
+
+    >>> number(0.0123456), number(31794.2), number(1940.0, 2), number(None)
+    ('0.01235', '31794', '1940', '–')
+    >>> number(2.755e7), number(-1e-9)
+    ('2.755×10⁷', '-1×10⁻⁹')
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value and digits - 1 < math.log10(abs(value)) < 6:
+        return f"{value:.0f}"
+    mantissa, _, power = f"{value:.{digits}g}".partition("e")
+    return f"{mantissa}×10{str(int(power)).translate(_RAISED)}" if power else mantissa

@@ -20,7 +20,7 @@ from chladni.report.blocks import (
 )
 from chladni.report.mesh_drawings import layout, mesh_of, mode_shapes
 from chladni.report.shown import Shown
-from chladni.report.words import direction, hertz, number, rounded
+from chladni.report.words import direction, fixed, hertz, number, percent, rounded
 from chladni.view import annotations, charts
 from chladni.workflows.loaded_model import Model
 
@@ -37,7 +37,7 @@ from .plan_summary import (
 from .sensor_candidates import FOOT, SensorCandidates
 from .whole_plan import Plan, motion
 
-_FAINT = 12  # modes whose shapes are shown
+_SHOWN = 12  # modes in the picture of shapes
 
 
 def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
@@ -176,9 +176,24 @@ def _sensors(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     return [
         layout("where", placed, "sensors", caption, "the layout"),
         _layout(result),
-        Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
+        Text([_compared(found)]),
         Items(moves or ["All modes were visible, so no sensor was moved."]),
     ]
+
+
+def _compared(found: Plan) -> str:
+    """The layout next to those of other methods, by the errors of the modal coordinates."""
+    last = list(found.log_det)[-1]
+    r = len(found.modal)
+    worse = [
+        f"{name} {percent(float(np.exp((found.log_det[last] - value) / (2 * r))), 1.0)}"
+        for name, value in found.log_det.items()
+        if name != last
+    ]
+    return (
+        "Mean standard deviation of the modal coordinates at equal noise, other layouts relative "
+        f"to this one ({last}): {', '.join(worse)}."
+    )
 
 
 def _layout(result: PlanSummary) -> Table:
@@ -197,7 +212,7 @@ def _layout(result: PlanSummary) -> Table:
 
 
 def _where(at: PlannedPlace) -> tuple[str, str]:
-    return "" if at.grid is None else str(at.grid), ", ".join(f"{x:.3f}" for x in at.point_m)
+    return "" if at.grid is None else str(at.grid), ", ".join(fixed(x, 3) for x in at.point_m)
 
 
 def _marker(at: PlannedPlace, text: str) -> annotations.Marker:
@@ -211,7 +226,6 @@ def _arrow(point: np.ndarray, direction: np.ndarray, text: str) -> annotations.M
 
 
 def _modes(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> list[Block]:
-    shift = found.loaded / found.modal.frequency - 1
     rows = [
         (
             str(m.mode),
@@ -219,7 +233,7 @@ def _modes(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> 
             f"{m.visibility:.2f}",
             "yes" if m.seen else "hardly",
             "yes" if m.seen_by_normals else "no, moves along the sheets",
-            f"{100 * shift[k]:.2f} %",
+            percent(found.loaded[k], m.frequency_hz),
         )
         for k, m in enumerate(result.modes)
     ]
@@ -228,6 +242,8 @@ def _modes(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> 
         rows,
         words=("seen", "seen by normals"),
         caption="Visibility: largest motion at a sensor, relative to the largest anywhere.",
+        opens="shapes",
+        at=range(len(rows)),
     )
     sweep = [(str(n), f"{100 * share:.0f} %") for n, share in found.sweep]
     steps = Table(
@@ -236,17 +252,18 @@ def _modes(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> 
         caption="Share of the sensors that stay when the number of target modes changes from the "
         "row above to this one.",
     )
-    faint = np.sort(np.argsort(found.visible, kind="stable")[:_FAINT])
-    modal, moved = found.modal.sel(faint), motion(built, found.modal.sel(faint))
-    numbers = [found.first + 1 + int(k) for k in faint]
-    what = "the modes that the sensors see least"
-    f = found.modal.frequency
-    auto = charts.mac(f, {"model": (found.auto_mac, f, [])}, "model")
+    f, moved = found.modal.frequency, motion(built, found.modal)
+    numbers = [found.first + 1 + k for k in range(len(f))]
+    auto = charts.mac(f, {"model": (found.auto_mac, f, [])}, "model", "shapes")
+    said = (
+        "AutoMAC at the sensors: similarity of each mode to each other one. High values off the "
+        "diagonal are modes that these sensors cannot distinguish. Click one to see both."
+    )
     return [
         table,
-        *mode_shapes(shown, moved, modal.frequency, numbers, _FAINT, what, "modes"),
-        Drawing("mac", auto, "AutoMAC at the sensors.", {"auto_mac": still(auto)},
-                "AutoMAC at the sensors"),
+        *mode_shapes(shown, moved, f, numbers, _SHOWN, "the target modes", "modes",
+                     {"model|model": found.auto_mac}),
+        Drawing("mac", auto, said, {"auto_mac": still(auto)}, "AutoMAC at the sensors"),
         steps,
     ]  # fmt: skip
 
@@ -268,12 +285,15 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     ]
     s = result.scores
     facts = [
-        ("Observability", f"rank {s.observability_rank} of {s.states}"),
-        ("Quotient of the observability gramian", number(s.gramian_quotient)),
+        ("Seen by the sensors", f"{s.observability_rank} of {s.states} states (rank of the "
+         "observability matrix)"),
+        ("Best and worst seen state", f"{_ratio(s.gramian_quotient)} apart in amplitude (square "
+         "root of the quotient of the observability Gramian)"),
         ("Cords at grids", ", ".join(str(g) for g in result.hangers)),
-    ]
+    ]  # fmt: skip
     caption = (
-        "Condition: greatest over least Hankel singular value, the lower the better. Least "
+        "Condition: best driven mode over the one driven least (Hankel singular values), the lower "
+        "the better. Least "
         "residue: driving-point residue of the mode driven least, relative to the mean. Rattles "
         "from: force at resonance at which two sheets first touch. Allowed: a straight rod "
         f"reaches the place, and nothing rattles at {found.settings.force:g} N."
@@ -289,6 +309,11 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
         layout("shaker", placed, "shaker", what, "shaker and cords", rank),
         table,
     ]
+
+
+def _ratio(quotient: float) -> str:
+    """A factor between amplitudes, of a quotient of energies."""
+    return f"a factor of {number(rounded(quotient**0.5))}"
 
 
 def _rattling(actuator: PlannedActuator) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from chladni.report.words import number
 from chladni.view.chart import Chart, ChartAxis, Column, Mark, Matrix, Note, Panel, Series
-from chladni.view.charts import matrix
+from chladni.view.charts import FREQUENCY, matrix
 
 Measures = Mapping[str, tuple[np.ndarray, np.ndarray | None]]  # values, half of the interval
 MOST = 1000  # samples: a line and words for each
@@ -128,3 +128,17 @@ def over(x: Column, y: Column) -> Panel:
     points = Series("", np.asarray(x.values, float), np.asarray(y.values, float), "points", "after",
                     size=3, opacity=0.6)  # fmt: skip
     return Panel([points], ChartAxis(x.name, x.log), ChartAxis(y.name, y.log), marks=marks)
+
+
+def spread(f: np.ndarray, H: np.ndarray, names: Sequence[str], axis: str) -> Chart:
+    """Magnitudes H (n, lines, c) of samples over frequency [Hz], with their median, by channel."""
+    x = np.tile(np.append(f, np.nan), len(H))
+
+    def panel(values: np.ndarray) -> Panel:
+        every = np.hstack([values, np.full((len(values), 1), np.nan)]).ravel()
+        lines = Series("samples", x, every, tint="soft", width=0.8, opacity=0.5)
+        middle = Series("median", f, np.median(values, axis=0), tint="after", width=1.8)
+        return Panel([lines, middle], FREQUENCY, ChartAxis(axis, log=True))
+
+    views = {name: [panel(H[:, :, k])] for k, name in enumerate(names)}
+    return Chart(views, size=(8.2, 4.2), height=28, choice="channel")

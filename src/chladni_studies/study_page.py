@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from chladni.dynamics.frf import UNIT
 from chladni.output import plain
 from chladni.report.blocks import (
     Block,
@@ -16,17 +17,19 @@ from chladni.report.blocks import (
     Table,
     still,
 )
-from chladni.report.words import number, quantity, unit_text
+from chladni.report.words import display_unit, number, quantity
 from chladni.view.chart import Column
 
 from . import study_charts
 from .parameter_study import ParameterStudy
 from .sensitivity import Sensitivity
+from .study_tables import response_files
 
 _SHOWN = 4  # results drawn over the parameters
 _AXES = 5  # parameters drawn
 _LAW = 0.8  # share of the variance a power law explains where its slopes are drawn
 _LONGEST = 36  # letters of a name on an axis
+_RESPONSES, _CHANNELS = 40, 12  # samples and channels whose responses are drawn
 _LISTED = 12  # failed samples on the page; all are in the table
 READ = (
     'pandas.read_csv("samples.csv")',
@@ -74,6 +77,7 @@ def study_page(found: ParameterStudy) -> PageParts:
         sections += [
             Section("Sensitivities", _sensitivities(found)),
             Section("Results over parameters", _samples(found)),
+            Section("Responses", _responses(found)),
         ]
     if found.failed:
         why_not = [f"sample {k}: {why}" for k, why in found.failed[:_LISTED]]
@@ -111,7 +115,7 @@ def _notes(found: ParameterStudy) -> list[str]:
 
 def _ranges(found: ParameterStudy) -> Block:
     rows = [
-        (v.name, *(quantity(value, v.unit) for value in (v.nominal, v.low, v.high)),
+        (v.name, *(quantity(value, v.unit, v.nominal) for value in (v.nominal, v.low, v.high)),
          "logarithmic" if v.log else "even")
         for v in found.varied
     ]  # fmt: skip
@@ -224,17 +228,38 @@ def _samples(found: ParameterStudy) -> list[Block]:
     return blocks
 
 
+def _responses(found: ParameterStudy) -> list[Block]:
+    """Kept responses of samples spread evenly over the study, channel by channel."""
+    files, _ = response_files(found)
+    some = [files[k] for k in list(files)[:: -(-len(files) // _RESPONSES) or 1]]
+    if not some:
+        return []
+    values = []
+    for path in some:
+        with np.load(path, allow_pickle=False) as held:
+            values.append(np.abs(held["values"]))
+            f, quantity = held["frequency_hz"], str(held["quantity"])
+            names = [f"{o} from {i}" for o in held["outputs"] for i in held["inputs"]]
+    H = np.array(values).reshape(len(values), len(f), -1)[:, :, :_CHANNELS]
+    title = f"|{quantity}| [{UNIT.get(quantity, '')}]"
+    chart = study_charts.spread(f, H, names[:_CHANNELS], title)
+    text = f"{len(some)} of {len(files)} samples (grey), and the median of each line."
+    return [Drawing("frf", chart, text, what="responses of the samples")]
+
+
 def _columns(found: ParameterStudy) -> dict[str, Column]:
-    """Parameters and results by their own names."""
-    units = {v.name: unit_text(v.unit) for v in found.varied}
-    text = {n: f"{_shortened(n)} [{u}]" if u else _shortened(n) for n, u in units.items()}
+    """Parameters and results by their own names, in the units of the table."""
+    units = {v.name: display_unit(v.nominal, v.unit) for v in found.varied}
+    text = {n: f"{_shortened(n)} [{u}]" if u else _shortened(n) for n, (_, u) in units.items()}
     text |= {c: _shortened(label(c)) for c in found.columns}
     nominal = {k: v for k, v in plain(found.nominal).items() if isinstance(v, float)}
     decades = {v.name for v in found.varied if v.log}
+    scale = {n: units[n][0] if n in units else 1.0 for n in text}
     return {
-        n: Column(t, np.asarray(found.column(n), float), n in decades, nominal.get(n, np.nan))
+        n: Column(t, np.asarray(found.column(n), float) / scale[n], n in decades,
+                  nominal.get(n, np.nan) / scale[n])
         for n, t in text.items()
-    }
+    }  # fmt: skip
 
 
 def _shortened(name: str) -> str:

@@ -21,7 +21,7 @@ def write_netcdf(path: Path, found: ParameterStudy) -> list[str]:
     """
     from scipy.io import netcdf_file
 
-    frfs, notes = _responses(found)
+    frfs, notes = response_files(found)
 
     def write(part: Path) -> None:
         with netcdf_file(str(part), "w", version=2) as file:
@@ -89,7 +89,7 @@ def _texts(file: Any, name: str, texts: list[str]) -> None:
     made[:] = rows.view("S1").reshape(rows.shape)
 
 
-def _responses(found: ParameterStudy) -> tuple[dict[int, Path], list[str]]:
+def response_files(found: ParameterStudy) -> tuple[dict[int, Path], list[str]]:
     """Files of the whole responses; no file, and a note, where they are too large together."""
     if found.store is None or not found.settings.keep_frf:
         return {}, []

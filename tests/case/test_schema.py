@@ -55,6 +55,7 @@ mass_sd = 0.002
 gain_sd = 0.01
 direction_sd = 1.0
 position_sd = 0.0015
+shape_sd = 0.02
 hangers = [1, 35]
 [[recording]]
 file = "b.npz"
@@ -110,6 +111,7 @@ OTHER = {  # another accepted value of every word
     ("test", "gain_sd"): "0.02",
     ("test", "direction_sd"): "2.0",
     ("test", "position_sd"): "0.001",
+    ("test", "shape_sd"): "0.03",
     ("test", "hangers"): "[1]",
     ("recording", "file"): '"a.npz"',
     ("recording", "article"): '"C"',

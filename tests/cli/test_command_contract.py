@@ -17,11 +17,22 @@ from chladni_specimens.plates import plate
 from .test_cli import deck_text
 
 WITH_FILE = [c for c in commands() if c not in ("demo", "blind")]  # these two take no file
-CASELESS = ("report", "next", "specimen", "init", "map", "check-effect")  # they take no case
+CASELESS = (  # they take no case
+    "report",
+    "index",
+    "compare",
+    "next",
+    "specimen",
+    "init",
+    "map",
+    "check-effect",
+    "convert",
+)
 COMPARING = ("diagnose", "calibrate", "correlate")  # a recording with the model
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
     "map": ["formed.k"],
+    "compare": ["other"],
 }
 READERS = {  # commands that read a bare deck, and what makes them quick
     "modes": ("--count", "8"),
@@ -58,6 +69,38 @@ def test_a_bad_file_is_refused(tmp_path, monkeypatch, command):
         assert " runs" not in sentence  # a folder that went again is not recommended
         ran(*words, code=2)
     assert {p.name for p in tmp_path.iterdir()} == {n for n, c in BAD.items() if c is not None}
+
+
+FOREIGN = {  # first lines of files of other programs
+    "a.inp": ("*HEADING\n*NODE\n1, 0., 0.\n", "an Abaqus input file"),
+    "a.cdb": ("/COM,ANSYS\n/PREP7\n", "an Ansys archive"),
+    "a.k": ("$ made by hand\n*KEYWORD\n*NODE\n", "an LS-DYNA keyword file"),
+    "a.msh": ("$MeshFormat\n4.1 0 8\n", "a Gmsh mesh"),
+    "a.vtk": ("# vtk DataFile Version 3.0\n", "a VTK file"),
+    "a.vtu": ('<?xml version="1.0"?>\n<VTKFile type="x">\n', "a VTK file"),
+    "a.stl": ("solid a\nfacet normal 0 0 1\n", "an STL file"),
+    "b.stl": ("\0" * 90, "an STL file"),
+    "a.unv": ("    -1\n  2411\n", "a universal file"),
+    "a.med": ("\x89HDF\n", "a MED mesh"),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_model_of_another_program_names_the_command(tmp_path, name):
+    """Each command says the same sentence; a deck with any of these names is still a deck."""
+    text, what = FOREIGN[name]
+    path = tmp_path / name
+    path.write_text(text)
+    made = f"`chladni convert {path} --out {path.stem}.bdf` makes a deck of it"
+    due = f"{path} is {what}, not a Nastran deck; {made}"
+    for command in (*READERS, "map", "init", "check", "diagnose", "correlate"):
+        words = (command, path, *NEEDED.get(command, []), "--out", tmp_path / "out")
+        assert due in " ".join(refused(*words).split())
+        if name != "a.inp":
+            break
+    if path.suffix in (".inp", ".k"):
+        path.write_text(deck_text())
+        assert ran("modes", path, "--count", "8", "--out", tmp_path / "out")
 
 
 @pytest.mark.parametrize("fault", BAD_DECKS)

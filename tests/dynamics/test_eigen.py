@@ -223,3 +223,20 @@ def test_what_does_not_converge_names_the_mass_out_of_proportion(shell_box, monk
     other = replace(shell_box, M=sp.csr_array(M))
     says(said, normal_modes, other, 8, error=AccuracyError)
     says("nearer to the modes", normal_modes, shell_box, 8, shift=-1e3, error=AccuracyError)
+
+
+def test_the_shift_of_the_last_try_is_that_of_its_factor(monkeypatch):
+    """Two tries with poor shifts: the modes are those of the shift that was factorised last."""
+    made = []
+
+    def poor_at_first(solve, M, k, **more):
+        ritz = block_lanczos(solve, M, k, **more)
+        made.append(ritz)
+        return ritz if len(made) > 1 else replace(ritz, error=np.ones_like(ritz.error))
+
+    monkeypatch.setattr(eigen, "block_lanczos", poor_at_first)
+    monkeypatch.setattr(eigen, "_NEAR", 0.5)  # no shift is near enough
+    modal = normal_modes(line(900), 12, proof=False)
+    assert len(made) == 2
+    due = line_frequency(900, np.arange(12))
+    np.testing.assert_allclose(modal.frequency[1:], due[1:], rtol=1e-7)

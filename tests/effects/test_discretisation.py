@@ -68,6 +68,7 @@ def test_the_softest_mode_of_a_row_of_bars_goes_to_its_limit(tmp_path):
         return abs(np.sqrt(np.linalg.eigvalsh(K)[0]) / (2 * np.pi) / due - 1)
 
     assert away(LIMIT) < 0.1 * away(0.0)
+    assert abs(error.limit[0] / due - 1) == away(LIMIT)
     assert away(2.0) < away(0.0)
 
 

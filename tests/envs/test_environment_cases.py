@@ -87,6 +87,20 @@ def test_contracts_with_a_case(ready, case, id):
     assert env.render().shape[2] == 3
 
 
+def test_info_names_what_is_kept(ready, case):
+    """Labels of the mesh for places, names for parameters; the mask says the same."""
+    known = cases.specimen(case, 8).labels
+    env = gym.make("chladni/SensorPlacement-v0", case=case, modes=8, n_sensors=9)
+    end = agents.play(env, agents.greedy)
+    assert end["labels"] == tuple(known[k] for k in np.flatnonzero(end["kept"]))
+    assert all(":" in label for label in end["labels"])
+    env = gym.make("chladni/ParameterSelection-v0", case=case)
+    end = agents.play(env, agents.at_random(0))
+    assert set(end["labels"]) <= set(ready.names)
+    env = gym.make("chladni/SensorPlacement-v0", phi=np.eye(5)[:, :2], n_sensors=3)
+    assert len(env.reset(seed=0)[1]["labels"]) == 5
+
+
 def test_vectors_with_a_case_are_identical(case):
     id, options = "chladni/SensorPlacement-v0", {"case": case, "modes": 8}
     assert_array_equal(story("sync", 5, id, **options), story("async", 5, id, **options))
@@ -219,3 +233,25 @@ def test_effects_need_a_case():
     env = gym.make("chladni_envs:chladni/ParameterSelection-v0").unwrapped
     with pytest.raises(ShapeError, match="effects=True"):
         env.gain(np.zeros(env.p, bool))
+
+
+MESH = """import chladni, gymnasium
+env = gymnasium.make("chladni_envs:{}", case={})"""
+WITH_MODEL = 'chladni.load(mesh, "SI", parts=["steel"])'
+WITH_CASE = f"chladni.make_case({WITH_MODEL}.deck, recording, words=dict(units='SI'))"
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_a_converted_mesh_is_in_every_environment_in_two_lines(id):
+    """A mesh with thickness alone, with a recording of it where the environment needs one."""
+    import meshio
+
+    made = folded_panel()
+    t = [np.full(len(made.shells), 1e-3)]
+    cells = [("quad", made.shells.nodes)]
+    mesh = meshio.Mesh(made.points, cells, cell_data={"thickness": t})
+    names = {"mesh": mesh, "recording": _recorded(made)}
+    exec(MESH.format(id, WITH_MODEL if "Placement" in id else WITH_CASE), names)
+    env = names["env"]
+    env.reset(seed=0)
+    assert env.step(env.action_space.sample())[1] is not None

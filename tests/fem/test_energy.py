@@ -7,8 +7,15 @@ import pytest
 from tests.builders.elements import CUBE, bars
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.fem.assemble import structure
-from chladni.fem.energy import mass_properties, part_energies, shell_energies
+from chladni.fem.assemble import over_all_motions, structure
+from chladni.fem.energy import (
+    effective_masses,
+    kinetic_energies,
+    mass_properties,
+    part_energies,
+    rigid_motions,
+    shell_energies,
+)
 from chladni.model.assembly import Assembly, Masses, Solids
 from chladni.model.properties import BeamSection, Part, SolidSection
 from chladni_specimens.plates import STEEL, folded_panel, plate
@@ -69,3 +76,29 @@ def test_bricks_and_beams_hold_all_the_energy():
     np.testing.assert_allclose(share.sum(axis=0), 1, rtol=1e-8)
     assert (share > 0).all()
     assert share[0, 0] > share[1, 0]  # the first mode bends the block at its foot
+
+
+def test_effective_masses_add_up_to_what_moves():
+    """Σ_r (φᵀMR)² = Rᵀ M R of what no support holds; a point mass is in no part."""
+    built = structure(block_with_a_mast())
+    every = normal_modes(built.system, len(built.system.dofs)).shapes
+    about = np.array([0.3, -0.2, 1.0])
+    found = effective_masses(built, every, about)
+    R = rigid_motions(replace(built.assembly, points=built.assembly.points - about))
+    M = over_all_motions(built.assembly)[0]
+    loads = built.T.T @ (M @ R)
+    inner = loads.T @ np.linalg.pinv(built.system.M.toarray(), hermitian=True) @ loads
+    np.testing.assert_allclose(found.sum(axis=1), np.diag(inner), rtol=1e-8)
+    share = kinetic_energies(built, every[:, :4])
+    assert ((share.sum(axis=0) > 0) & (share.sum(axis=0) < 1)).all()
+
+
+def test_a_free_structure_moves_as_a_whole():
+    """Rigid modes alone carry all of the mass, and the inertia about the centre."""
+    free = folded_panel()
+    built = structure(free)
+    m, c = mass_properties(free)
+    modal = normal_modes(built.system, 12)
+    found = effective_masses(built, modal.shapes, c)
+    np.testing.assert_allclose(found[:3, :6].sum(axis=1), m, rtol=1e-6)
+    assert found[:, 6:].max() < 1e-6 * m

@@ -13,7 +13,7 @@ from tests.builders.refusals import says
 
 import chladni
 from chladni.dynamics.frf import FRF
-from chladni.ema.setup import PoleTable
+from chladni.ema.setup import PoleTable, Recording
 from chladni.io.tables.csv_table import escaped, unescaped
 from chladni.io.tables.read_tables import read_poles, read_recordings
 from chladni.io.tables.sensor_table import read_sensors
@@ -222,5 +222,27 @@ def test_the_quantity_must_be_known(tmp_path, H):
     write_csv(tmp_path / "a.csv", replace(H, variance=None))
     said = "does not say its quantity: one of receptance"
     says(said, read_recordings, tmp_path / "a.csv")
-    said = r"end in .uff, .unv, .npz, .csv, .mat or .wav, not '.txt'"
+    said = r"end in .uff, .unv, .npz, .csv, .mat, .wav, .op2 or .pch, not '.txt'"
     says(said, read_recordings, tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize(
+    ("word", "quantity"),
+    [
+        ("apparent-mass", "accelerance"),
+        ("impedance", "mobility"),
+        ("dynamic-stiffness", "receptance"),
+    ],
+)
+def test_force_over_motion_is_turned_round(tmp_path, H, word, quantity):
+    """H = 1/Z and, to first order, var H = var Z / |Z|⁴; of a file and of what is in memory."""
+    write_csv(tmp_path / "a.csv", H)
+    (read,) = read_recordings(tmp_path / "a.csv", word)
+    frf = read.frf
+    assert frf.quantity == quantity
+    np.testing.assert_allclose(frf.values, 1 / H.values, rtol=1e-9)
+    np.testing.assert_allclose(frf.variance, H.variance / np.abs(H.values) ** 4, rtol=1e-9)
+    (held,) = [Recording("a", frf=H).reciprocal(word)]
+    np.testing.assert_allclose(held.frf.values, 1 / H.values)
+    zero = replace(H, values=np.where(np.arange(20)[:, None, None] == 3, 0, H.values))
+    says("has no reciprocal", Recording("a", frf=zero).reciprocal, word)

@@ -104,6 +104,27 @@ def test_units_become_si(tmp_path, head, ordinate, label, below, factor, quantit
     assert frf.quantity == quantity
 
 
+@pytest.mark.parametrize(
+    ("labels", "factor", "quantity"),
+    [
+        (("N", "m/s^2"), 1.0, "accelerance"),
+        (("lbf", "g"), 4.4482216152605 / 9.80665, "accelerance"),
+        (("N", "mm/s"), 1e3, "mobility"),
+        (("NONE", "NONE"), 1.0, "receptance"),
+    ],
+)
+def test_force_over_motion_is_turned_round(tmp_path, labels, factor, quantity):
+    """The motion becomes the output, wherever the file has it, and units go with their ends."""
+    kind = {"accelerance": 12, "mobility": 11, "receptance": 8}[quantity]
+    fields = dict(ordinate_spec_data_type=13, orddenom_spec_data_type=kind)
+    named = dict(zip(("ordinate_axis_units_lab", "orddenom_axis_units_lab"), labels, strict=True))
+    path = foreign(tmp_path / "a.uff", units(1), record(**fields, **named))
+    for asked in (None, {12: "apparent-mass", 11: "impedance", 8: "dynamic-stiffness"}[kind]):
+        frf = read_uff(path, asked).frf
+        assert (frf.outputs, frf.inputs, frf.quantity) == (("2:+Z",), ("1:+Z",), quantity)
+        np.testing.assert_allclose(frf.values[:, 0, 0], 1 / (factor * record()["data"]))
+
+
 @given(st.sampled_from(["m", "mm", "in"]), st.sampled_from(["", "/s", "/s2", "/s^2", "/s**2"]))
 def test_labels_of_units(length, rate):
     """Brackets, blanks and the way the square is written make no difference."""

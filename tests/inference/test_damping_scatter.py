@@ -53,7 +53,7 @@ def test_a_few_modes_damped_ten_times_are_said_with_their_frequencies():
     found = _evenly_damped(FITS, damped(ratio))
     assert not found.passes
     assert "2 of 14 modes" in found.what
-    assert "6.4% to 8.2%" in found.what
+    assert "6.4 % to 8.2 %" in found.what
     assert "50.77, 71.54 Hz" in found.where
     assert found.statistics[-1].value > found.statistics[-1].high
 

@@ -47,6 +47,7 @@ class Catalogue:
     f_max: float
 
     scan = None
+    tells_places = False
     labels: tuple[str, ...] = ("1:+Z",)
     weighs_more = 0.0
 

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.frf import FRF
-from chladni.report import frf_charts
-from chladni.report.blocks import Drawing, Section, still, write_pictures
+from chladni.effects.estimate import Location
+from chladni.report import frf_charts, live_mesh
+from chladni.report.blocks import Drawing, Section, Table, still, write_pictures
 from chladni.report.drawings import drawings_of
 from chladni.report.frf_charts import responses, thinned
-from chladni.report.live_mesh import rounded
+from chladni.report.live_mesh import ModeSet, rounded, shapes, spots
 from chladni.report.page import write_sections
+from chladni.report.shown import Shown
 from chladni.view import charts
 from chladni.view.chart_page import page
+from chladni.view.surface import Surface
 
 STEPS = charts.steps({"fitted": {"nominal": 1.0, "after": 0.5}})
 
@@ -143,3 +146,61 @@ def test_what_is_not_fitted_is_grey():
     grey = responses(both, [(20.0, 80.0), (100.0, 300.0)], [(30.0, 35.0)])[0].panels[0].grey
     assert grey == [(10.0, 20.0), (80.0, 100.0), (30.0, 35.0)]
     assert responses(both, (), [(5.0, 15.0)])[0].panels[0].grey == [(10.0, 15.0)]
+
+
+@pytest.fixture
+def plate():
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    return Shown(Surface.of(square, np.array([[0, 1, 2, 3]])))
+
+
+def modes_of(f, **more):
+    return ModeSet(np.array(f), np.ones((4, 3, len(f))) * np.arange(1, len(f) + 1), **more)
+
+
+def test_modes_of_every_side_are_kept_with_those_that_belong_together(plate):
+    """Every mode over its largest motion; a mode without a partner, and a row without any mode."""
+    sensors = np.array([[1.0, 2.0, -4.0]])
+    sides = {
+        "test": ModeSet(np.array([10.0, 20.0, 30.0]), sensors=sensors, damping=[0.01, None, 0.02]),
+        "model": modes_of([11.0, 21.0], numbers=[7, 8]),
+    }
+    held = shapes(sides, [[0, 0], [1, None], [None, None]], plate, mac={"test|model": np.eye(3, 2)})
+    assert held["rows"] == [[0, 0], [1, None]]
+    assert [m["motion"] for m in held["sides"]["test"]] == [[1000], [1000], [-1000]]
+    assert [m["number"] for m in held["sides"]["model"]] == [7, 8]
+    whole = np.array(held["sides"]["model"][1]["motion"])
+    assert whole.shape == (3, 4)
+    np.testing.assert_allclose(np.linalg.norm(whole, axis=0), 1000, atol=1)
+    assert held["mac"] == {"test|model": [[1, 0], [0, 1], [0, 0]]}
+
+
+def test_a_page_has_room_for_so_many_modes(plate, monkeypatch):
+    """The highest are left out, and no row refers to them."""
+    monkeypatch.setattr(live_mesh, "_SHAPE_VALUES", 24)
+    held = shapes({"model": modes_of([1.0, 2.0, 3.0])}, [[0], [1], [2]], plate)
+    assert len(held["sides"]["model"]) == 2
+    assert held["rows"] == [[0], [1]]
+
+
+def test_rows_of_a_table_name_what_they_open(tmp_path):
+    table = Table(("mode",), [("1",), ("2",), ("3",)], opens="shapes", at=[0, None])
+    text = write_sections(tmp_path / "p.html", "t", [Section("s", [table])]).read_text()
+    body = text[text.index("<tbody>") : text.index("</tbody>")]
+    assert body.count("data-opens") == 1
+    assert 'data-opens="shapes" data-at="0"' in body
+
+
+def test_a_folded_section_is_closed_until_it_is_opened_or_printed(tmp_path):
+    section = Section("The recording", [Table(("a",), [("1",)])], folded="3 checks")
+    text = write_sections(tmp_path / "p.html", "t", [section]).read_text()
+    assert "<details><summary>The recording: 3 checks</summary>" in text
+
+
+def test_places_that_the_data_cannot_distinguish_are_drawn_and_named(plate):
+    """Rank 1, next to the finding; a place without any number is left out."""
+    found = spots([("point-mass", "at 7", Location(point_m=(0.0, 0.0, 0.0)), 0),
+                   ("crack", "on a", Location(parts=("a",)), 1),
+                   ("suspension", "", Location(channels=("9:+Z",)), 1)],
+                  replace(plate, parts=["a"]))  # fmt: skip
+    assert [(s["name"], s["rank"]) for s in found] == [("point-mass", 0), ("crack", 1)]

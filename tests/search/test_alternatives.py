@@ -64,7 +64,7 @@ def test_a_lump_tuned_above_the_highest_line_is_a_point_mass():
     assert LocalResonator.remarks(effect, [0, 0, 0, 299.0]).becomes == ""
 
 
-RUBS = "1 of 5 modes have a damping of 2.0%"
+RUBS = "1 of 5 modes have a damping of 2.0 %"
 
 
 @pytest.mark.parametrize(
@@ -105,8 +105,8 @@ def test_a_leader_that_is_refused_is_told_with_what_refused_it():
 @pytest.mark.parametrize(
     ("verdict", "weighed", "said"),
     [
-        ("calibration only", 6.0, "5.3% more"),
-        ("nothing missing", 5.4, "5.3% less"),
+        ("calibration only", 6.0, "5.3 % more"),
+        ("nothing missing", 5.4, "5.3 % less"),
         ("calibration only", 5.75, ""),
         ("calibration only", None, ""),
         ("missing physics", 6.0, ""),

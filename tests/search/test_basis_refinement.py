@@ -60,7 +60,7 @@ def test_is_fitted_again_only_beyond_the_limit(errors, error, model):
     errors(error, error, error, error)
     done = basis_refinement.refined(None, PREPARED, NARROW)
     assert done.hypothesis.model == model
-    assert f"{error:.2%}" in done.note
+    assert f"{100 * error:.2f} %" in done.note
     assert bool(done.distrust) == (model == "wide")
 
 

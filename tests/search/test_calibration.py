@@ -167,7 +167,7 @@ def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
     *reasons, stands = compensating(calibrated_plate(reduced, x), result, SCALES)
     assert len(reasons) == 1
     assert said in reasons[0]
-    assert f"plate {np.expm1(x):.1%} stiffer" in stands
+    assert f"plate {100 * np.expm1(x):.1f} % stiffer" in stands
     assert "largest on top" in stands
 
 

@@ -50,6 +50,27 @@ def test_every_backend_solves_the_same(backend):
     assert factor.nnz >= sp.tril(A).nnz
 
 
+@pytest.mark.parametrize("backend", ["multifrontal", "superlu"])
+def test_flexibility_between_few_loads_is_that_of_the_solution(backend):
+    """Bᵀ A⁻¹ B, with fronts left out that no load reaches."""
+    A, nodes = grid(23, 19)
+    factor = factorise(A, nodes=nodes, backend=backend)
+    for at in ([3, 4, 5], [0, 150, 151, A.shape[0] - 1], []):
+        B = sp.csr_array(sp.eye_array(A.shape[0], format="csr")[:, at])
+        B = sp.csr_array(B @ (np.eye(len(at)) + 0.5)) if at else B
+        due = B.T @ np.linalg.solve(A.toarray(), B.toarray())
+        np.testing.assert_allclose(factor.between(B), due, rtol=1e-9)
+
+
+def test_flexibility_of_an_indefinite_matrix_is_that_of_the_solution():
+    A, nodes = grid(9, 8)
+    A = sp.csr_array(A - 2.0 * sp.eye_array(A.shape[0]))
+    factor = factorise(A, nodes=nodes, definite=False)
+    B = sp.csr_array(sp.eye_array(A.shape[0], format="csr")[:, [5, 40]])
+    due = np.linalg.inv(A.toarray())[np.ix_([5, 40], [5, 40])]
+    np.testing.assert_allclose(factor.between(B), due, rtol=1e-8)
+
+
 @given(st.integers(0, 10**6), st.integers(0, 3), st.integers(1, 4), st.booleans())
 @settings(max_examples=40, deadline=None)
 def test_any_pattern_any_order(seed, hubs, groups, metis):

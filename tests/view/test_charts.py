@@ -127,6 +127,11 @@ CHARTS = {  # name: the chart, and words that must stand on it
             ["a", "b", EVIL], "index"), ("index", "first", "total"),
     ),
     "parallel": (lambda: study_charts.parallel(TABLE, SAID, 1), ("t [m]", "one", "200")),
+    "spread": (
+        lambda: study_charts.spread(F, np.abs(H)[None, :, None] * R[:, None, None], ["1:+Z"],
+                                    "|accelerance|"),
+        ("|accelerance|", "frequency [Hz]", "samples", "median"),
+    ),
     "cloud": (lambda: study_charts.cloud(TABLE, SAID, 0, 1), ("t [m]",)),
     "grid": (lambda: study_charts.results_over_parameters(TABLE[:1], TABLE[1:]), ("t [m]", "one")),
 }  # fmt: skip
@@ -338,3 +343,17 @@ def test_a_large_study_is_cut_and_a_failed_sample_is_a_gap():
     (panel,) = study_charts.parallel(table, study_charts.samples(table), 0).panels
     lines = {int(n) for s in panel.series if s.sample is not None for n in s.sample if n >= 0}
     assert lines == set(range(study_charts.MOST)) - {1}
+
+
+def test_scores_are_seen_over_decades_and_a_zero_at_the_edge():
+    """A Q of zero and one of 1e-4 have their place; words say the value and the change."""
+    both = charts.steps({"fitted": {"a": 1.0, "b": 1e-4}, "held out": {"a": 0.5, "b": 0.0}})
+    (panel,) = both.panels
+    low, high = panel.y.limits
+    assert panel.y.log
+    every = np.concatenate([s.y for s in panel.series])
+    assert low <= every.min()
+    assert every.max() < high
+    assert [n.text for n in panel.notes] == ["1", "0.0001 (-100 %)", "0.5", "0 (-100 %)"]
+    placed = page(both)["layout"]["annotations"]
+    np.testing.assert_allclose([n["y"] for n in placed], np.log10([n.y for n in panel.notes]))

@@ -79,7 +79,7 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
                  "quantity": "accelerance", "factor": 1.0, "delay": 0.0,
                  "frequency_unit": "Hz", "conjugated": False, "sensors": "sensors.csv",
                  "mass": 1.9, "mass_sd": 0.1, "gain_sd": 0.02, "direction_sd": 2.0,
-                 "position_sd": 0.002, "hangers": [1, 620]},
+                 "position_sd": 0.002, "shape_sd": 0.03, "hangers": [1, 620]},
         "band": {"fit": [15.0, 110.0], "exclude": [[50.0, 51.0]]},
         "held_out": {"sensors": ["240:+Y"], "band": [110.0, 119.0]},
         "search": {"effects": ["point-mass"]},
@@ -98,7 +98,15 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
     made = bench(case, tmp_path / "o", "--band", "12:120")
     refined = {(s, k) for s, all in RENEWED.items() for k in all}
     assert {w for w in before.given if w not in refined} <= set(made.given)
-    for name in ("damping", "band", "held_sensors", "held_band", "parameters", "gain_known"):
+    for name in (
+        "damping",
+        "band",
+        "held_sensors",
+        "held_band",
+        "parameters",
+        "gain_known",
+        "shape_sd",
+    ):
         assert getattr(made, name) == getattr(before, name), name
     assert made.setup.accuracy == before.setup.accuracy
     assert made.setup.hangers == before.setup.hangers

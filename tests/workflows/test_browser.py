@@ -1,6 +1,7 @@
 """The page in a real Chromium, over the WebDriver protocol (W3C): the standard library will do."""
 
 import json
+import re
 import shutil
 import socket
 import subprocess
@@ -13,6 +14,7 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
+from tests.builders.cases import changed_case
 from tests.builders.commands import ran
 from tests.builders.quick_runs import coarse_pictures
 
@@ -253,6 +255,173 @@ def test_a_matrix_says_its_numbers_where_one_points(page):
     assert "MAC" in page.until(tip, "mac")
 
 
+TITLES = PLOT + "return plot.layout.annotations.map((a) => a.text)"
+
+
+def click(page, name, x, y):
+    """Press at values of the axes of a chart."""
+    at = (
+        PLOT
+        + """const b = plot.getBoundingClientRect(), { xaxis, yaxis } = plot._fullLayout;
+      return [b.x + xaxis._offset + xaxis.l2p(arguments[1]),
+        b.y + yaxis._offset + yaxis.l2p(arguments[2])]"""
+    )
+    place = page.run(at, name, x, y)
+    page.pointer(("pointerMove", *place), ("pointerDown",), ("pointerUp",))
+
+
+def press(page, name, word):
+    """Press the button of a drawing with a word."""
+    script = """const all = document.querySelectorAll(`[data-name='${arguments[0]}'] button`);
+      [...all].find((b) => b.textContent == arguments[1]).click()"""
+    page.run(script, name, word)
+
+
+def test_a_square_of_the_matrix_opens_its_pair_of_modes(page, diagnosed):
+    """The second mode of the test next to the first of the given deck, which is no pair."""
+    see(page, "shapes")
+    see(page, "mac")
+    click(page, "mac", 0, 1)
+    f = diagnosed.models.test.frequency[1]
+    _, right = page.until(TITLES + f".filter((t, k, a) => a[0].includes('{f:.2f} Hz'))", "shapes")
+    value = page.run(PLOT + "return plot.data[0].z[1][0]", "mac")
+    assert "deck before" in right
+    assert f"MAC {value / 100:.3f}"[:8] in right
+    assert (
+        page.run(PLOT + "return plot.closest('.live').querySelector('select').value", "shapes")
+        == ""
+    )
+
+
+def test_a_row_of_frequencies_opens_its_pair_of_modes(page, diagnosed):
+    row = "[...document.querySelectorAll('tr[data-opens=shapes]')][2]"
+    page.run(f"{row}.click()")
+    f = diagnosed.frequencies[2].test_hz
+    page.until(
+        TITLES.replace("return ", "return plot.layout && ") + f"[0].includes('{f:.2f} Hz')",
+        "shapes",
+    )
+
+
+def test_a_sensor_opens_its_channel_and_faults_that_are_none_are_folded(window, folder, tmp_path):
+    """The page of a correlation begins with matrix and shapes; paper shows what is folded."""
+    ran("correlate", folder, "--out", tmp_path / "out")
+    window.size(1440, 900)
+    window.open(tmp_path / "out" / "report.html")
+    assert window.run(DRAWN)[:2] == ["mac", "shapes"]
+    for name in ("mac", "shapes"):
+        window.until(READY, name)
+        top = window.run(PLOT + "return plot.getBoundingClientRect().y", name)
+        assert top < 500
+    label = window.run("""const row = document.querySelectorAll("tr[data-opens=frf]")[1];
+      row.click(); return row.cells[0].textContent""")
+    chosen = PLOT + "return plot.closest('.live').querySelector('select')?.selectedOptions[0].text"
+    window.until(READY, "frf")
+    window.until(chosen + ".startsWith(arguments[1])", "frf", f"{label} from ")
+    folded = "return [...document.querySelectorAll('details')].map((d) => d.open)"
+    assert window.run(folded) == [False]
+    window.pdf()
+    assert window.run(folded) == [True]
+    assert not window.complaints()
+
+
+def test_the_page_scrolls_unless_the_drawing_has_focus(page):
+    see(page, "where")
+    x, y = centre(page, "where")
+    where = PLOT + "return [scrollY, plot.view.zoom]"
+    before, zoom = page.run(where, "where")
+    turn = {"type": "scroll", "x": round(x), "y": round(y), "deltaX": 0, "deltaY": 60}
+    wheel = {"actions": [{"type": "wheel", "id": "wheel", "actions": [turn]}]}
+    page.call("POST", "/actions", wheel)
+    page.until(where + "[0] > arguments[1]", "where", before)
+    assert page.run(where, "where")[1] == zoom
+    see(page, "where")
+    page.pointer(("pointerMove", *centre(page, "where")), ("pointerDown",), ("pointerUp",))
+    still = page.run(where, "where")[0]
+    page.call("POST", "/actions", wheel)
+    page.until(where + "[1] != arguments[1]", "where", zoom)
+    assert page.run(where, "where")[0] == still
+
+
+# half the width and height that the structure takes, over those of the picture without its foot
+TAKEN = """
+    const { scene, _size } = plot._fullLayout, { eye, up } = scene.camera;
+    const axes = ["x", "y", "z"], unit = (v) => v.map((c) => c / Math.hypot(...v));
+    const e = unit(axes.map((k) => eye[k])), u = axes.map((k) => up[k]);
+    const turn = (a, b, k) => a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    const cross = (a, b) => [0, 1, 2].map((k) => turn(a, b, k));
+    const right = unit(cross(u, e)), above = cross(e, right);
+    const mesh = plot.data.find((t) => t.type == "mesh3d");
+    const ends = axes.map((k) => scene[k + "axis"].range);
+    const size = axes.map((k, n) => scene.aspectratio[k] / (ends[n][1] - ends[n][0]));
+    const at = (n) => axes.map((k, a) => size[a] * (mesh[k][n] - (ends[a][0] + ends[a][1]) / 2));
+    const along = (d, v) => Math.abs(d[0] * v[0] + d[1] * v[1] + d[2] * v[2]);
+    const most = (d) => Math.max(...Array.from(mesh.x, (_, n) => along(d, at(n))));
+    return [most(right) / (_size.w / _size.h), most(above)];"""
+
+
+def test_a_structure_that_turns_stays_within_its_picture(page):
+    see(page, "where")
+    for views in ("start", "behind", "X", "Y", "Z", "drag"):
+        if views == "drag":
+            x, y = centre(page, "where")
+            page.pointer(
+                ("pointerMove", x, y),
+                ("pointerDown",),
+                ("pointerMove", x + 60, y + 130),
+                ("pointerUp",),
+            )
+            page.until(PLOT + "return plot.view.eye[2] < 0.99", "where")
+        else:
+            press(page, "where", views)
+        taken = page.run(PLOT + TAKEN, "where")
+        assert 0.5 < max(taken) < 1
+    press(page, "where", "Y")
+    assert page.run(PLOT + "return plot.view.eye", "where") == [0, -1, 0]
+
+
+def test_the_axes_are_in_a_corner_and_the_finding_is_named(page, diagnosed):
+    """In the foot of the picture, which the structure leaves free."""
+    see(page, "where")
+    foot = (
+        PLOT
+        + """const a = plot.querySelector(".triad").getBoundingClientRect();
+      const b = plot.getBoundingClientRect(); return [a.x - b.x, b.bottom - a.bottom, a.height]"""
+    )
+    left, bottom, high = page.run(foot, "where")
+    assert abs(left) < 5
+    assert abs(bottom) < 5
+    assert high < 75
+    names = PLOT + "return plot.data.filter((t) => t.mode == 'markers+text').flatMap((t) => t.text)"
+    found = [e.name for e in diagnosed.effects]
+    tied = [n for n in (diagnosed.one_of[0] if diagnosed.one_of else ()) if n not in found]
+    assert set(found) <= set(page.run(names, "where")) <= {*found, *tied}
+
+
+def test_a_list_of_runs_leads_to_their_pages_and_two_are_compared(window, folder, tmp_path):
+    """Sorted by a click; hostile names of folders are text; charts of both in one."""
+    runs = tmp_path / "runs"
+    for name in ("a", '<img src=x onerror="window.hit=1">'):
+        ran("frf", folder, "--input", "2:+Z", "--output", "30:+Z", "--out", runs / name)
+    (runs / "not ours").mkdir()
+    (runs / "not ours" / "run.json").write_text('{"command": "modes"}')
+    ran("index", runs)
+    ran("compare", runs / "a", runs / '<img src=x onerror="window.hit=1">', "--out", tmp_path / "c")
+    window.size(390, 800)
+    window.open(runs / "index.html")
+    links = window.run("return [...document.querySelectorAll('td a')].map((a) => a.href)")
+    assert len(links) == 2
+    assert window.run("return document.documentElement.scrollWidth") <= 390
+    assert window.run("return [window.hit, document.querySelector('img[src=x]')]") == [None, None]
+    window.call("POST", "/url", {"url": links[1]})
+    assert window.run(DRAWN) == ["frf"]
+    window.open(tmp_path / "c" / "report.html")
+    see(window, "frf")
+    assert window.run(PLOT + "return plot.data.length", "frf") == 4  # level and phase of two runs
+    assert window.run("return [window.hit, document.querySelector('img[src=x]')]") == [None, None]
+    assert not window.complaints()
+
+
 def test_a_table_is_sorted_by_its_head(page):
     script = """
       const named = (s) => s.querySelector("h2").textContent == "Frequencies";
@@ -440,12 +609,12 @@ PAGES = {  # words of a command after which its case or deck comes: names of its
     "check": "where",
     "test": "frf_grid",
     "frf --input 2:+Z --output 30:+Z --output 7:+Z": "frf",
-    "identify": "automac circles fit indicators stabilisation",
+    "identify": "automac circles fit indicators shapes stabilisation",
     "correlate": "frf ladder mac shapes where",
     "map --units SI": "change thickness",
     "plan --sensors 6": "mac shaker shapes where",
     f"{VARIED} --vary E=80%:120% --samples 6": "parallel responses slopes",
-    f"{VARIED} --sampler morris --samples 8": "indices_mu_star parallel responses slopes",
+    f"{VARIED} --sampler morris --samples 8 --frf": "frf indices_mu_star parallel responses slopes",
     f"{BENCH} stepped-sine --resolution 2 --sweeps 2": "frf schedule",
     f"{BENCH} hammer --resolution 1 --averages 2": "frf time",
 }
@@ -472,7 +641,7 @@ def test_every_command_draws_its_page(window, folder, tmp_path, command):
         assert window.run("return document.documentElement.scrollWidth") <= width
     assert not window.complaints()
     if name == "identify":
-        click_a_pole(window)
+        click_a_pole(window, folder)
 
 
 def form(deck, path):
@@ -485,8 +654,8 @@ def form(deck, path):
     write_keyword(path, FormedMesh(plate.ids, plate.points, nodes, part, t[nodes], names), "SI")
 
 
-def click_a_pole(window):
-    """It is put into a line that picks it."""
+def click_a_pole(window, folder):
+    """It is put into the whole line that picks it."""
     see(window, "stabilisation")
     place = (
         PLOT
@@ -500,3 +669,46 @@ def click_a_pole(window):
     assert "--pick" in window.until(
         line + ".includes('--pick')" + " && " + line[7:], "stabilisation"
     )
+    assert window.run(line, "stabilisation").startswith("chladni ")
+
+
+HOSTILE = '<img src=x onerror="window.hit=1">'
+EVERY = {  # command that shows results of a type: its words; the case has hostile names everywhere
+    "modes": "", "check": "", "test": "", "frf": "--input 2:+Z --output 30:+Z", "identify": "",
+    "correlate": "", "plan": "--sensors 4", "study": "--vary t=90%:110% --samples 4",
+    "calibrate": "", "bench": "--band 20:60 --excitation hammer --resolution 1 --averages 2",
+    "render": "--modes 7", "map": "--units SI", "init": "",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def hostile(folder, tmp_path_factory):
+    """The case in a folder, with a part, a recording and a sensor, of a hostile name."""
+    place = tmp_path_factory.mktemp("h") / HOSTILE
+    changed_case(folder, place, ("frf.npz", f"{HOSTILE}.npz".replace('"', '\\"')))
+    (place / "frf.npz").rename(place / f"{HOSTILE}.npz")
+    deck = (place / "plate.bdf").read_text()
+    named = re.sub(r"(?m)^PSHELL", f"$ANSA_NAME;1;PSHELL;{HOSTILE}\nPSHELL", deck, count=1)
+    (place / "plate.bdf").write_text(named)
+    return place
+
+
+@pytest.mark.parametrize("command", EVERY)
+def test_no_page_runs_a_hostile_name(window, hostile, tmp_path, command):
+    """Of a folder, a part, a recording; and paper shows every drawing in full width."""
+    given = [hostile]
+    if command == "map":
+        given = [hostile / "plate.bdf", tmp_path / f"{HOSTILE}.k"]
+        form(*given)
+    ran(command, *given, *EVERY[command].split(), "--out", tmp_path / HOSTILE)
+    page = tmp_path / HOSTILE / "report.html"
+    if not page.exists():  # init drafts a case and writes no page
+        return
+    window.size(1280, 900)
+    window.open(page)
+    for name in window.run(DRAWN):
+        see(window, name)
+        window.pointer(("pointerMove", *centre(window, name)))
+    assert window.run("return [window.hit, document.querySelector('img[src=x]')]") == [None, None]
+    assert window.pdf().startswith(b"%PDF")
+    assert not window.complaints()

@@ -22,7 +22,7 @@ def planned(tmp_path_factory):
 
 
 def test_a_planned_test_of_the_model_finds_the_model(planned, tmp_path):
-    """The sensors' mass is in both: Q of the case that init drafts is that of rounding.
+    """The sensors' mass is in both: Q of the case that init drafts is that of the identification.
 
     The plan and its table of sensors are one layout.
     """
@@ -39,7 +39,7 @@ def test_a_planned_test_of_the_model_finds_the_model(planned, tmp_path):
     ran("init", *words, "--out", tmp_path / "case")
     ran("correlate", tmp_path / "case", "--out", tmp_path / "out")
     found = json.loads((tmp_path / "out" / "correlation.json").read_text())
-    assert found["Q"]["mean"] < 1e-8
+    assert found["Q"]["mean"] < 1e-5
     assert found["alone_test_hz"] == []
     assert max(abs(pair["deviation"]) for pair in found["modes"]) < 1e-3
     assert [pair["mac"] > 0.999 for pair in found["modes"]][:5] == [True] * 5, "the planned modes"

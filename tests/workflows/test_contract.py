@@ -33,6 +33,8 @@ WORKFLOW = {  # command: the function it calls
     "check-effect": "chladni_contract.check_effect",
     "specimen": "chladni_specimens.tailgate_specimen",
     "report": "chladni.report.page.write_page",
+    "index": "chladni.report.run_list.index_page",
+    "compare": "chladni.report.run_comparison.compared_runs",
     "next": "chladni.search.next_measurement.advised",
 }
 

@@ -17,7 +17,7 @@ PSHELL,101,5,2.-3,5
 MAT1,5,7.+10,,.3,2700.
 DESVAR,1,A,1.
 RFORCE,1,1,,2.
-NSM1,1,PSHELL,NSM,1.
+TF,1,1,1
 """
 STRANGE = "CSEAM,1,2\nCSEAM,2,2\n"
 
@@ -38,7 +38,7 @@ def test_every_card_has_its_use(deck):
     assert not found.refused
     assert uses["GRID"] == (4, "read")
     assert uses["RFORCE"] == (1, "left out")
-    assert uses["DESVAR"] == uses["NSM1"] == (1, "passed over")
+    assert uses["DESVAR"] == uses["TF"] == (1, "passed over")
 
 
 def test_what_is_not_understood_stands_first_with_its_meaning(deck, tmp_path):

@@ -59,7 +59,7 @@ def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(case, tmp_path, 
     monkeypatch.setattr(Accuracy, "refined", lambda self, model: model)
     monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: off)
     done = ran("calibrate", case.path.parent, "--out", tmp_path / "out", code=3)
-    assert "by 1.00%" in done.stderr
+    assert "by 1.00 %" in done.stderr
     d = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert "do not trust the result" in d["distrust"][0]
     assert "Reasons for doubt" in (tmp_path / "out" / "report.html").read_text()

@@ -1,6 +1,7 @@
 """Every result explains itself: in words, drawn, saved as its command does, in a notebook."""
 
 import json
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -105,3 +106,23 @@ def test_a_result_of_a_file_says_that_it_holds_no_structure(diagnosed, tmp_path)
     for ask in (read.plot, lambda: read.save(tmp_path / "again")):
         with pytest.raises(ChladniError, match="was read from a file"):
             ask()
+
+
+def reached(value, depth):
+    """All dataclasses within a value, so many fields deep."""
+    if isinstance(value, tuple | list):
+        for one in value[:2]:
+            yield from reached(one, depth)
+    elif is_dataclass(value) and not isinstance(value, type):
+        yield value
+        for held in fields(value) if depth else ():
+            yield from reached(getattr(value, held.name), depth - 1)
+
+
+def test_every_object_fits_on_a_screen(case, diagnosed):
+    """A notebook shows its text, in place of all numbers of a deck."""
+    model, found = chladni.load(case.assembly), chladni.correlate(case)
+    for one in (case, model, found, found.test, chladni.modes(model, 8), diagnosed):
+        for each in reached(one, 3):
+            assert len(repr(each)) <= 2000, type(each)
+    assert "complex128 (450, 6, 1)" in repr(case.frfs[0])

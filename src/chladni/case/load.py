@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import checked
+from ..arrays import OneScreen
+from ..dofs import positions
 from ..dynamics.frf import FRF
 from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
 from ..errors import ChladniError, FileError, named
@@ -41,8 +43,8 @@ OUTSIDE = "[model] outside: files of the case may lie outside of its folder"  # 
 _MASS_SD = 0.002  # of the mass, where the user gives none
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
+@dataclass(frozen=True, eq=False, repr=False)
+class Case(OneScreen):
     """The resolved request of the user: a model in SI, and what was measured on it.
 
     Attributes
@@ -65,6 +67,7 @@ class Case:
     given : (section, key)    of every word
     sensor_masses : (grid, kg) pairs of known mass: on the article while it was measured
     effects : names           that a diagnosis tries; empty: all
+    shape_sd : float or None  standard deviation of measured shapes, of their rms
     """
 
     path: Path
@@ -88,6 +91,7 @@ class Case:
     given: tuple[tuple[str, str], ...]
     sensor_masses: tuple[tuple[int, float], ...]
     effects: tuple[str, ...]
+    shape_sd: float | None = None
 
     @property
     def frfs(self) -> tuple[FRF, ...]:
@@ -163,6 +167,10 @@ def resolved(asked: Request) -> Case:
     notes += remarks(deck, STRUCTURAL)
     if allow:
         notes.append(f"ignored by [model] allow: {named(allow, 20)}")
+    if "shape_sd" in words and (not recordings or recordings[0].modal is None):
+        notes.append(
+            f"{at['shape_sd']} = {words['shape_sd']:g} is not used: no shapes are compared"
+        )
     if words.get("outside"):
         notes.append(OUTSIDE)
     band = covered(words.get("band"), "[band] fit", at["band"], recordings, notes)
@@ -197,6 +205,7 @@ def resolved(asked: Request) -> Case:
         given=asked.given,
         asked=asked,
         sensor_masses=sensor_masses(made, outputs, inputs),
+        shape_sd=words.get("shape_sd"),
     )
 
 
@@ -251,6 +260,8 @@ def _recordings(asked: Request, sensors: Sequence[Sensor]) -> tuple[Recording, .
     alike = tuple(
         r if first is None or r.frf is None else _like(first, r, at["recordings"]) for r in ranked
     )
+    if ranked and ranked[0].modal is not None:
+        alike = tuple(_with_dofs(ranked[0], r, at["recordings"]) for r in ranked)
     refuse_copies(alike, at["recordings"])
     return alike
 
@@ -270,6 +281,16 @@ def _like(first: Recording, other: Recording, at: str) -> Recording:
     if a.quantity != b.quantity:
         raise FileError(f"{at}: {first.name} holds {a.quantity}, {other.name} {b.quantity}")
     return replace(other, frf=b.sel(a.outputs, a.inputs))
+
+
+def _with_dofs(first: Recording, other: Recording, at: str) -> Recording:
+    """Shapes of another state at the dofs of the first."""
+    a, b = first.modal, other.modal
+    if a is None or b is None or other.state == first.state:
+        return other
+    if lacks := [label for label in a.dofs if label not in b.dofs]:
+        raise FileError(f"{at}: {other.name} has no shapes at {named(lacks)}, as {first.name} has")
+    return replace(other, shapes=b.sel(np.arange(len(b.frequency)), positions(a.dofs, b.dofs)))
 
 
 def _setup(asked: Request, made: Assembly) -> TestSetup:

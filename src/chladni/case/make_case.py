@@ -4,10 +4,10 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ..arguments import checked
-from ..dynamics.frf import FRF, Quantity
+from ..dynamics.frf import FRF, MOTION_OVER_FORCE, Quantity, Recorded
 from ..ema.setup import PoleTable, Recording, Sensor
 from ..errors import FileError, did_you_mean
 from ..io.nastran import Deck
@@ -124,11 +124,13 @@ def _recording(one: FRF | PoleTable | Recording, name: str) -> Recording:
     return Recording(name, frf=one) if isinstance(one, FRF) else Recording(name, poles=one)
 
 
-def _read_as(r: Recording, quantity: Quantity | None) -> Recording:
+def _read_as(r: Recording, quantity: Recorded | None) -> Recording:
     """A recording whose responses are of another quantity than they name."""
     if quantity is None or r.frf is None:
         return r
-    return replace(r, frf=replace(r.frf, quantity=quantity))
+    if quantity in MOTION_OVER_FORCE:
+        return r.reciprocal(quantity)
+    return replace(r, frf=replace(r.frf, quantity=cast(Quantity, quantity)))
 
 
 def _sensors(given: dict[str, Any]) -> tuple[Sensor, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..ema.frf_estimate import EstimateSettings, FrfEstimate, estimate
-from ..ema.setup import Recording, Role, Sensor
+from ..ema.setup import Recording, Role, Sensor, Shapes
 from ..errors import ChladniError, FileError
 from ..units import HERTZ
 
@@ -68,6 +68,8 @@ def mended(r: Recording, factor: float, delay: float, sensors: Sequence[Sensor])
     FileError
         If no output is left.
     """
+    if r.shapes is not None and r.frf is None:
+        return _with_shapes_mended(r, r.shapes, {s.label: s for s in sensors if s.role == "output"})
     if r.frf is None:
         return r
     table = {(s.label, s.role): s for s in sensors}
@@ -96,9 +98,26 @@ def mended(r: Recording, factor: float, delay: float, sensors: Sequence[Sensor])
     return replace(r, frf=frf, notes=tuple(notes))
 
 
+def _with_shapes_mended(r: Recording, shapes: Shapes, table: dict[str, Sensor]) -> Recording:
+    """Shapes divided by the gains of their sensors, without those that are left out."""
+    known = [table.get(d, Sensor(d)) for d in shapes.dofs]
+    use = np.array([s.use for s in known])
+    if not use.any():
+        raise FileError(f"{r.name}: the table of sensors excludes every output")
+    gains = np.array([s.gain for s in known])[:, None]
+    sd = None if shapes.sd is None else shapes.sd / np.abs(gains)
+    divided = replace(shapes, values=shapes.values / gains, sd=sd)
+    unused = [s.label for s in known if not s.use]
+    notes = [f"{r.name}: {', '.join(unused)} excluded by the table of sensors"] * bool(unused)
+    said = ", ".join(f"{s.label} by {s.gain:g}" for s in known if s.gain != 1)
+    notes += [f"{r.name}: divided by the gains of the table of sensors: {said}"] * bool(said)
+    modes = np.arange(len(shapes.frequency))
+    return replace(r, shapes=divided.sel(modes, use), notes=(*r.notes, *notes))
+
+
 def read_as(r: Recording, unit: str, conjugated: bool) -> Recording:
     """A recording whose frequencies are in a unit of ``HERTZ``, or whose phases are reversed."""
-    frf, poles, k, notes = r.frf, r.poles, HERTZ[unit], list(r.notes)
+    frf, poles, shapes, k, notes = r.frf, r.poles, r.shapes, HERTZ[unit], list(r.notes)
     if k != 1:
         notes.append(f"{r.name}: frequencies read in {unit} ([test] frequency_unit)")
         if frf is not None:
@@ -106,10 +125,12 @@ def read_as(r: Recording, unit: str, conjugated: bool) -> Recording:
         if poles is not None:
             f, sd = poles.frequency * k, poles.frequency_sd * k
             poles = replace(poles, frequency=f, frequency_sd=sd)
+        if shapes is not None:
+            shapes = replace(shapes, frequency=shapes.frequency * k)
     if conjugated and frf is not None:
         frf = replace(frf, values=frf.values.conj())
         notes.append(f"{r.name}: all FRFs conjugated ([test] conjugated)")
-    return replace(r, frf=frf, poles=poles, notes=tuple(notes))
+    return replace(r, frf=frf, poles=poles, shapes=shapes, notes=tuple(notes))
 
 
 def _row(table: dict[tuple[str, Role], Sensor], output: str) -> Sensor:

@@ -1,7 +1,8 @@
 """Several recordings of one case: what each says of itself, and which of them are one test.
 
 Recordings of one article, level and state that were driven at different places are one test with
-several inputs: their columns are stacked. Driven at the same places they are repeats.
+several inputs: their columns are stacked. Driven at the same places they are repeats. Shapes of
+one article and state are set-ups of one test.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,8 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..ema.setup import Recording
-from ..errors import FileError
+from ..ema.shape_setups import merged
+from ..errors import FileError, ShapeError
 from .request import Stated
 from .schema import RecordingWords
 
@@ -103,6 +105,8 @@ def states(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """States of the object in the order of the recordings that are compared."""
     if not recordings:
         return ()
+    if recordings[0].modal is not None:
+        return tuple(dict.fromkeys(r.state for r in recordings if r.modal is not None))
     if recordings[0].frf is None:
         first = recordings[0].poles
         return ("",) if first is None else first.states
@@ -112,21 +116,56 @@ def states(recordings: Sequence[Recording]) -> tuple[str, ...]:
 def of_state(recordings: Sequence[Recording], state: str) -> tuple[Recording, ...]:
     """The recordings of one state."""
     first = recordings[0]
+    if first.modal is not None:
+        return tuple(r for r in recordings if r.modal is not None and r.state == state)
     if first.frf is None and first.poles is not None:
         return (replace(first, poles=first.poles.of(state)),)
     return tuple(r for r in recordings if r.frf is not None and r.state == state)
 
 
 def stacked(read: Sequence[Recording]) -> list[Recording]:
-    """Recordings of one article, level and state that differ in their inputs, as one each."""
-    out: list[Recording] = []
-    for r in read:
+    """Recordings of one article, level and state that differ in their inputs, as one each.
+
+    Modal models of one article, level and state are merged.
+    """
+    out = _of_setups([r for r in read if r.modal is not None])
+    for r in (r for r in read if r.modal is None):
         at = next((k for k, other in enumerate(out) if _one_test(other, r)), None)
         if at is None:
             out.append(r)
         else:
             out[at] = _joined(out[at], r)
     return out
+
+
+def _of_setups(modal: Sequence[Recording]) -> list[Recording]:
+    groups: dict[tuple[str, str, float | None], list[Recording]] = {}
+    for r in modal:
+        groups.setdefault((r.article, r.state, r.level), []).append(r)
+    return [group[0] if len(group) == 1 else _merged(group) for group in groups.values()]
+
+
+def _merged(group: Sequence[Recording]) -> Recording:
+    """Shapes of several files as those of one test."""
+    first, names = group[0], " + ".join(r.name for r in group)
+    try:
+        shapes = merged([r.modal for r in group if r.modal is not None])
+    except ShapeError as error:
+        raise FileError(
+            f"{names}: {error}; name several articles or states in [[recording]]"
+        ) from error
+    poles, least = shapes.poles(), min(len(r.poles.frequency) for r in group if r.poles is not None)
+    said = f"{names}: merged as {len(group)} set-ups of one test, {len(poles.frequency)} modes"
+    if len(poles.frequency) < least:
+        said += "; modes that only some of them show are left out"
+    if first.poles is not None:
+        poles = replace(poles, state=(first.poles.state[0],) * len(poles.state))
+    return replace(
+        first, name=names, shapes=shapes, poles=poles,
+        nodes={n: x for r in group for n, x in r.nodes.items()},
+        axes={n: A for r in group for n, A in r.axes.items()},
+        notes=(*(n for r in group for n in r.notes), said),
+    )  # fmt: skip
 
 
 def _one_test(a: Recording, b: Recording) -> bool:

@@ -84,13 +84,18 @@ def notes_of(recordings: Sequence[Recording], alone: bool = True) -> list[str]:
     if not recordings:
         return out
     first = recordings[0]
-    among = states(recordings) if first.frf is not None else ()
+    modal = first.modal is not None
+    among = states(recordings) if first.frf is not None or modal else ()
     if len(among) > 1 and not alone:
         out.append(_every_state(among))
     both = [r for r in recordings[1:] if first.frf is not None and r.frf is not None]
     held = [_other(first, r) for r in both if r.state == first.state]
     idle = [_other(first, r) for r in both if alone and r.state != first.state]
-    idle += [r.name for r in recordings[1:] if first.frf is None or r.frf is None]
+    idle += [
+        r.name for r in recordings[1:]
+        if (first.frf is None or r.frf is None)
+        and not (modal and r.modal is not None and r.state != first.state and not alone)
+    ]  # fmt: skip
     if held:
         out.append(
             f"{first.name} is compared with the model; the others are held out, and calibrate and "
@@ -158,7 +163,7 @@ def _poles(r: Recording, alone: bool) -> list[str]:
             "([test] use names another)"
         )
     if np.isfinite(r.poles.damping).any():
-        out.append(f"{r.name}: the damping of the poles is not used, because no damping is fitted")
+        out.append(f"{r.name}: the damping of the poles is shown; no damping is fitted")
     return out
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal, TypedDict, get_args, get_origin
 
-from ..dynamics.frf import Quantity
+from ..dynamics.frf import Recorded
 from ..ema.setup import Control, Sensor
 from ..units import HERTZ, UNITS
 from .key import NEEDED, Band, File, Key
@@ -56,11 +56,12 @@ class FileWords(TypedDict, total=False):
         "Leave it false in a case from somebody else.")]
     recordings: Annotated[Sequence[str], Key("test",
         '["article_A.uff", "article_B.uff"]', _RIG, "none", "",
-        "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data. FRFs of time data "
-        "are estimated as in `chladni test`. One file may have several articles or levels. The "
-        "first (or the one `use` names) is compared with the model. Recordings of the same "
-        "article, level and state with other drive points are stacked with it; the others are held "
-        "out and scored. `identify` reads all.", kind="list of files")]
+        "Universal files, .npz, .csv, .mat or .wav: FRFs, modes with shapes, poles or time data; "
+        ".op2 or .pch: modes. FRFs of time data are estimated as in `chladni test`. One file may "
+        "have several articles or levels. The first (or the one `use` names) is compared with the "
+        "model. Recordings of the same article, level and state with other drive points are "
+        "stacked with it, and those with shapes are merged. The others are held out and scored. "
+        "`identify` reads all.", kind="list of files")]
 
 
 class RecordingWords(TypedDict, total=False):
@@ -129,8 +130,9 @@ class CaseWords(TypedDict, total=False):
         "Unknown cards and case control commands that are ignored.", kind="list of cards")]
     use: Annotated[str, Key("test", '"article_B.uff"', _READ, "the first", "",
         "Recording that is compared: the name of its file, its article, its level or its state.")]
-    quantity: Annotated[Quantity, Key("test", '"accelerance"', _READ, "as in the file", "",
-        "Quantity of the FRFs.")]
+    quantity: Annotated[Recorded, Key("test", '"accelerance"', _READ, "as in the file", "",
+        "Quantity of the FRFs. Force over motion of one force at a time is turned into its "
+        "reciprocal.")]
     gain: Annotated[str, Key("test", '"unknown"', _SCORE, "known", "",
         "Unknown: one real factor common to all channels is free, its sign included.",
         choices=("known", "unknown"))]
@@ -160,6 +162,9 @@ class CaseWords(TypedDict, total=False):
     position_sd: Annotated[float, Key("test", "0.003", _FIT, "0.0015", "m",
         "Standard deviation of the place of each, in each direction of the sheet, if the table of "
         "sensors gives none.", kind="number, 0 to the size of the structure")]
+    shape_sd: Annotated[float, Key("test", "0.01", _FIT, "as in the file; else learned", "",
+        "Standard deviation of each entry of measured mode shapes, of the rms of the shape.",
+        least=1e-4, most=1.0)]
     hangers: Annotated[Sequence[int], Key("test", "[101, 102]", (*_FIT, "bench"), "none", "",
         "Grids of the cords: places of the springs of `suspension`. Without them a free deck is "
         "compared above the modes of the suspension.")]

@@ -37,14 +37,14 @@ def places(
     role: Role,
     notes: list[str],
 ) -> MeasuredDofs:
-    """The dofs of the compared FRFs on the structure; where only poles are known, of the table.
+    """The dofs of the compared FRFs or shapes on the structure; of poles those of the table.
 
     The table of sensors says where a dof is, else the recording does.
     """
     table = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
     recorded = recordings[:1]
     frf = recorded[0].frf if recorded else None
-    labels = tuple(table) if frf is None else frf.outputs if role == "output" else frf.inputs
+    labels = recorded_labels(recorded[0] if recorded else None, role, tuple(table))
     unit, nodes = scaled(made, {n: x for r in recorded for n, x in r.nodes.items()})
     axes = {n: A for r in recorded for n, A in r.axes.items()}
     spoken = [label for label in labels if label not in table]
@@ -65,6 +65,17 @@ def places(
     found = placed(made, [known[label] for label in labels], where)
     notes += ways_said(made, found, table)
     return found
+
+
+def recorded_labels(
+    recording: Recording | None, role: Role, table: tuple[str, ...] = ()
+) -> tuple[str, ...]:
+    """Labels of one end of a recording: of its FRFs, else of its shapes, else of the table."""
+    if recording is not None and recording.frf is not None:
+        return recording.frf.outputs if role == "output" else recording.frf.inputs
+    if recording is not None and recording.modal is not None and role == "output":
+        return recording.modal.dofs
+    return table
 
 
 def placed(made: Assembly, sensors: Sequence[Sensor], where: str) -> MeasuredDofs:

@@ -2,6 +2,9 @@
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from ..errors import AccuracyError, FileError
 from ..progress import within
@@ -16,6 +19,12 @@ from .run import Allow, DeckOrCase, Out, Pictures, opened, say_sections, started
 
 def run(
     source: DeckOrCase,
+    mesh: Annotated[
+        bool,
+        typer.Option(
+            "--mesh", help="Compare the modes of a case with those of a mesh twice as fine."
+        ),
+    ] = False,
     allow: Allow = None,
     pictures: Pictures = False,
     out: Out = None,
@@ -23,6 +32,8 @@ def run(
     """Check a case before a long run: units, mass, size, places, band, words; or a deck's cards."""
     from ..report.check_page import check_page
 
+    if mesh and source.is_file() and not is_case(source):
+        raise FileError("--mesh is of a case; chladni init drafts one of a deck")
     if source.is_file() and not is_case(source):
         _deck(source, tuple(allow or ()), out)
         return
@@ -31,12 +42,14 @@ def run(
 
     with started("check", source, out, pictures=pictures) as job:
         case = opened(source)
-        found = check(case, progress=within(job.progress, 0.0, 0.7))
+        found = check(case, mesh=mesh, progress=within(job.progress, 0.0, 0.7))
         job.json("check.json", to_json(found))
         job.progress("the picture", 0.7)
         job.show(check_page(case, found))
         for what, text in found.facts:
             job.say(f"{what}: {text}")
+        for f, limit in zip(found.frequency, found.converged, strict=False):
+            job.say(f"mode at {f:.4g} Hz: {limit:.4g} Hz on an infinitely fine mesh")
         for finding in found.findings:
             job.say(f"{'FAULT' if finding.fault else 'check'}: {finding.text}; {finding.remedy}")
         for note in dict.fromkeys(n for said in found.unused.values() for n in said):

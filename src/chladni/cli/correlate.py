@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..errors import FileError
+from ..io.mesh_format import refuse_foreign
 from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.correlate import correlate
@@ -46,6 +47,7 @@ def _with_test(job: Run, source: Path) -> None:
     from ..report.correlation_page import correlation_page
 
     if source.is_file() and not is_case(source):
+        refuse_foreign(source)
         raise FileError(
             f"{source} is a deck; give a case with a recording, or --modes with the modes from "
             "another program"
@@ -54,7 +56,7 @@ def _with_test(job: Run, source: Path) -> None:
     found = correlate(case, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
-    job.show(correlation_page(case, found))
+    job.show(correlation_page(case, found, job.folder))
 
 
 def _with_other_modes(

@@ -10,7 +10,7 @@ from ..report.result_json import to_json
 from ..workflows.identify import PoleChoice, identify
 from ..workflows.loaded_model import is_case
 from ..workflows.recordings_of import load_recordings
-from .run import Out, Pictures, limits, started
+from .run import Out, Pictures, command_line, limits, started
 
 
 def run(
@@ -53,5 +53,5 @@ def run(
         read = load_case(source) if is_one else load_recordings(source, quantity or None)
         found = identify(read, limit, averages, choice, progress=job.progress)
         job.json("identified.json", to_json(found))
-        job.show(identification_page(job.folder, found))
+        job.show(identification_page(job.folder, found, command_line()))
     found.trusted()

@@ -183,9 +183,11 @@ def place_of(command: str, source: Path, out: Path | None) -> Path:
 def opened(source: Path) -> "Case":
     """The case of a folder or a case.toml."""
     from ..case import load_case
+    from ..io.mesh_format import refuse_foreign
     from ..workflows.loaded_model import is_case
 
     if source.exists() and not is_case(source):
+        refuse_foreign(source)
         raise FileError(
             f"{source} is not a case; give a folder with a case.toml (chladni init drafts one)"
         )

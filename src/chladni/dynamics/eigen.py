@@ -292,12 +292,12 @@ def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, F
     sigma = shift
     if sigma is None:
         sigma = -_GUESS * _scale(problem.K, problem.M, problem.dofs).typical
-    for _ in range(2):
+    for again in (False, True):
         factor = problem.factor(sigma)
         ritz = block_lanczos(factor.solve, problem.M_o, k)
         known = ritz.theta[ritz.error < 1e-2]
         top = sigma + 1 / known[-1] if len(known) else 0.0
-        if shift is not None or _NEAR * top < -sigma < _FAR * top:
+        if again or shift is not None or _NEAR * top < -sigma < _FAR * top:
             break
         sigma = -1e-3 * top if top > 0 else 1e3 * sigma
     if np.any(ritz.error[:k] > _LOOSE):

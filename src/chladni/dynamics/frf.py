@@ -7,7 +7,7 @@ from typing import Literal, Self, get_args
 import numpy as np
 
 from ..arguments import checked
-from ..arrays import readonly
+from ..arrays import OneScreen, readonly
 from ..dofs import positions
 from ..errors import LabelError, ShapeError, named
 from .massless import static_solver
@@ -15,6 +15,13 @@ from .modes import ModalModel
 from .system import System
 
 Quantity = Literal["receptance", "mobility", "accelerance", "transmissibility"]
+Recorded = Literal[  # quantities that a recording may hold; the last three are force over motion
+    "receptance", "mobility", "accelerance", "transmissibility", "dynamic-stiffness", "impedance",
+    "apparent-mass",
+]  # fmt: skip
+MOTION_OVER_FORCE: dict[str, Quantity] = {
+    "dynamic-stiffness": "receptance", "impedance": "mobility", "apparent-mass": "accelerance",
+}  # fmt: skip
 UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N", "transmissibility": "-"}
 _ORDER = {q: k for k, q in enumerate(get_args(Quantity)[:3])}  # displacement, velocity, ...
 
@@ -33,8 +40,8 @@ def _coherence(gamma: np.ndarray) -> np.ndarray:
     return np.clip(gamma, 0.0, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class FRF:
+@dataclass(frozen=True, eq=False, repr=False)
+class FRF(OneScreen):
     """H[k, i, j]: response at output i per unit input j at frequency k.
 
     Attributes

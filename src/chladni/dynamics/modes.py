@@ -6,15 +6,15 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import readonly
+from ..arrays import OneScreen, readonly
 from ..dofs import parse, rows
 from ..errors import LabelError, ShapeError
 
 _RIGID_GAP = 100.0  # ratio of frequencies that does not occur between two flexible modes
 
 
-@dataclass(frozen=True, eq=False)
-class ModalModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalModel(OneScreen):
     """Modes with Φᵀ M Φ = I and Φᵀ K Φ = diag(ω_r²).
 
     Attributes

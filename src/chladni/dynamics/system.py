@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import readonly
+from ..arrays import OneScreen, readonly
 from ..errors import ShapeError
 
 
-@dataclass(frozen=True, eq=False)
-class System:
+@dataclass(frozen=True, eq=False, repr=False)
+class System(OneScreen):
     """Mass, viscous damping and stiffness over labelled degrees of freedom."""
 
     # M, V, K: (n, n) mass [kg], damping [N s/m], stiffness [N/m]; symmetric. K may be

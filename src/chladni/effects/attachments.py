@@ -268,7 +268,7 @@ def attachments(
     where = context.where
     grids, places = where.grids, where.places
     if context.scan is None:
-        some = places.spread(TRIED)
+        some = np.arange(len(places)) if context.tells_places else places.spread(TRIED)
         at = [grids.position(places.grids[k], places.normal[k]) for k in some]
         return best_places(context, [kind.near(where, k) for k in at])
     scan, out = context.scan, []

@@ -312,10 +312,11 @@ def _beams(assembly: Assembly, k: int) -> _Elements:
     """
     beams = picked(assembly.beams, member_beams(assembly))
     plain = tuple(
-        part.with_section(nonstructural=0.0, nonstructural_inertia=0.0)
+        replace(part, section=part.section.structural)
         if isinstance(part.section, BeamSection) else part
         for part in assembly.parts
     )  # fmt: skip
+    beams = replace(beams, nonstructural=np.zeros(len(beams)))
     alone = replace(assembly.with_parts(plain), beams=beams)
     nodes, K, M = beam.stiffness_and_mass(alone)
     K, M = (np.pad(A, ((0, 0), *2 * [(0, 6 * (k - 2))])) for A in (K, M))

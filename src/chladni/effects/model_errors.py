@@ -29,9 +29,7 @@ from .element_groups import ElementGroups
 MOST_DOFS = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
 LARGE = 20_000  # dofs from which refined modes are solved only up to the comparison limit
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
-FAR = (
-    0.1  # largest change of a frequency for which modes of the deck are near those of a finer mesh
-)
+FAR = 0.1  # largest change of a frequency for which modes of one mesh are near those of another
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
 FOOTPRINT = 0.5, 0.7  # prior of the footprint error: as in the deck, half or a quarter as wide
@@ -58,6 +56,13 @@ class MeshError(Effect):
     log: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (k, k) L
     # (p, k) change of motion at the measured places by each coordinate
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def limit(self) -> np.ndarray:
+        """Natural frequencies of the modes on an infinitely fine mesh (k,) [Hz], increasing."""
+        w, V = np.linalg.eigh(LIMIT * self.log)
+        lam = np.linalg.eigvalsh(self.omega[:, None] * ((V * np.exp(w)) @ V.T) * self.omega)
+        return np.asarray(np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi))
 
     def terms(self, x: np.ndarray) -> tuple[Term, ...]:
         """x L over the modes, and x times the change of their shapes at sensors and shaker."""
@@ -129,8 +134,9 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     softest modes first, and Λ^½ e^L Λ^½ = B Λ_ref Bᵀ. B is square, so that x = 1 gives the refined
     frequencies exactly.
 
-    Ψ begins with Φ. :func:`.iterated` leaves the square of what the mesh changes, times
-    (λ_r/λ_m)² a step, λ_m that of the last mode it begins with. No count proves Ψ complete.
+    Ψ begins with Φ, that of other footprints with Ψ. :func:`.iterated` leaves the square of what
+    changes, times (λ_r/λ_m)² a step, λ_m that of the last mode it begins with. No count proves Ψ
+    complete.
     """
     built = model.structure
     made = built.assembly
@@ -141,27 +147,29 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     coarse = _CoarseModes.of(
         built, _flexible(model.up_to(above[0] * f_max), f_max), places or _nowhere
     )
-    begun = built.system.M @ model.up_to(min(band, model.band)).shapes
+    begun = _Begun(built, built.system.M @ model.up_to(min(band, model.band)).shapes)
     lowest = float(coarse.omega.min(initial=2 * np.pi * f_max)) / (2 * np.pi)
 
-    def change(finer: Assembly) -> _ModalChange:
+    def change(finer: Assembly, begun: _Begun) -> tuple[_ModalChange, _Begun]:
+        """The change by a mesh, and what another begins with whose modes are near."""
         made = structure(finer)
-        loads = made.rows(built.system.dofs).T @ begun
+        loads = made.rows(begun.built.system.dofs).T @ begun.loads
         modes = iterated(made.system, loads, lowest / 2)
         near = coarse.changed_to(made, _flexible(modes.sel(modes.frequency < band), f_max))
-        if near.largest(f_max) < FAR:
-            return near
-        return coarse.changed_to(made, _flexible(solved(made, band).modes, f_max))
+        if (near if begun.change is None else near - begun.change).largest(f_max) >= FAR:
+            modes = solved(made, band).modes
+            near = coarse.changed_to(made, _flexible(modes, f_max))
+        return near, _Begun(made, made.system.M @ modes.shapes, near)
 
     fine = refined(built.assembly)
-    of_shells = change(fine)
+    of_shells, begun = change(fine, begun)
     errors = [of_shells.error(MeshError, MESH)]
     smaller = on_smaller_shells(built.assembly, fine)
     moved = [k for k, (new, old) in enumerate(zip(smaller, fine.rigid, strict=True)) if new != old]
 
     def footprints(bodies: Sequence[int], mean: float, sd: float) -> MeshError:
         rigid = [smaller[k] if k in bodies else old for k, old in enumerate(fine.rigid)]
-        on_less = change(replace(fine, rigid=tuple(rigid)))
+        on_less, _ = change(replace(fine, rigid=tuple(rigid)), begun)
         return (on_less - of_shells).error(JointFootprint, (mean, sd))
 
     if moved:
@@ -205,6 +213,15 @@ class _ModalChange:
             (unknown,), "every mode", rows=self.rows, omega=self.omega, log=self.log,
             shapes=self.seen,
         )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Begun:
+    """Loads M Φ (n, k) of known modes of a structure, and its change if it is not the deck's."""
+
+    built: Structure
+    loads: np.ndarray
+    change: _ModalChange | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -137,6 +137,10 @@ class SearchContext(Protocol):
         """Fast scores; None if only natural frequencies are known."""
 
     @property
+    def tells_places(self) -> bool:
+        """True if the data tell neighbouring places apart: responses, or modes with shapes."""
+
+    @property
     def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
         """Welds and fasteners of the structure, each with the share z/(w + z) of its rows (r,)."""
 
@@ -146,7 +150,7 @@ class SearchContext(Protocol):
         """Score of an effect at each start, from one of ``bases`` (n_ways, n_starts).
 
         With ``extended``, or if the effect releases clamps, the basis is extended by the responses
-        of the effect, as for a fit.
+        of the effect, as for a fit. The static flexibility of few dofs stands for that basis.
         """
 
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

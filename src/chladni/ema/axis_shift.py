@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics.frf import FRF
+from ..units import number
 from .finding import Check, Finding
 from .identification import Identified, kept_lines, pole_data
 from .pole_fitting import PoleData, bounded, polish, solved
@@ -93,7 +94,7 @@ def axis_check(
     way, mend = ("high", "subtract {} from") if shift > 0 else ("low", "add {} to")
     text = (
         f"the frequency axis is {size:.3g} Hz too {way} (95 % interval {size - half:.3g} to "
-        f"{size + half:.3g}): without it χ² of the identified modes falls by {gain:.3g}."
+        f"{size + half:.3g}): without it χ² of the identified modes falls by {number(gain, 3)}."
     )
     repair = f"{mend.format(f'{size:.3g} Hz')} all frequencies, or find why the axis is off"
     return [Finding("frequency offset", text, "fault", (), repair, shift)], Check(name, said, False)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..units import number
 from .finding import Check, Finding
 from .frf_maps import Misreading
 from .identification import Identified
@@ -152,8 +153,8 @@ def other_reading(identified: Identified, others: dict[Misreading, Identified]) 
     best = min(able, key=lambda error: able[error].chi)
     text = (
         f"read as {identified.quantity} the recording has {identified.order} modes and a residual "
-        f"of {identified.chi:.3g} times its noise; read as if {best.text}, it has "
-        f"{able[best].order} modes and a residual of {able[best].chi:.3g}."
+        f"of {number(identified.chi, 3)} times its noise; read as if {best.text}, it has "
+        f"{able[best].order} modes and a residual of {number(able[best].chi, 3)}."
     )
     next_best = min((o.chi for e, o in others.items() if e != best), default=np.inf)
     undo = best.mend if BETTER * able[best].chi < next_best else ()
@@ -216,7 +217,7 @@ def level_checks(
         found.append(Finding("reversed force", text, "fault", (), mend, -1.0, undo))
     if known_gain and abs(level) > np.log(LOUD):
         found.append(_unit(level))
-    said = f"{np.exp(np.median(size)):.3g} times the model, over {len(gains)} modes"
+    said = f"{number(np.exp(np.median(size)), 3)} times the model, over {len(gains)} modes"
     return found, Check("level and units", said, not found)
 
 
@@ -254,7 +255,7 @@ def _quantity(identified: Identified, order: int) -> Finding:
 
 def _unit(level: float) -> Finding:
     factor, why = min(FACTORS.items(), key=lambda item: abs(level + np.log(item[0])))
-    said = f"the recording is {np.exp(level):.3g} times the model"
+    said = f"the recording is {number(np.exp(level), 3)} times the model"
     if abs(level + np.log(factor)) < NEAR_FACTOR:
         mend = f"in case.toml, [test]: factor = {factor:.7g}"
         undo = ("factor", f"{factor:.7g}")

@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from ..dynamics.frf import FRF
+from ..units import number
 from .finding import Check, Finding
 from .screening import noise_of
 from .value_checks import cut_off, jumping_phase, without_phase
@@ -168,7 +169,7 @@ def reciprocity(frf: FRF) -> tuple[list[Finding], Check]:
             factor = float(np.real(np.vdot(b, a)) / max(float(np.vdot(b, b).real), 1e-300))
             text = (
                 f"{names[0]} and {names[1]} are not reciprocal: H_ij and H_ji differ by "
-                f"{100 * apart:.0f} % beyond their noise (best factor {factor:.3g})."
+                f"{100 * apart:.0f} % beyond their noise (best factor {number(factor, 3)})."
             )
             mend = "compare the calibration and the places of both sensors and force gauges"
             found.append(Finding("not reciprocal", text, "warning", names, mend, apart))
@@ -197,7 +198,11 @@ def doubled(frf: FRF, places: dict[str, np.ndarray]) -> tuple[list[Finding], Che
             names = (frf.outputs[a], frf.outputs[b])
             copied = ratio < COPIED and apart < COPY_APART and level**2 > SILENT_NOISE
             found.append(_doubled(names, places, ratio, apart, copied))
-    said = "one channel" if not np.isfinite(least) else f"nearest pair {least:.3g} times its noise"
+    said = (
+        "one channel"
+        if not np.isfinite(least)
+        else f"nearest pair {number(least, 3)} times its noise"
+    )
     return found, Check("doubled channels", said, not found)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import ChladniError
+from ..units import number
 from .channel_checks import drive_points
 from .finding import Check, Finding
 from .identification import DERIVATIVES, Identified, identify
@@ -63,8 +64,8 @@ def channel_delays(frf: FRF, found: Identified | None) -> tuple[list[Finding], C
 def _late(label: str, late: float, sd: float, gain: float) -> Finding:
     text = (
         f"output {label} {'lags' if late > 0 else 'leads'} the others by {1e3 * abs(late):.4g} ms "
-        f"(± {1e3 * sd:.2g}): without that delay real modes leave {gain:.3g} times less of its "
-        "response."
+        f"(± {1e3 * sd:.2g}): without that delay real modes leave {number(gain, 3)} times less of "
+        "its response."
     )
     mend = "shift its signal by that time, or measure again with one clock for all channels"
     return Finding("channel delay", text, "fault", (label,), mend, late)

@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from ..arrays import OneScreen
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
 from ..progress import Progress, silent
@@ -25,8 +26,8 @@ LEAST_LINES = 12  # to identify from
 AWAY = 3.0  # times the band, above or below: of a pole there damping moves H by ζ of a small part
 
 
-@dataclass(frozen=True, eq=False)
-class Identified:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identified(OneScreen):
     """H(s) = s^q [Σ_r R_r/(s-p_r) + R̄_r/(s-p̄_r) + L/s² + U], with the spread of the poles."""
 
     poles: np.ndarray  # (r,) complex; p_r [rad/s], by increasing |p|

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import chdtrc
 
 from .level_elements import ELEMENTS, Element
 from .level_modes import ModeLevels
@@ -53,9 +54,7 @@ class ElementFit:
     def p(self) -> float:
         """Chance of so large a χ² of the right element; nan where nothing could contradict it."""
         free = self.data - self.count
-        from scipy.stats import chi2
-
-        return float(chi2.sf(self.chi2, free)) if free > 0 else float("nan")
+        return float(chdtrc(free, self.chi2)) if free > 0 else float("nan")
 
     def at(
         self, amplitude: np.ndarray, amplitude_sd: np.ndarray | float = 0.0

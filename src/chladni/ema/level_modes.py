@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from scipy.special import chdtrc
 
 from ..dynamics.frf import FRF
 from .coincident_poles import alike_shapes, twins_joined
@@ -116,9 +117,9 @@ def chi2_about_mean(value: np.ndarray, sd: np.ndarray) -> float:
 
 
 def _p(value: np.ndarray, sd: np.ndarray) -> float:
-    from scipy.stats import chi2
-
-    return float(chi2.sf(chi2_about_mean(value, sd), len(value) - 1))
+    """Chance of such differences of one value; nan of a single one."""
+    free = len(value) - 1
+    return float(chdtrc(free, chi2_about_mean(value, sd))) if free else float("nan")
 
 
 def _range(value: np.ndarray) -> float:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.special import chdtrc
 
 from ..dynamics.frf import Quantity
 from .identification import DERIVATIVES
@@ -171,13 +172,12 @@ def _studied(mode: ModeLevels) -> ModeStudy:
 
 def _p_of_runs(mode: ModeLevels) -> float:
     """Chance of such differences between runs at one level."""
-    from scipy.stats import chi2
-
     s_f, s_z = weights(mode)
     total = chi2_about_mean(np.log(mode.frequency), s_f) + chi2_about_mean(
         np.log(mode.damping), s_z
     )
-    return float(chi2.sf(total, 2 * (len(mode.level) - 1)))
+    free = 2 * (len(mode.level) - 1)
+    return float(chdtrc(free, total)) if free else float("nan")
 
 
 def _of(fit: ElementFit) -> Signature:
@@ -202,8 +202,6 @@ def _drifts(modes: Sequence[ModeLevels]) -> bool:
 
     The model ln f_r(level) = a_r + d(level) is fitted to modes seen at every level. It must fit.
     """
-    from scipy.stats import chi2
-
     most = max((len(m.level) for m in modes), default=0)
     whole = [m for m in modes if len(m.level) == most]
     moved = [m for m in whole if m.frequency_moves]
@@ -214,4 +212,4 @@ def _drifts(modes: Sequence[ModeLevels]) -> bool:
     y = y - np.average(y, axis=1, weights=1 / s**2)[:, None]
     d = np.average(y, axis=0, weights=1 / s**2)
     left = float((((y - d) / s) ** 2).sum())
-    return bool(chi2.sf(left, (len(whole) - 1) * (most - 1)) > POOR)
+    return bool(chdtrc((len(whole) - 1) * (most - 1), left) > POOR)

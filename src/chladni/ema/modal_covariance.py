@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from ..arrays import OneScreen
 from .condensed_lines import affordable
 from .pole_fitting import (
     PoleData,
@@ -28,8 +29,8 @@ _RIDGE = 1e-12  # of the orthonormal basis, as the fit has it
 _SINGULAR = 1e-12  # of the largest: directions of the poles that the data do not know
 
 
-@dataclass(frozen=True, eq=False)
-class ModalCovariance:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalCovariance(OneScreen):
     """δp_r = L_r z, δR_rc = S_rc z + e_rc, z of unit covariance, over real and imaginary part."""
 
     pole: np.ndarray  # (r, 2, m) L, roots: Cov(p_i, p_j) = L_i L_jᵀ [rad/s]

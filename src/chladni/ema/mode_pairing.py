@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import OneScreen
 from ..errors import ShapeError
 
 LEAST_CHANNELS = 3  # on fewer all shapes look similar, so that modes are paired by frequency
 
 
-@dataclass(frozen=True, eq=False)
-class ModePairs:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModePairs(OneScreen):
     """Positions of paired modes, in order of the test's frequency, and of modes without partner."""
 
     # model, test: (k,) int

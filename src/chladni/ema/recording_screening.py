@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics.frf import FRF
+from ..units import number
 from .axis_shift import axis_check
 from .chain_checks import (
     LOUD,
@@ -81,7 +82,7 @@ def screened(
     if found is not None:
         strong = strong_modes(found)
         read = other_readings(frf, strong, use) if alone else []
-        said = f"the identified modes leave {strong.chi:.3g} times the noise"
+        said = f"the identified modes leave {number(strong.chi, 3)} times the noise"
         failed = Check("phase of the modes", said, False)
         more, one = (read, failed) if read else _phases(frf, strong, use)
         findings += more

@@ -1,13 +1,13 @@
 """Recordings, sensors and the set-up of the test (SI)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from ..arrays import readonly
-from ..dynamics.frf import FRF
+from ..arrays import OneScreen, readonly
+from ..dynamics.frf import FRF, MOTION_OVER_FORCE
 from ..errors import LabelError, ShapeError, named
 from .time_record import TimeRecord
 
@@ -15,8 +15,8 @@ Role = Literal["output", "input"]
 Control = Literal["force", "response"]
 
 
-@dataclass(frozen=True, eq=False)
-class PoleTable:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoleTable(OneScreen):
     """Identified frequencies without an FRF, as in a table of a report.
 
     Attributes
@@ -76,24 +76,62 @@ class Function:
     unit: str = ""
 
 
+RIGID = 1e-3  # of the highest frequency: modes below are rigid motions
+
+
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Mode shapes as a file holds them (dataset 55): any scale, real or complex."""
+    """Mode shapes as a file holds them: any scale, real or complex.
 
-    # frequency, damping: (r,) [Hz], fraction of critical
+    Attributes
+    ----------
+    frequency, damping : (r,)   [Hz], fraction of critical or nan
+    values : (n, r)
+    dofs : n labels
+    sd : (n, r) or None         standard deviation of each entry
+    frequency_sd : (r,) or None [Hz]
+    """
+
     frequency: np.ndarray
     damping: np.ndarray
-    values: np.ndarray  # (n, r)
-    dofs: tuple[str, ...]  # n labels
+    values: np.ndarray
+    dofs: tuple[str, ...]
+    sd: np.ndarray | None = None
+    frequency_sd: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         due = (len(self.dofs), len(self.frequency))
-        if self.values.shape != due:
-            raise ShapeError(f"shapes are {self.values.shape}, labels and frequencies say {due}")
+        for values in (self.values, self.sd):
+            if values is not None and values.shape != due:
+                raise ShapeError(f"shapes are {values.shape}, labels and frequencies say {due}")
+
+    def sel(self, modes: np.ndarray, dofs: np.ndarray | slice = slice(None)) -> "Shapes":
+        """Some modes at some dofs, by position or mask."""
+        kept = np.arange(len(self.dofs))[dofs]
+        return replace(
+            self, frequency=self.frequency[modes], damping=self.damping[modes],
+            values=self.values[kept][:, modes], dofs=tuple(self.dofs[k] for k in kept),
+            sd=None if self.sd is None else self.sd[kept][:, modes],
+            frequency_sd=None if self.frequency_sd is None else self.frequency_sd[modes],
+        )  # fmt: skip
+
+    @property
+    def elastic(self) -> "Shapes":
+        """The modes that are no rigid motions, in the order of their frequencies."""
+        order = np.argsort(self.frequency, kind="stable")
+        f = self.frequency[order]
+        return self.sel(order[f > RIGID * f.max(initial=0.0)])
+
+    def poles(self) -> PoleTable:
+        """Frequencies and damping of the elastic modes as a table."""
+        found = self.elastic
+        n = len(found.frequency)
+        sd = np.full(n, np.nan) if found.frequency_sd is None else found.frequency_sd
+        return PoleTable(found.frequency, sd, found.damping, np.arange(1, n + 1), ("",) * n)
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(OneScreen):
     """One file of a test, or one article or level of it.
 
     Attributes
@@ -101,7 +139,7 @@ class Recording:
     name : str                   file (and article, level) it comes from
     frf : FRF or None
     poles : PoleTable or None        where no FRF exists
-    shapes : Shapes or None      mode shapes the file holds
+    shapes : Shapes or None      mode shapes the file holds; with ``poles`` of a modal model
     nodes : {node: (3,)}         places [m]
     axes : {node: (3, 3)}        rows: unit vectors of the node's own measuring axes, where turned
     elements : tuple of tuples   nodes of each trace line or element
@@ -132,6 +170,32 @@ class Recording:
     state: str = ""
     mass: float | None = None
     control: Control = "force"
+
+    def reciprocal(self, quantity: str) -> "Recording":
+        """The recording with force over motion, of one force at a time, as motion over force."""
+        if self.frf is None:
+            raise LabelError(f"{self.name} holds no FRFs that could be {quantity}")
+        frf, kind = self.frf, MOTION_OVER_FORCE[quantity]
+        if not frf.values.all():
+            raise LabelError(f"{self.name}: {quantity} is zero on a line and has no reciprocal")
+        variance = None if frf.variance is None else frf.variance / np.abs(frf.values) ** 4
+        frf = replace(frf, values=1 / frf.values, variance=variance, quantity=kind)
+        note = f"{self.name}: {quantity} was turned into its reciprocal, {kind}"
+        return replace(self, frf=frf, notes=(*self.notes, note))
+
+    @property
+    def modal(self) -> Shapes | None:
+        """Elastic modes with shapes, one for each of ``poles``; None where shapes are not known.
+
+        Test systems fill in zeros for the directions that they did not measure.
+        """
+        if self.frf is not None or self.poles is None or self.shapes is None:
+            return None
+        found = self.shapes.elastic
+        measured = np.flatnonzero(found.values.any(axis=1))
+        if len(found.frequency) != len(self.poles.frequency) or not len(measured):
+            return None
+        return found.sel(np.arange(len(found.frequency)), measured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +236,8 @@ class SensorAccuracy:
     position: float = 1.5e-3
 
 
-@dataclass(frozen=True, eq=False)
-class TestSetup:
+@dataclass(frozen=True, eq=False, repr=False)
+class TestSetup(OneScreen):
     """The test as it was set up: sensors, exciters, hangers, the weighing."""
 
     __test__ = False  # not a test class, whatever its name says

@@ -21,6 +21,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ..units import number
 from .finding import Finding, Severity
 from .odds import evidence_in_words
 
@@ -237,7 +238,7 @@ def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float, over: float)
         turned = " and has the wrong sign" if g < 0 else ""
         kind, text = (
             "wrong gain",
-            f"output {label} is {abs(g):.3g} times as large as the shapes allow{turned}",
+            f"output {label} is {number(abs(g), 3)} times as large as the shapes allow{turned}",
         )
         mend = f"in sensors.csv give {label} the gain {g:.3g}"
     unless = "" if g == -1.0 else _UNLESS

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..dynamics.frf import FRF
+from ..units import number
 from .finding import Check, Finding
 from .frf_estimate import excitation_of
 from .identification import DERIVATIVES
@@ -97,7 +98,7 @@ def dropouts(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Fin
         more = f", and {len(runs) - 1} more such runs" if len(runs) > 1 else ""
         text = (
             f"{c.name} does not move for {last - first} samples from {first / record.rate:.4g} s "
-            f"on (each is {x[first]:.4g}){more}; its signal was interrupted."
+            f"on (each is {number(x[first], 4)}){more}; its signal was interrupted."
         )
         mend = "check its cable and the storage, and measure again"
         found.append(Finding("dropout", text, "fault", (c.label,), mend, whole / record.rate))
@@ -163,7 +164,7 @@ def spikes(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Findi
         first, most = lone[0] / record.rate, float(size[lone].max())
         text = (
             f"{c.name} has {len(lone)} lone spikes, the first at {first:.4g} s; the largest is "
-            f"{most:.3g} times the rms of the signal, and no other channel shows it."
+            f"{number(most, 3)} times the rms of the signal, and no other channel shows it."
         )
         mend = "check cable, connector and range of the front end"
         found.append(Finding("spikes", text, "warning", (c.label,), mend, float(len(lone))))
@@ -240,16 +241,16 @@ def drifts(record: TimeRecord, channels: Sequence[_Channel]) -> tuple[list[Findi
         if step is not None:
             what, text = (
                 "step",
-                f"{c.name} steps by {size:.3g} at {step * every / record.rate:.4g} s",
+                f"{c.name} steps by {number(size, 3)} at {step * every / record.rate:.4g} s",
             )
         else:
-            what, text = "drift", f"{c.name} drifts by {size:.3g} from 0 to {T:.4g} s"
-        text += f", {size / max(rms, 1e-300):.3g} times the rms of its signal"
+            what, text = "drift", f"{c.name} drifts by {number(size, 3)} from 0 to {T:.4g} s"
+        text += f", {number(size / max(rms, 1e-300), 3)} times the rms of its signal"
         if power and not c.drives:
             text += f"; as a motion it would take the article {away:.2g} m away"
         mend = "let the sensor warm up, check its insulation and coupling, or take off the drift"
         found.append(Finding(what, f"{text}.", "warning", (c.label,), mend, size))
-    said = f"at most {largest:.2g} times the rms of the signal"
+    said = f"at most {number(largest, 2)} times the rms of the signal"
     return found, Check("drift", said, not found)
 
 
@@ -297,13 +298,13 @@ def changed_gains(
         largest = max(largest, factor)
         if factor > GAIN and abs(change) > SURE * sd and alike < CALM * abs(change):
             text = (
-                f"output {label} is {np.exp(change):.3g} times as sensitive from about "
+                f"output {label} is {number(np.exp(change), 3)} times as sensitive from about "
                 f"{starts[at]:.4g} s on as before, and no other output changes: its gain, range or "
                 "unit was changed."
             )
             mend = "split the recording there, or measure again"
             found.append(Finding("changed gain", text, "fault", (label,), mend, np.exp(change)))
-    said = f"one changes {largest:.3g}-fold at most"
+    said = f"one changes {number(largest, 3)}-fold at most"
     return found, Check("steady gains", said, not found)
 
 

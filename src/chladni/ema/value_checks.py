@@ -6,6 +6,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import named
+from ..units import number
 from .finding import Check, Finding
 from .screening import roughness
 
@@ -79,8 +80,8 @@ def cut_off(frf: FRF) -> tuple[list[Finding], Check]:
         return [], Check("cut off", "no largest value repeats itself")
     text = (
         f"the largest values of {len(names)} of {len(frf.outputs)} outputs ({named(names, 4)}) are "
-        f"one value, from {limit:.4g}, on {LEAST_CUT} lines and more while the phase changes: the "
-        "FRFs are cut off."
+        f"one value, from {number(limit, 4)}, on {LEAST_CUT} lines and more while the phase "
+        "changes: the FRFs are cut off."
     )
     mend = "export without a limit, or measure in a larger range"
     found = Finding("cut off", text, "fault", tuple(names), mend, limit)

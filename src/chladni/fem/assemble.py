@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import OneScreen
 from ..dofs import rows as label_rows
 from ..dynamics.system import System
 from ..errors import LabelError, ModelError
@@ -32,8 +33,8 @@ EMPTY = 1e-8  # of the stiffest direction of a point: Nastran's EPZERO of AUTOSP
 PIECE = 1024  # elements whose matrices are in memory at a time
 
 
-@dataclass(frozen=True, eq=False)
-class Structure:
+@dataclass(frozen=True, eq=False, repr=False)
+class Structure(OneScreen):
     """The assembled matrices and the transformation from the free dofs to the motion of points."""
 
     assembly: Assembly

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import ModelError, named
 from ..model.assembly import Assembly
 from ..model.properties import BeamSection, Isotropic
+from . import tapered_beam
 
 
 def stiffness_and_mass(assembly: Assembly) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -23,10 +24,32 @@ def stiffness_and_mass(assembly: Assembly) -> tuple[np.ndarray, np.ndarray, np.n
     ends = assembly.points[beams.nodes] + beams.offset
     R, L = frames(ends, beams.up, beams.ids)
     K = stiffness(L, **_rigidities(sections))
+    M = _mass(sections, L, beams.nonstructural, coupled=assembly.coupled_mass)
+    _taper(sections, L, beams.nonstructural, K, M, coupled=assembly.coupled_mass)
     K = released(K, beams.pins.reshape(-1, 12))
-    M = _mass(sections, L, coupled=assembly.coupled_mass)
     T = _to_nodes(R, beams.offset)
     return beams.nodes, T.transpose(0, 2, 1) @ K @ T, T.transpose(0, 2, 1) @ M @ T
+
+
+def _taper(
+    sections: list[BeamSection],
+    L: np.ndarray,
+    more: np.ndarray,
+    K: np.ndarray,
+    M: np.ndarray,
+    *,
+    coupled: bool,
+) -> None:
+    """Put K and M of tapered beams in the place of those of their end A."""
+    for section in {s for s in sections if s.stations}:
+        at = np.array([i for i, s in enumerate(sections) if s == section])
+        e, t, kappa, w = _deformations(L[at], np.zeros((len(at), 2)))
+        D = np.concatenate([e[:, None], t[:, None], kappa, w], axis=1)
+        K[at] = D.transpose(0, 2, 1) @ tapered_beam.natural_stiffness(section, L[at]) @ D
+        M[at] = sum(
+            _moved(line, ends, L[at])
+            for line, ends in tapered_beam.masses(section, L[at], more[at], coupled=coupled)
+        )
 
 
 def loss_factors(assembly: Assembly) -> np.ndarray:
@@ -145,10 +168,17 @@ def released(K: np.ndarray, pins: np.ndarray) -> np.ndarray:
     return K
 
 
-def _mass(sections: list[BeamSection], L: np.ndarray, *, coupled: bool) -> np.ndarray:
-    """Element masses (m, 12, 12) in the element frame [kg]."""
+def _mass(
+    sections: list[BeamSection], L: np.ndarray, more: np.ndarray, *, coupled: bool
+) -> np.ndarray:
+    """Element masses (m, 12, 12) in the element frame [kg].
+
+    Parameters
+    ----------
+    more : (m,)   mass of the elements beyond that of their sections [kg/m]
+    """
     structural = np.array([s.material.rho * s.area for s in sections]) * L
-    other = np.array([s.nonstructural for s in sections]) * L
+    other = (np.array([s.nonstructural for s in sections]) + more) * L
     polar = np.array([s.material.rho * (s.I1 + s.I2) * (s.kind == "beam") for s in sections]) * L
     extra = np.array([s.nonstructural_inertia for s in sections]) * L
     at = np.array([s.neutral for s in sections], dtype=float)
@@ -189,7 +219,7 @@ def _consistent(
     _add(M, (1, 5, 7, 11), across)
     flip = np.array([1, -1, 1, -1])
     _add(M, (2, 4, 8, 10), across * np.outer(flip, flip))
-    return _moved(M, at)
+    return _moved(M, np.stack([at, at], axis=1), L)
 
 
 def _add(M: np.ndarray, dofs: tuple[int, ...], block: np.ndarray) -> None:
@@ -207,12 +237,16 @@ def _halves() -> np.ndarray:
     return np.diag([0.5, 0, 0.5, 0])
 
 
-def _moved(M: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Tᵀ M T for a line at the offset (y, z), with T = [1, -r×] at both ends."""
+def _moved(M: np.ndarray, at: np.ndarray, L: np.ndarray) -> np.ndarray:
+    """Tᵀ M T for a line at the offsets (n, 2, 2) of both ends (y, z).
+
+    T = [1, -r×], and where the line is tilted its slopes gain v' = -z' θx, w' = y' θx.
+    """
+    tilt = (at[:, 1] - at[:, 0]) / L[:, None]
     T = np.tile(np.eye(12), (len(M), 1, 1))
-    y, z = at.T
-    for k in (0, 6):
+    for k, (y, z) in zip((0, 6), at.transpose(1, 2, 0), strict=True):
         T[:, k, k + 4], T[:, k, k + 5], T[:, k + 1, k + 3], T[:, k + 2, k + 3] = z, -y, -z, y
+        T[:, k + 4, k + 3], T[:, k + 5, k + 3] = -tilt.T
     return T.transpose(0, 2, 1) @ M @ T
 
 

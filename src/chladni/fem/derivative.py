@@ -132,8 +132,9 @@ def of_part(structure: Structure, part: int, name: str) -> Slope:
     a = only(structure.assembly, part)
     section = a.parts[part].section
     if isinstance(section, BeamSection):
-        own = replace(section, nonstructural=0.0, nonstructural_inertia=0.0)
-        a = replace(a, parts=tuple(replace(p, section=own) if k == part else p
+        bare_beams = replace(a.beams, nonstructural=np.zeros(len(a.beams)))
+        a = replace(a, beams=bare_beams)
+        a = replace(a, parts=tuple(replace(p, section=section.structural) if k == part else p
                                    for k, p in enumerate(a.parts)))  # fmt: skip
     M, _, K, _ = over_all_motions(a)
     found = {"E": {"K": K}, "rho": {"M": M}, "wall": {"K": K, "M": M}}[name]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..geometry.facets import cell_areas
 from ..model.assembly import Assembly, Beams, Bushes, Masses, Scalars, Shells, picked
 from . import shell
 from .assemble import PIECE, Structure, over_all_motions
@@ -53,6 +54,33 @@ def part_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
     return _shares(structure, phi, 2, structure.system.K)
 
 
+def kinetic_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
+    """Share φᵀ M_p φ / φᵀ M φ of each part in the kinetic energy of each motion (parts, r).
+
+    The rest to 1 is in point masses.
+    """
+    return _shares(structure, phi, 0, structure.system.M)
+
+
+def effective_masses(structure: Structure, phi: np.ndarray, about: np.ndarray) -> np.ndarray:
+    """Effective modal mass (φᵀ M R)² / φᵀ M φ for the six rigid motions of the base (6, r).
+
+    Over all modes the rows add up to the mass and inertia that move (Craig and Kurdila 2006,
+    Fundamentals of Structural Dynamics, section 18.2). Three translations [kg], three rotations
+    [kg m²].
+
+    Parameters
+    ----------
+    phi : (n_free, r)   modes over the free dofs
+    about : (3,)        point of the rotations [m]
+    """
+    made = structure.assembly
+    R = rigid_motions(replace(made, points=made.points - about))
+    load = np.asarray(structure.T.T @ (over_all_motions(made)[0] @ R))
+    mass = np.einsum("nr,nr->r", phi, structure.system.M @ phi)
+    return np.asarray((load.T @ phi) ** 2 / mass)
+
+
 def _shares(structure: Structure, phi: np.ndarray, which: int, whole: sp.csr_array) -> np.ndarray:
     """φᵀ A_p φ / φᵀ A φ, A the M (0) or K (2) of every part."""
     u = np.asarray(structure.T @ phi)
@@ -82,6 +110,37 @@ def only(assembly: Assembly, part: int) -> Assembly:
         beams=picked(beams, beams.part == part) if len(beams) else Beams(),
         solids=tuple(picked(s, s.part == part) for s in assembly.solids if np.any(s.part == part)),
     )
+
+
+def element_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
+    """Strain energy ½ uᵀ K_e u (n, r) [J] of all shells, then all solids, then all beams."""
+    from . import beam, solid
+
+    a = structure.assembly
+    u = np.asarray(structure.T @ phi).reshape(len(a.points), 6, -1)
+    found = [np.zeros((len(a.shells), phi.shape[1]))]
+    for which in (a.shells.curved, ~a.shells.curved):
+        if which.any():
+            some = replace(structure, assembly=replace(a, shells=picked(a.shells, which)))
+            found[0][which] = shell_energies(some, phi)
+    for nodes, K, _ in solid.stiffness_and_mass(a):
+        u_e = u[nodes, :3].reshape(len(K), -1, phi.shape[1])
+        found.append(0.5 * np.einsum("eir,eij,ejr->er", u_e, K, u_e, optimize=True))
+    nodes, K, _ = beam.stiffness_and_mass(a)
+    u_e = u[nodes].reshape(len(K), 12, phi.shape[1])
+    return np.concatenate([*found, 0.5 * np.einsum("eir,eij,ejr->er", u_e, K, u_e)])
+
+
+def element_volumes(assembly: Assembly) -> np.ndarray:
+    """Volumes (n,) [m³] of all shells, then all solids, then all beams."""
+    from . import solid
+
+    a, x = assembly, assembly.points
+    found = [cell_areas(x, a.shells.nodes) * a.thickness()]
+    found += [solid.volume(x[group.nodes]) for group in a.solids]
+    area = [getattr(a.parts[p].section, "area", 0.0) for p in a.beams.part.tolist()]
+    ends = x[a.beams.nodes] + a.beams.offset
+    return np.concatenate([*found, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * area])
 
 
 def shell_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:

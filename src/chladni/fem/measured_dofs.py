@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import OneScreen
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from .assemble import Structure
@@ -14,8 +15,8 @@ from .locate import Share, rows_of, shares_of
 _ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredDofs:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasuredDofs(OneScreen):
     """Measured or driven dofs: grids, free points on the nearest shell, or motion of the base."""
 
     labels: tuple[str, ...]  # (k,) text

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import OneScreen
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
 from ..errors import ModelError
@@ -15,8 +16,8 @@ LARGE = 100_000  # dofs from which it saves memory to return what the assembly h
 _ROUNDING = 1e-9  # tolerance, because callers compute the same band by different products
 
 
-@dataclass(frozen=True, eq=False)
-class Modelled:
+@dataclass(frozen=True, eq=False, repr=False)
+class Modelled(OneScreen):
     """The matrices of an assembly and all its normal modes up to ``band``, at least the first."""
 
     structure: Structure

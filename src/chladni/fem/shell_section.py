@@ -124,7 +124,7 @@ def section_arrays(
         S=_inverse(flexibility + _diagonal(residual), Qb),
         drill=np.outer(Qm[:, 2, 2] * t, _drilling(assembly.k6rot)),
         rho=rho,
-        nsm=nsm,
+        nsm=nsm + shells.nonstructural,
         loss=loss,
         shear_flexibility=flexibility,
         residual_flexibility=residual,

@@ -10,6 +10,8 @@ import scipy.sparse as sp
 from ..model.assembly import Assembly, Bushes, Scalars
 from .beam import cross
 
+_ROUNDING = 1e-12  # of the length of an arm
+
 
 def matrices(
     assembly: Assembly,
@@ -55,7 +57,10 @@ def _relative(assembly: Assembly, bushes: Bushes) -> np.ndarray:
         joined = sign * (bushes.nodes[:, end] >= 0)[:, None, None]
         k = 6 * end
         E[:, :3, k : k + 3] = E[:, 3:, k + 3 : k + 6] = joined * bushes.frame
-        E[:, :3, k + 3 : k + 6] = -joined * (bushes.frame @ cross(arm))
+        turned = bushes.frame @ cross(arm)
+        size = np.linalg.norm(arm, axis=1)[:, None, None]
+        turned[np.abs(turned) < _ROUNDING * size] = 0  # a force along the arm turns nothing
+        E[:, :3, k + 3 : k + 6] = -joined * turned
     return E
 
 

@@ -131,4 +131,5 @@ def _split(shells: Shells, side: np.ndarray, centre: int) -> Shells:
         np.concatenate([thick for _, thick in pieces]),
         shells.axis[at],
         shells.offset[at],
+        nonstructural=shells.nonstructural[at],
     )

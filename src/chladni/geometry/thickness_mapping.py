@@ -72,7 +72,7 @@ def shell_mass(assembly: Assembly) -> np.ndarray:
             rho[k], extra[k] = getattr(material, "rho", 0.0), section.nonstructural
     part = assembly.shells.part
     mean = _cell_mean(assembly.shells.nodes, assembly.shells.thickness)
-    return shell_area(assembly) * (rho[part] * mean + extra[part])
+    return shell_area(assembly) * (rho[part] * mean + extra[part] + assembly.shells.nonstructural)
 
 
 def area_mean(assembly: Assembly, rows: np.ndarray) -> float:

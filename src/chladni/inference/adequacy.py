@@ -17,6 +17,7 @@ its modal damping would scatter more than that of one structure.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
@@ -106,7 +107,7 @@ def _along_lines(z: np.ndarray) -> np.ndarray:
 STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
 TWO_SIDED = (0, 1)  # a fit better than those of right models has overstated errors
 NAMES = (
-    "the form error must be {0:.1%}; right models have {1:.1%}",
+    "the form error must be {3:.1f} %; right models have {4:.1f} %",
     "the residual is {2:.1f} times as large as a right model leaves",
     "the residual of one spectral line is {2:.1f} times as large as a right model leaves",
     "the residual of one channel is {2:.1f} times as large as a right model leaves",
@@ -149,7 +150,9 @@ def adequacy(
         for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
     )
     usual = rows[least].median
-    what = NAMES[least].format(seen[least], usual, seen[least] / usual)
+    what = NAMES[least].format(
+        seen[least], usual, seen[least] / usual, 100 * seen[least], 100 * usual
+    )
     near = _modes_near(worst, fit.state)
     test = FitTest(better or p >= LEAST_P, p, what, where, rows, near, better)
     if damping is not None:
@@ -194,9 +197,7 @@ def of_poles(data: Poles, state: State) -> FitTest:
     and of at least as many poles without a partner among the modes of ``state``. Each pole is
     spurious with its own probability.
     """
-    from scipy.stats import norm
-
-    closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
+    closely = float(ndtr(-np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
     alone = np.setdiff1d(poles, data.pairs(state)[0])
     share = np.broadcast_to(data.spurious, data.frequency.shape)[poles]
@@ -205,9 +206,10 @@ def of_poles(data: Poles, state: State) -> FitTest:
         what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
         where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
         return FitTest(often >= LEAST_P, often, what, where)
+    both = " and shapes" if data.shapes is not None else ""
     what = (
-        f"natural frequencies agree to {data.scale:.1%}; models of one structure differ by about "
-        f"{SCALE:.1%}"
+        f"natural frequencies{both} agree to {100 * data.scale:.1f} %; models of one structure "
+        f"differ by about {100 * SCALE:.1f} %"
     )
     return FitTest(closely >= LEAST_P, closely, what, "over all modes")
 

@@ -115,12 +115,8 @@ def _by_modes(
     gain_known: bool,
 ) -> Screening:
     """Level, quantity and every channel, by modal constants and shapes."""
-    strong = strong_modes(found)
-    built, modes = model.structure, model.modes
-    f_max = REACH * found.band[1]
-    elastic = ~rigid_modes(modes) & (modes.frequency <= f_max)
-    elastic &= modes.frequency > 1e-3 * f_max
-    near = modes.sel(np.flatnonzero(elastic))
+    strong, built = strong_modes(found), model.structure
+    near = _elastic(model, REACH * found.band[1])
     labels = found.outputs
     phi_o = outputs.rows(built) @ near.shapes
     phi_i = inputs.rows(built) @ near.shapes
@@ -135,22 +131,49 @@ def _by_modes(
         findings = []  # the level of responses that are unlike the model's has no meaning
     bad = {c for f in before.findings for c in f.channels if f.kind in _UNUSABLE}
     keep = np.array([k for k, label in enumerate(labels) if label not in bad], int)
+    faults, one = _channels(real_shapes(strong)[keep], strong.frequency, built, near, outputs, keep)
+    return before.with_more([*findings, *faults], [check, one])
+
+
+def shapes_against_model(
+    name: str, psi: np.ndarray, frequency: np.ndarray, model: Modelled, outputs: MeasuredDofs
+) -> Screening:
+    """Screening of every channel of a modal model; its faults are mended in the table of sensors.
+
+    Parameters
+    ----------
+    psi : (n_out, r)   real shapes
+    """
+    near = _elastic(model, min(REACH * float(frequency.max()), model.band))
+    every = np.arange(len(psi))
+    faults, check = _channels(psi, frequency, model.structure, near, outputs, every)
+    return Screening(name, tuple(replace(f, mend=()) for f in faults), (check,))
+
+
+def _elastic(model: Modelled, f_max: float) -> ModalModel:
+    """Elastic modes of a model up to a frequency [Hz]."""
+    f = model.modes.frequency
+    elastic = ~rigid_modes(model.modes) & (f <= f_max) & (f > 1e-3 * f_max)
+    return model.modes.sel(np.flatnonzero(elastic))
+
+
+def _channels(
+    psi: np.ndarray, frequency: np.ndarray, built: Structure, near: ModalModel,
+    outputs: MeasuredDofs, keep: np.ndarray,
+) -> tuple[list[Finding], Check]:  # fmt: skip
+    """Faults of some channels by their shapes ψ (k, r), and the check."""
     shapes = ModelShapes(
-        phi_o[keep],
-        near.frequency,
+        (outputs.rows(built) @ near.shapes)[keep], near.frequency,
         lambda i: _turned(outputs, int(keep[i]), built, near.shapes),
         lambda i: _elsewhere(outputs, int(keep[i]), built, near.shapes),
-    )
-    psi = real_shapes(strong)[keep]
-    kept = tuple(labels[k] for k in keep)
-    faults = [] if outputs.sd.any() else shape_faults(kept, psi, strong.frequency, shapes)
-    said = f"{len(kept)} channels, {strong.order} modes, {len(near.frequency)} of the model"
-    one = Check("channels against the model", said, not faults)
-    if outputs.sd.any() or len(kept) < LEAST_CHANNELS or strong.order < LEAST_MODES:
+    )  # fmt: skip
+    kept = tuple(outputs.labels[k] for k in keep)
+    faults = [] if outputs.sd.any() else shape_faults(kept, psi, frequency, shapes)
+    said = f"{len(kept)} channels, {len(frequency)} modes, {len(near.frequency)} of the model"
+    if outputs.sd.any() or len(kept) < LEAST_CHANNELS or len(frequency) < LEAST_MODES:
         why = f"{said}: at least {LEAST_CHANNELS} channels of known places, {LEAST_MODES} modes"
-        one = Check("channels against the model", why, None)
-    checks = [check, one]
-    return before.with_more([*findings, *faults], checks)
+        return faults, Check("channels against the model", why, None)
+    return faults, Check("channels against the model", said, not faults)
 
 
 _UNUSABLE = ("dead channel", "duplicated channels")

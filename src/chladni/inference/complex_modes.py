@@ -14,6 +14,7 @@ mass make no mode complex, so an effect of stiffness or mass alone cannot explai
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import bdtr, bdtrc
 
 from ..ema.identification import Identified
 from ..ema.propagation import standard_deviations
@@ -55,14 +56,12 @@ class ModeCoupling:
         pairs with equal signs.  Equal signs are as likely as opposite ones where close poles make
         shapes complex without coupling.  They are less likely where damping couples the modes.
         """
-        from scipy.stats import binom
-
         n = len(self.frequency)
         ratio = self.complexity / self.bound
         over = np.flatnonzero(ratio > MARGIN)
-        most = float(binom.sf(len(over) - 1, n, EXCUSED))
-        skew = float(binom.sf(self.alike - 1, self.coupled, 0.5)) if self.coupled else 1.0
-        allowed = float(binom.ppf(0.995, n, EXCUSED))
+        most = float(bdtrc(len(over) - 1, n, EXCUSED))
+        skew = float(bdtrc(self.alike - 1, self.coupled, 0.5)) if self.coupled else 1.0
+        allowed = float(np.searchsorted(bdtr(np.arange(n + 1), n, EXCUSED), 0.995))
         row = FitStatistic("complex modes", float(len(over)), n * EXCUSED, 0.0, allowed)
         if most <= skew:
             what = f"{len(over)} of {n} modes are more complex than their damping explains"

@@ -81,10 +81,12 @@ class ModalDamping(IdentifiedDamping):
         out = out if len(out) else np.array([int(np.argmax(excess))])
         usual = float(np.median(self.ratio))
         least, most = self.ratio[out].min(), self.ratio[out].max()
-        span = f"{most:.1%}" if len(out) == 1 else f"{least:.1%} to {most:.1%}"
+        span = (
+            f"{100 * most:.1f} %" if len(out) == 1 else f"{100 * least:.1f} % to {100 * most:.1f} %"
+        )
         what = (
             f"{len(out)} of {len(self.ratio)} modes have a damping of {span}, the others about "
-            f"{usual:.1%}: stiffness and mass cannot explain this dissipation"
+            f"{100 * usual:.1f} %: stiffness and mass cannot explain this dissipation"
         )
         modes = tuple(float(f) for f in self.frequency[out])
         return what, "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz", modes

@@ -104,9 +104,8 @@ def _slopes(data: Responses | Poles, state: State) -> np.ndarray:
     """Slopes of the whitened data; natural frequencies are paired in a wide window first."""
     if not isinstance(data, Poles):
         return data.residual(state, True)[1]
-    wide = replace(data, scale=PAIRED, strength=np.full(len(data.strength), np.inf))
-    widths = np.append((wide.std() / data.std())[data.use], 1.0)
-    return wide.scaled(state, True)[1] * widths[:, None]
+    wide = replace(data.all_paired(), scale=PAIRED)
+    return data.scaled(state, True, wide.pairs(state))[1]
 
 
 def calibration_positions(effects: Sequence[Effect]) -> np.ndarray:
@@ -282,10 +281,10 @@ def _why(k: int, names: Sequence[str], prior: np.ndarray, F: np.ndarray) -> str:
     """Reason why a parameter is frozen, in one sentence."""
     if 1 / (1 + F[k, k]) > HALF:
         alone = _sd(prior[k], F[k, k])
-        known = "not at all" if alone is None or alone > 1 else f"only to {alone:.1%}"
+        known = "not at all" if alone is None or alone > 1 else f"only to {100 * alone:.1f} %"
         return (
             f"with all others known, the data would determine {names[k]} {known}, its prior to "
-            f"{prior[k]:.1%}"
+            f"{100 * prior[k]:.1f} %"
         )
     others = np.setdiff1d(np.arange(len(F)), [k])
     answer = np.zeros(len(F))
@@ -293,10 +292,9 @@ def _why(k: int, names: Sequence[str], prior: np.ndarray, F: np.ndarray) -> str:
     answer[others] = -np.linalg.solve(inner, F[others, k])
     share = np.abs(answer) * np.sqrt(np.diag(F) / F[k, k])
     partners = [j for j in np.argsort(-share) if share[j] > PARTNER]
-    makes_up = ", ".join(
-        f"{answer[j] * prior[j] / prior[k]:+.2f} % of {names[j]}" for j in partners
-    )
-    return f"{names[k]} trades off: {makes_up or 'many small changes'} compensate +1 % of it"
+    others_by = [f"{names[j]} by {answer[j] * prior[j] / prior[k]:+.2f} %" for j in partners]
+    rest = " and ".join(others_by or ["many others by little"])
+    return f"the data hardly change where {names[k]} changes by +1 % and {rest}"
 
 
 def _settled(k: int, told: Information, held: np.ndarray) -> str:

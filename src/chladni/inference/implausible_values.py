@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TypeGuard
 
 import numpy as np
+from scipy.special import chdtrc
 
 from ..effects.effect import Effect
 from ..effects.joint_stiffness import FAR, JOINTS, ModelFamily
@@ -63,15 +64,13 @@ def _far_together(fit: Fit) -> list[str]:
     With z = (x - μ)/σ, |z|² is χ² where the deck is right.  Its degrees of freedom are the number
     of directions that the data determine: the prior's trace less that of the covariance of z.
     """
-    from scipy.stats import chi2
-
     own = [e for e in fit.effects if e.kind == "calibration" and e.parameters]
     if not own:
         return []
     z = np.concatenate([(fit.of(e) - _each(e, "mean")) / _each(e, "sd") for e in own])
     left = sum(float(((fit.sd(e) / _each(e, "sd")) ** 2).sum()) for e in own)
     freedom = max(1.0, len(z) - left)
-    if chi2.sf(z @ z, freedom) >= chi2.sf(FAR**2, 1):
+    if chdtrc(freedom, z @ z) >= chdtrc(1, FAR**2):
         return []
     names = ", ".join(e.text for e in own)
     return [

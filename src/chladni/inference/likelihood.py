@@ -6,7 +6,7 @@ interface serves natural frequencies alone (:class:`.pole_data.Poles`).
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self
+from typing import ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
@@ -77,6 +77,8 @@ class Responses:
     direct: np.ndarray | float = 0.0
     sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
     known: Whitening | None = None  # of what those errors do to the lines and channels in use
+
+    compared: ClassVar[Literal["responses"]] = "responses"
 
     @property
     def power(self) -> int:
@@ -192,7 +194,7 @@ class Responses:
 
     def _stacked(self, z: np.ndarray, use: np.ndarray) -> np.ndarray:
         """Columns of :meth:`stacked` where z holds some lines and channels; ``use`` is of these."""
-        picked = z[:, use].reshape(len(z), use.sum() * z.shape[-1]).T
+        picked = np.moveaxis(z, 0, -1)[use].reshape(use.sum() * z.shape[-1], len(z))
         columns = np.concatenate([picked.real, picked.imag])
         return columns if self.known is None else self.known.whitened(columns)
 
@@ -210,32 +212,34 @@ class Responses:
         H = self.receptance(state, phi_o, phi_i, d, s) + direct / s[:, None, None] ** self.power
         assert state.dK is not None
         assert state.dM is not None
-        out = np.empty((state.dK.count, *H.shape), complex)
+        out = np.empty((*H.shape, state.dK.count), complex)
         left = phi_o * d[:, None]  # φ_o D (n_f, n_out, r)
         q = state.vectors @ np.stack([(phi * d).T for phi in phi_i])  # (n_in, m, n_f)
         span, parts = spanned(np.concatenate([*q, *(q * s**2)], axis=1))
         of_K, of_M = np.split(parts.reshape(len(span.T), 2, len(q), -1), 2, axis=1)
         slopes = np.concatenate([state.dK.times(span), state.dM.times(span)], axis=2)
-        from_basis = left @ state.vectors.T
+        slopes = slopes.transpose(2, 1, 0).reshape(slopes.shape[2], -1)  # (2k, m n_p)
+        real, imag = (part @ state.vectors.T for part in (left.real, left.imag))
+        seen = np.block([[real, -imag], [imag, real]])  # products of real numbers are fast
         for j in range(len(phi_i)):
-            both = np.concatenate([of_K[:, 0, j], of_M[:, 0, j]])
-            W = (slopes @ np.ascontiguousarray(both).view(float)).view(complex)
-            W = np.ascontiguousarray(W.transpose(2, 1, 0))  # or it is no product of BLAS
-            out[:, :, :, j] = -(from_basis @ W).transpose(2, 0, 1)
+            both = np.concatenate([of_K[:, 0, j], of_M[:, 0, j]]).T
+            both = np.stack([both.real, both.imag], axis=1)  # (n_f, 2, 2k)
+            W = (both.reshape(-1, len(slopes)) @ slopes).reshape(*seen.shape[::2], -1)
+            out[:, :, j].real, out[:, :, j].imag = np.split(-seen @ W, 2, axis=1)
             if state.ddrive is not None:
-                out[:, :, :, j] += np.einsum("for,pr->pfo", left, state.ddrive[:, j], optimize=True)
+                out[:, :, j] += np.einsum("for,pr->fop", left, state.ddrive[:, j], optimize=True)
         if state.dissipated is not None:
-            for p, seen in state.dissipated.seen_slopes(s, d, phi_o, phi_i):
-                out[p] += seen
+            for p, lost in state.dissipated.seen_slopes(s, d, phi_o, phi_i):
+                out[..., p] += lost
         for p, moved in state.dmoved.items():
             moved_o, moved_i = self._of_test(moved)
-            out[p] += modal_sum(moved_o[outputs], d, phi_i)
+            out[..., p] += modal_sum(moved_o[outputs], d, phi_i)
             if state.drive is None:
-                out[p] += modal_sum(phi_o, d, moved_i)
-        out /= H * LN10
+                out[..., p] += modal_sum(phi_o, d, moved_i)
+        out /= H[..., None] * LN10
         if state.doffset is not None:
-            out += state.doffset[outputs].T[:, None, :, None]
-        return out
+            out += state.doffset[outputs][:, None]
+        return np.moveaxis(out, -1, 0)
 
     def only(self, use: np.ndarray) -> Self:
         """Return these responses on other lines and channels, without errors of form."""

@@ -45,7 +45,7 @@ def as_written(
     mesh = [e.halved for e in found.effects if type(e) is MeshError] if halved else []
     data, fits = hypothesis.data, list[Fit]()
     made = fitted if isinstance(data, Poles) else fit  # poles have the spread of the deck itself
-    if isinstance(data, Poles) and data.listed:
+    if isinstance(data, Poles) and data.listed and data.shapes is None:
         data = data.all_paired()
     for given in (False, True):
         x = [_given(e) if given and e.kind == "calibration" else found.of(e) for e in kept]

@@ -24,7 +24,7 @@ _WIDTHS = {"": (8, 16), "%": (10, 16), "+": (20, 20)}  # integers and reals of e
 
 
 @dataclass
-class _Block:
+class KeywordBlock:
     """One keyword with its data lines and their numbers."""
 
     keyword: str
@@ -33,11 +33,17 @@ class _Block:
     lines: list[str] = field(default_factory=list)
     at: list[int] = field(default_factory=list)
 
+    @property
+    def widths(self) -> tuple[int, int]:
+        """Columns of an integer and of a real number."""
+        return _WIDTHS[self.form]
+
     def fault(self, row: int, what: str) -> FileError:
+        """An error in a data line."""
         return FileError(f"{self.source}, line {self.at[row]}: {what} in *{self.keyword}")
 
 
-def _blocks(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Block]:
+def keyword_blocks(path: Path, above: tuple[Path, ...] = ()) -> Iterator[KeywordBlock]:
     """The keyword blocks of a file and of those it includes; ``above`` includes this one."""
     above = (*above, path.resolve())
     try:
@@ -58,7 +64,7 @@ def _blocks(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Block]:
             if name == "KEYWORD":
                 form = _format(line.upper(), form)
             here = name[-1] if name[-1:] in ("%", "+") else form
-            block = _Block(name.rstrip("%+-"), "" if name.endswith("-") else here, path)
+            block = KeywordBlock(name.rstrip("%+-"), "" if name.endswith("-") else here, path)
         elif block is not None:
             block.lines.append(line)
             block.at.append(number)
@@ -72,7 +78,7 @@ def _format(line: str, default: str) -> str:
     return "%" if "I10=Y" in line else default
 
 
-def _resolved(block: _Block, above: tuple[Path, ...]) -> Iterator[_Block]:
+def _resolved(block: KeywordBlock, above: tuple[Path, ...]) -> Iterator[KeywordBlock]:
     """The block itself, or the blocks of the file it includes."""
     if block.keyword != "INCLUDE":
         yield block
@@ -85,10 +91,10 @@ def _resolved(block: _Block, above: tuple[Path, ...]) -> Iterator[_Block]:
                 raise block.fault(row, f"no file {line.strip()!r}")
             if other.resolve() in above:
                 raise block.fault(row, f"{line.strip()!r} includes itself")
-            yield from _blocks(other, above)
+            yield from keyword_blocks(other, above)
 
 
-def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -> np.ndarray:
+def table(block: KeywordBlock, rows: np.ndarray, widths: Sequence[int], kind: type) -> np.ndarray:
     """The fields of some lines as numbers (n, fields); blank is zero."""
     lines = [block.lines[r] for r in rows]
     if any("," in line for line in lines):
@@ -138,14 +144,14 @@ def _first_bad(words: np.ndarray, kind: type) -> tuple[int, str]:
     return 0, str(words[0, 0])
 
 
-def _nodes(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
+def nodes_of(blocks: list[KeywordBlock]) -> tuple[np.ndarray, np.ndarray]:
     """Ids (n,) and places (n, 3) of all *NODE lines, by increasing id."""
     ids, places, lines = [np.zeros(0, np.int64)], [np.zeros((0, 3))], []
     for block in blocks:
         if block.keyword == "NODE" and block.lines:
-            whole, real = _WIDTHS[block.form]
+            whole, real = block.widths
             rows = np.arange(len(block.lines))
-            values = _table(block, rows, (whole, real, real, real), float)
+            values = table(block, rows, (whole, real, real, real), float)
             ids.append(values[:, 0].astype(np.int64))
             places.append(values[:, 1:])
             lines.append((block, rows))
@@ -155,7 +161,7 @@ def _nodes(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _first_of_each(
-    ids: np.ndarray, values: np.ndarray, lines: list[tuple[_Block, np.ndarray]], what: str
+    ids: np.ndarray, values: np.ndarray, lines: list[tuple[KeywordBlock, np.ndarray]], what: str
 ) -> np.ndarray:
     """Where each id stands first; what an include repeats is the same, all else is refused."""
     _, first, which = np.unique(ids, return_index=True, return_inverse=True)
@@ -166,7 +172,7 @@ def _first_of_each(
     return first
 
 
-def _at(lines: list[tuple[_Block, np.ndarray]], k: int) -> tuple[_Block, int]:
+def _at(lines: list[tuple[KeywordBlock, np.ndarray]], k: int) -> tuple[KeywordBlock, int]:
     """Block and row of the k-th of all that was read."""
     for block, rows in lines:
         if k < len(rows):
@@ -175,23 +181,23 @@ def _at(lines: list[tuple[_Block, np.ndarray]], k: int) -> tuple[_Block, int]:
     raise IndexError(k)
 
 
-def _shells(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
+def shells_of(blocks: list[KeywordBlock]) -> tuple[np.ndarray, np.ndarray]:
     """(n, 6) id, part, four node ids and (n, 4) thickness, zero where the section's holds."""
     found, thickness, lines = [np.zeros((0, 6), np.int64)], [np.zeros((0, 4))], []
     for block in blocks:
         if not block.keyword.startswith("ELEMENT_SHELL") or not block.lines:
             continue
-        options, (whole, real) = block.keyword.split("_")[2:], _WIDTHS[block.form]
+        options, (whole, real) = block.keyword.split("_")[2:], block.widths
         cards = 1 + ("THICKNESS" in options or "BETA" in options) + ("OFFSET" in options)
         if len(block.lines) % cards:
             raise block.fault(-1, f"{len(block.lines)} lines are not {cards} per element")
         first = np.arange(0, len(block.lines), cards)
-        values = _table(block, first, (whole,) * 10, int)
+        values = table(block, first, (whole,) * 10, int)
         if np.any(higher := values[:, 6:].any(axis=1)):
             raise block.fault(int(first[higher][0]), "a shell with mid-side nodes")
         found.append(values[:, :6])
         has = "THICKNESS" in block.keyword
-        t = _table(block, first + 1, (real,) * 4, float) if has else np.zeros((len(first), 4))
+        t = table(block, first + 1, (real,) * 4, float) if has else np.zeros((len(first), 4))
         thickness.append(t)
         lines.append((block, first))
     shells, t = np.vstack(found), np.vstack(thickness)
@@ -199,18 +205,18 @@ def _shells(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
     return shells[once], t[once]
 
 
-def _names(blocks: list[_Block]) -> tuple[dict[int, str], dict[int, int]]:
+def parts_of(blocks: list[KeywordBlock]) -> tuple[dict[int, str], dict[int, int]]:
     """Title and section of each part."""
     names, sections = {}, {}
     for block in blocks:
         if block.keyword == "PART":
             for k in range(0, len(block.lines) - 1, 2):
-                id_, section = _table(block, np.array([k + 1]), (10, 10), int)[0].tolist()
+                id_, section = table(block, np.array([k + 1]), (10, 10), int)[0].tolist()
                 names[id_], sections[id_] = block.lines[k].strip(), section
     return names, sections
 
 
-def _section_thickness(blocks: list[_Block]) -> dict[int, float]:
+def section_thickness(blocks: list[KeywordBlock]) -> dict[int, float]:
     """Thickness at the first node of every shell section."""
     out = {}
     for block in blocks:
@@ -218,17 +224,17 @@ def _section_thickness(blocks: list[_Block]) -> dict[int, float]:
             titled = block.keyword.endswith("TITLE")
             cards = 3 if titled else 2
             for k in range(int(titled), len(block.lines) - 1, cards):
-                id_ = int(_table(block, np.array([k]), (10,), int)[0, 0])
-                out[id_] = float(_table(block, np.array([k + 1]), (10,), float)[0, 0])
+                id_ = int(table(block, np.array([k]), (10,), int)[0, 0])
+                out[id_] = float(table(block, np.array([k + 1]), (10,), float)[0, 0])
     return out
 
 
 def read_keyword(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
     """Nodes, shells and their thickness of an LS-DYNA keyword file, in SI."""
     path, unit = Path(path), units_named(units)
-    blocks = list(_blocks(path))
-    ids, places = _nodes(blocks)
-    shells, t = _shells(blocks)
+    blocks = list(keyword_blocks(path))
+    ids, places = nodes_of(blocks)
+    shells, t = shells_of(blocks)
     if not len(ids) or not len(shells):
         raise FileError(f"{path} has {len(ids)} nodes and {len(shells)} shells; both are needed")
     nodes = shells[:, 2:].copy()
@@ -236,8 +242,8 @@ def read_keyword(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
     rows = np.minimum(np.searchsorted(ids, nodes), len(ids) - 1)
     if np.any(lost := (ids[rows] != nodes).any(axis=1)):
         raise FileError(f"{path}: shell {shells[lost][0, 0]} names a node that is not in *NODE")
-    names, sections = _names(blocks)
-    t = _with_sections(path, shells, t, sections, _section_thickness(blocks))
+    names, sections = parts_of(blocks)
+    t = _with_sections(path, shells, t, sections, section_thickness(blocks))
     return FormedMesh(ids, places * unit.length, rows, shells[:, 1], t * unit.length, names)
 
 

@@ -20,7 +20,7 @@ from .file_size import refuse_large, refuse_outside
 from .tables.csv_table import read_table
 
 _NODE_IDS = ("node", "nid", "id", "grid")
-_THICKNESS_NAMES = ("thickness", "t", "thk", "shell thickness")
+THICKNESS_NAMES = ("thickness", "t", "thk", "shell thickness")
 
 
 def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
@@ -49,7 +49,7 @@ def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
 def _read_csv(path: Path, unit: Units) -> FormedMesh:
     """Points with thickness, no cells; columns of other names are passed over."""
     table = read_table(path, ("x", "y", "z"), None)
-    t = next((n for n in _THICKNESS_NAMES if n in table), None)
+    t = next((n for n in THICKNESS_NAMES if n in table), None)
     if t is None:
         raise FileError(f"{path} has columns {', '.join(table.columns)}, but none of thickness")
     points = np.column_stack([table.numbers(c) for c in "xyz"])
@@ -76,7 +76,7 @@ def _read_csv(path: Path, unit: Units) -> FormedMesh:
 
 def _read_mesh(path: Path, unit: Units) -> FormedMesh:
     """Quads and triangles of a mesh file with nodal or elemental thickness."""
-    mesh = _meshio(path)
+    mesh = read_by_meshio(path)
     try:
         return _formed_of(path, mesh, unit)
     except ChladniError:
@@ -85,7 +85,7 @@ def _read_mesh(path: Path, unit: Units) -> FormedMesh:
         raise FileError(f"{path} cannot be read as a mesh: {error}") from error
 
 
-def _meshio(path: Path) -> Any:
+def read_by_meshio(path: Path) -> Any:
     """A mesh by meshio, which prints the reason and ends the process where it cannot read one."""
     import meshio
     from meshio._exceptions import CorruptionError  # no ReadError, and not exported
@@ -138,7 +138,7 @@ def _thickness_of(path: Path, mesh: object, block: int, nodes: np.ndarray) -> np
     """Thickness at the corners of a block of cells (n, 4), in the file's unit."""
     at_points = {k.lower(): v for k, v in mesh.point_data.items()}  # type: ignore[attr-defined]
     at_cells = {k.lower(): v for k, v in mesh.cell_data.items()}  # type: ignore[attr-defined]
-    for name in _THICKNESS_NAMES:
+    for name in THICKNESS_NAMES:
         if name in at_points:
             return np.asarray(at_points[name], dtype=float).ravel()[nodes]
         if name in at_cells:

@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..arrays import OneScreen
 from ..errors import LabelError, ModelError, named
 from .properties import Part
 
@@ -23,8 +24,8 @@ def _no_rows(*shape: int) -> np.ndarray:
     return np.zeros((0, *shape), dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class Shells:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shells(OneScreen):
     """Four- and three-node shells; a triangle repeats its third node."""
 
     ids: np.ndarray = field(default_factory=_no_rows)  # (n,) int
@@ -37,10 +38,14 @@ class Shells:
     offset: np.ndarray = field(default_factory=_none)
     # (n, 4) int: rows of the nodes on the edges, from that of corners 1 and 2 on; -1: none
     middle: np.ndarray = field(default_factory=lambda: _no_rows(4))
+    # (n,) mass beyond that of the section (NSM) [kg/m²]
+    nonstructural: np.ndarray = field(default_factory=_none)
 
     def __post_init__(self) -> None:
         if len(self.middle) != len(self.nodes):
             object.__setattr__(self, "middle", np.full(np.shape(self.nodes), -1))
+        if len(self.nonstructural) != len(self.nodes):
+            object.__setattr__(self, "nonstructural", np.zeros(len(self.nodes)))
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -83,6 +88,7 @@ class Beams:
     up : (n, 3)           orientation vector v of plane 1 (zero for rods)
     offset : (n, 2, 3)    of the ends from their nodes [m]
     pins : (n, 2, 6) bool element dofs released at each end
+    nonstructural : (n,)  mass beyond that of the section (NSM) [kg/m]
     """
 
     ids: np.ndarray = field(default_factory=_no_rows)
@@ -91,6 +97,11 @@ class Beams:
     up: np.ndarray = field(default_factory=lambda: _none(3))
     offset: np.ndarray = field(default_factory=lambda: _none(2, 3))
     pins: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 6), bool))
+    nonstructural: np.ndarray = field(default_factory=_none)
+
+    def __post_init__(self) -> None:
+        if len(self.nonstructural) != len(self.nodes):
+            object.__setattr__(self, "nonstructural", np.zeros(len(self.nodes)))
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -182,8 +193,8 @@ class Equation:
     factors: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Assembly:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assembly(OneScreen):
     """The complete structure.
 
     Attributes

@@ -119,8 +119,27 @@ class SolidSection:
 
 
 @dataclass(frozen=True)
+class BeamStation:
+    """What a tapered beam has at x times its length, relative to end A; linear between stations.
+
+    A change of the section at end A so changes the whole beam in proportion.
+    """
+
+    x: float
+    area: float  # over that of end A, as are I1, I2 and J
+    I1: float
+    I2: float
+    I12: float  # over I1 of end A
+    J: float
+    nonstructural: float  # as in BeamSection, as are those below
+    nonstructural_inertia: float
+    neutral: tuple[float, float]
+    nonstructural_at: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class BeamSection:
-    """Uniform beam or bar section (PBAR, PBEAM, PROD): areas and moments in the element frame (SI).
+    """Beam or bar section (PBAR, PBEAM, PROD) of end A: areas and moments in the element frame.
 
     ``shear`` are the shear area factors (K1, K2); 0 means no shear flexibility. The reference line
     is the shear centre. Positions (y, z) relative to it are ``neutral`` of the neutral axis (N1, N2
@@ -140,6 +159,16 @@ class BeamSection:
     neutral: tuple[float, float] = (0.0, 0.0)  # [m]
     nonstructural_at: tuple[float, float] = (0.0, 0.0)  # [m]
     nonstructural_inertia: float = 0.0  # about its own centre [kg m]
+    stations: tuple[BeamStation, ...] = ()  # by increasing x, the last at 1; none: uniform
+
+    @property
+    def structural(self) -> Self:
+        """The section without non-structural mass."""
+        bare = tuple(
+            replace(station, nonstructural=0.0, nonstructural_inertia=0.0)
+            for station in self.stations
+        )
+        return replace(self, nonstructural=0.0, nonstructural_inertia=0.0, stations=bare)
 
     @property
     def tube(self) -> bool:

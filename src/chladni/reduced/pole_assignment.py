@@ -1,8 +1,9 @@
-"""Pairing of model modes with test poles where no shapes were measured.
+"""Pairing of model modes with test poles.
 
-Both lists are in order of frequency, so an assignment is a monotone path. A pole or a mode may stay
-unpaired at a price.  The model is a mixture: a pole is a mode of the structure, ln f = ln f_m + ε
-with ε ~ N(0, σ²), or it is spurious and its ln f lies anywhere in the range.  Prices are -2 ln of
+Without shapes both lists are in order of frequency, so an assignment is a monotone path. With
+shapes any mode may be the partner of any pole. A pole or a mode may stay unpaired at a price.  The
+model is a mixture. A pole is a mode of the structure, ln f = ln f_m + ε with ε ~ N(0, σ²). Or it is
+spurious, and its ln f lies anywhere in the range.  Prices are -2 ln of
 these probabilities.  The price of a missed mode depends on its visibility.
 Needleman and Wunsch (1970), J. Mol. Biol. 48, 443-453 (the alignment).
 """
@@ -16,6 +17,7 @@ SPURIOUS_LISTED = 0.05  # share of spurious poles where the user lists modes
 RANGE = 3.0  # ln f over which a spurious pole may lie anywhere: 20 to 400 Hz
 MISSED = 5.0  # -2 ln p of missing a mode as visible as the strongest
 HARDLY = 0.3  # -2 ln p of missing a mode that is hardly visible
+FORBIDDEN = 1e9  # price of a pair that cannot be
 SEEN = 1.5  # decades of visibility over which the price falls from MISSED to HARDLY
 
 
@@ -87,6 +89,30 @@ def paired(
     unpaired = np.ones(m, bool)
     unpaired[at_model] = False
     return at_test, at_model, float(missed[unpaired].sum())
+
+
+def assigned(
+    cost: np.ndarray, alone: np.ndarray, missed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Positions of the cheapest pairing in any order; price of unpaired modes.
+
+    Kuhn (1955), Naval Research Logistics Quarterly 2, 83-97.
+
+    Parameters
+    ----------
+    cost : (n, m)              of each pair
+    alone, missed : (n,), (m,) prices of what stays unpaired
+
+    >>> assigned(np.array([[9.0, 1.0], [2.0, 50.0]]), np.full(2, 20.0), np.array([3.0, 3.0]))
+    (array([0, 1]), array([1, 0]), 0.0)
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    unpaired = np.where(np.eye(len(alone), dtype=bool), alone, FORBIDDEN)
+    test, at = linear_sum_assignment(np.hstack([cost - missed, unpaired]))
+    kept = at < len(missed)
+    test, model = test[kept], at[kept]
+    return test, model, float(missed.sum() - missed[model].sum())
 
 
 def _backtrack(matched: np.ndarray, skipped: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

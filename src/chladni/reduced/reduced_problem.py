@@ -51,15 +51,21 @@ class ReducedProblem:
 
     def flexibility(self, where: ElementGrids) -> np.ndarray:
         """b (K + σM)⁻¹ bᵀ less the share within the basis (k,) [m/N]."""
-        exact = np.concatenate(
-            [(rows @ attachments(self.factor, rows)).diagonal() for rows in _pieces(where.rows)]
-        )
-        b, K = self.model.rows(where.rows), self.model.K0.copy()
+        each = [self.flexibility_between(rows).diagonal() for rows in _pieces(where.rows)]
+        return np.maximum(np.concatenate(each), 0.0)
+
+    def flexibility_between(self, rows: sp.csr_array) -> np.ndarray:
+        """B (K + σM)⁻¹ Bᵀ of rows B (k, n), less the share within the basis (k, k)."""
+        b = self.model.rows(rows, keep=False)
+        return self.factor.between(sp.csr_array(rows.T)) - b @ self._inside @ b.T
+
+    @cached_property
+    def _inside(self) -> np.ndarray:
+        """(K + σM)⁻¹ over the basis (r, r)."""
+        K = self.model.K0 + (2 * np.pi * self.hertz) ** 2 * np.eye(len(self.model.K0))
         for stack in (*self.model.linear.values(), *self.model.cubic.values()):
             K += stack.weighted(np.ones(stack.shape[0]))
-        shifted_K = K + (2 * np.pi * self.hertz) ** 2 * np.eye(len(K))
-        inside = np.einsum("kr,kr->k", b, np.linalg.solve(shifted_K, b.T).T)
-        return np.maximum(exact - inside, 0.0)
+        return np.linalg.inv(K)
 
     def with_attachments(self, rows: sp.csr_array) -> Reduced:
         """The reduced model over a basis with the static responses to loads on these rows."""

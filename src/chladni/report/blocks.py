@@ -51,7 +51,14 @@ class Table:
     rows: Sequence[Sequence[str]]
     words: Sequence[str] = ()
     caption: str = ""
+    opens: str = ""  # drawing that a click on a row opens
+    at: Sequence[int | None] = ()  # part of it that belongs to each row: a mode, a channel
+    links: Sequence[str] = ()  # page to which the first cell of each row leads
     kind: str = "table"
+
+    def opened(self, row: int) -> int | None:
+        """The part that a click on a row opens."""
+        return self.at[row] if self.opens and row < len(self.at) else None
 
 
 @dataclass(frozen=True)
@@ -107,6 +114,7 @@ class Drawing:
     what: str = ""  # the pictures are, in the list of files
     first: str = ""  # still of the first screen, which every page holds
     place: str = ""  # section of a diagnosis
+    wide: bool = True  # False: next to another one, where there is room
     kind: str = "drawing"
 
     @property
@@ -160,6 +168,7 @@ class Section:
 
     title: str
     blocks: Sequence[Block]
+    folded: str = ""  # its summary, where a reader opens the section
 
 
 @dataclass(frozen=True)

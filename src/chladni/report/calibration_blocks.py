@@ -96,8 +96,8 @@ def _known(found: Identifiability) -> list[Block]:
     texts = [f"prior of {name}: {reason}" for name, reason in reasons.items()]
     texts += [p.why for p in found.parameters if p.why]
     texts += [
-        "the data cannot distinguish "
-        f"{', '.join(f'{c:+.2f} % of {name}' for name, c in direction)} from no change"
+        "the data hardly change where "
+        f"{' and '.join(f'{name} changes by {c:+.2f} %' for name, c in direction)}"
         for direction in found.directions
         if len(direction) > 1
     ]

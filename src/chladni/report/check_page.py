@@ -10,7 +10,7 @@ from ..workflows.case_check import CaseCheck, CheckedDof
 from ..workflows.case_model import cords, markers
 from .blocks import Block, Facts, Items, PageParts, Section, Table
 from .mesh_drawings import layout, mesh_of
-from .words import counted, direction, number
+from .words import counted, direction, fixed, hertz, number, percent
 
 
 def check_json(found: CaseCheck) -> dict[str, Any]:
@@ -19,6 +19,7 @@ def check_json(found: CaseCheck) -> dict[str, Any]:
         "facts": [{"what": what, "text": text} for what, text in found.facts],
         "findings": [vars(f) for f in found.findings],
         "model_hz": found.frequency,
+        "converged_hz": found.converged,
         "sensors": [plain(vars(d)) for d in found.dofs],
         "notes": found.unused,
     }
@@ -46,10 +47,25 @@ def in_words(found: CaseCheck) -> PageParts:
     facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
     sections = [
         Section("Possible errors", [Items(looks)] if looks else []),
-        Section("Data and settings in use", [Facts(facts)]),
+        Section("Data and settings in use", [Facts(facts), *_mesh(found)]),
         *(Section(f"For {who}", [Items(said)]) for who, said in _unused_words(found.unused)),
     ]
     return PageParts(_lead(found), sections)
+
+
+def _mesh(found: CaseCheck) -> list[Block]:
+    """Elastic modes with the error that their mesh makes."""
+    if not len(found.converged):
+        return []
+    both = zip(found.frequency.tolist(), found.converged.tolist(), strict=True)
+    rows = [(hertz(f), hertz(limit), percent(f, limit)) for f, limit in both]
+    return [Table(("model [Hz]", "on a fine mesh [Hz]", "off"), rows, caption=_MESH)]
+
+
+_MESH = (
+    "Elastic modes, and their limit for an infinitely fine mesh. It follows from a mesh twice as "
+    "fine: errors fall with the square of the element size."
+)
 
 
 def _unused_words(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
@@ -76,8 +92,8 @@ def _lead(found: CaseCheck) -> str:
 
 def _table(dofs: tuple[CheckedDof, ...]) -> Table:
     rows = [
-        (d.label, d.role, d.place, *(f"{x:.4f}" for x in d.point_m),
-         direction(d.direction), f"{1e3 * d.off_mesh_m:.1f}",
+        (d.label, d.role, d.place, *(fixed(x, 4) for x in d.point_m),
+         direction(d.direction), fixed(1e3 * d.off_mesh_m, 1),
          number(1e3 * d.mass_kg, 3))
         for d in dofs
     ]  # fmt: skip

@@ -1,6 +1,9 @@
 """A correlation as a page: paired modes, MAC, Q by band and channel."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -45,44 +48,59 @@ _HALVES = (
     "not prove the pair: random mixtures of the model's modes may agree as well on their best "
     "half."
 )
-_MAC = "Modal assurance criterion in per cent; framed: the pairs of the table."
-_SHAPES = (
-    "Each pair twice: the test's motion at the sensors, and the model's shape with its motion at "
-    "the same sensors."
+_ACROSS = (
+    "ΦᵀMΨ is the cross-orthogonality with the model's mass on the sensors (SEREP): 1 for the "
+    "model's own mode; the other entries are in correlation.json."
 )
+_MAC = "Modal assurance criterion in per cent; framed: the pairs of the table. Click one to see it."
 
 
-def correlation_page(case: Case, found: Correlation) -> PageParts:
-    """Sections of the page."""
+def correlation_page(case: Case, found: Correlation, folder: Path | None = None) -> PageParts:
+    """Sections of the page; the test's shapes on the whole model are written into the folder."""
     p, shown = found.pairs, _shown(case)
-    rows = [(found.f_test[j], found.f_model[i], None) for i, j in zip(p.model, p.test, strict=True)]
-    ladder = frequencies(rows, ("model", "after"))
-    shapes = shape_pairs(shown, found.shapes, found.sensors, _SHAPES)
-    mac: list[Block] = []
+    drawn: list[Block] = []
     if found.mac is not None and found.mac.size:
         pairs = list(zip(p.test.tolist(), p.model.tolist(), strict=True))
-        chart = charts.mac(found.f_test, {"model": (found.mac.T, found.f_model, pairs)})
-        mac.append(Drawing("mac", chart, _MAC))
-    sensors: list[Block] = []
+        matrix = {"model": (found.mac.T, found.f_model, pairs)}
+        chart = charts.mac(found.f_test, matrix, opens="shapes" if found.shapes else "")
+        drawn.append(Drawing("mac", chart, _MAC, wide=found.shapes is None))
+    drawn += shape_pairs(
+        shown, found.shapes, found.sensors, None if found.mac is None else found.mac.T
+    )
+    partner = dict(zip(p.test.tolist(), found.f_model[p.model].tolist(), strict=True))
+    rows = [(f, partner.get(j), None) for j, f in enumerate(found.f_test.tolist())]
+    responses, at = _responses(case, found)
+    sensors = _sensors(found, at)
     if shown.outputs or shown.inputs:
         sensors.append(layout("where", shown, "setup", "Sensors and shaker."))
+    ladder = frequencies(rows, ("model", "after"))
     return PageParts(
         _lead(found),
         [
-            screening_section(found.screening),
-            Section("Modes", [_modes(found), *ladder, *mac]),
-            Section("Shapes", [*_worth(found), *shapes]),
-            Section("Sensors", [*_sensors(found), *sensors]),
-            Section("Responses", [*_scores(found), *_responses(case, found)]),
+            Section("Modes", [*drawn, _modes(found), *ladder, *_worth(found)]),
+            Section("Sensors", sensors),
+            Section("Responses", [*_scores(found, at), *responses]),
+            screening_section(found.screening, folded=True),
         ],
         found.notes,
+        [] if folder is None else expanded_shapes(folder, case, found),
     )
 
 
-def _responses(case: Case, found: Correlation) -> list[Block]:
-    """Every channel of test and model on the lines that were compared."""
-    if found.model is None:
+def expanded_shapes(folder: Path, case: Case, found: Correlation) -> list[tuple[str, str]]:
+    """Write ``expanded.vtu``: (file, what it is); nothing where shapes were not expanded."""
+    from ..io.vtu import write_vtu
+
+    if found.expanded is None:
         return []
+    write_vtu(folder / "expanded.vtu", case.assembly, found.expanded, found.f_test)
+    return [("expanded.vtu", "the test's shapes on the whole model, for ParaView")]
+
+
+def _responses(case: Case, found: Correlation) -> tuple[list[Block], dict[str, int]]:
+    """Every channel of test and model on the lines that were compared; their positions."""
+    if found.model is None:
+        return [], {}
     f = found.model.frequency
     test = case.frfs[0].sel(band=(float(f[0]), float(f[-1])))
     chart, rows = frf_charts.responses(
@@ -91,16 +109,19 @@ def _responses(case: Case, found: Correlation) -> list[Block]:
     stills = {"frf": frf_charts.typical(chart, rows)}
     if len(rows) > 2:
         stills["frf_grid"] = frf_charts.overview(chart)
-    return [Drawing("frf", chart, frf_charts.CAPTION, stills)]
+    at = {name.split(",")[0]: k for k, (name, *_) in enumerate(rows)}
+    for k, (_, output, _) in enumerate(rows):
+        at.setdefault(output, k)
+    return [Drawing("frf", chart, frf_charts.CAPTION, stills)], at
 
 
 def in_words(found: Correlation) -> PageParts:
     """The page without its pictures."""
     sections = [
-        screening_section(found.screening),
-        Section("Modes", [_modes(found)]),
+        Section("Modes", [_modes(found), *_worth(found)]),
         Section("Sensors", _sensors(found)),
         Section("Responses", _scores(found)),
+        screening_section(found.screening),
     ]
     return PageParts(_lead(found), sections, found.notes)
 
@@ -134,6 +155,7 @@ def _shown(case: Case) -> Shown:
 
 def _modes(found: Correlation) -> Table:
     p = found.pairs
+    across = found.cross_orthogonality
     rows = [
         (
             hertz(found.f_test[j]),
@@ -141,10 +163,14 @@ def _modes(found: Correlation) -> Table:
             str(found.numbers[i]) if found.numbers else "–",
             percent(found.f_model[i], found.f_test[j]),
             criterion(value),
+            *([] if across is None else [criterion(float(abs(across[i, j])))]),
         )
         for i, j, value in zip(p.model, p.test, p.mac, strict=True)
     ]
-    return Table(("test [Hz]", "model [Hz]", "its mode", "off", "MAC"), rows, caption=_alone(found))
+    heads = ["test [Hz]", "model [Hz]", "its mode", "off", "MAC"]
+    heads += [] if across is None else ["ΦᵀMΨ"]
+    caption = _alone(found) if across is None else f"{_alone(found)} {_ACROSS}"
+    return Table(tuple(heads), rows, caption=caption, opens="shapes", at=p.test.tolist())
 
 
 def _worth(found: Correlation) -> list[Block]:
@@ -185,18 +211,19 @@ def _alone(found: Correlation) -> str:
     return " ".join(said)
 
 
-def _sensors(found: Correlation) -> list[Block]:
-    """CoMAC of every output, the worst first."""
+def _sensors(found: Correlation, at: Mapping[str, int] = MappingProxyType({})) -> list[Block]:
+    """CoMAC of every output, the worst first; ``at`` are the positions of the responses."""
     if found.comac is None:
         return []
     order = np.argsort(found.comac, kind="stable")[:_WORST]
     rows = [(found.sensors[k], criterion(float(found.comac[k]))) for k in order]
     more = len(found.comac) - len(rows)
     rest = f" The other {more} have at least {rows[-1][1]}." if more else ""
-    return [Table(("sensor", "CoMAC"), rows, ("sensor",), caption=_COMAC + rest)]
+    places = [at.get(name) for name, _ in rows]
+    return [Table(("sensor", "CoMAC"), rows, ("sensor",), _COMAC + rest, "frf", places)]
 
 
-def _scores(found: Correlation) -> list[Block]:
+def _scores(found: Correlation, at: Mapping[str, int] = MappingProxyType({})) -> list[Block]:
     q = found.quality
     if q is None:
         return []
@@ -215,7 +242,13 @@ def _scores(found: Correlation) -> list[Block]:
         Facts(facts),
         Text([_MEANING.format(off=_off_by(q))]),
         Table(("band [Hz]", "Q"), bands),
-        Table(("worst channels", "Q"), [(c, number(x, 3)) for c, x in worst], ("worst channels",)),
+        Table(
+            ("worst channels", "Q"),
+            [(c, number(x, 3)) for c, x in worst],
+            ("worst channels",),
+            opens="frf",
+            at=[at.get(c) for c, _ in worst],
+        ),
     ]
 
 
@@ -238,6 +271,10 @@ def correlation_json(result: Correlation) -> dict[str, Any]:
     }
     for mode, worth in zip(held["modes"], result.likeness, strict=False):
         mode["shape"] = vars(worth)
+    if (across := result.cross_orthogonality) is not None:
+        held["cross_orthogonality"] = {
+            "model_mode": result.numbers, "test_hz": test, "values": across,
+        }  # fmt: skip
     if result.screening is not None:
         held["screening"] = screening_json(result.screening)
     if result.comac is not None:

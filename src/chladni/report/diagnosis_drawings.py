@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..case import Case
+from ..dynamics.modes import ModalModel
 from ..effects.estimate import Location
 from ..fem.energy import shell_energies
 from ..fem.modelled import Modelled
@@ -20,7 +21,7 @@ from . import frf_charts, live_mesh
 from .blocks import Drawing, Still, still
 from .calibration_charts import study_drawings
 from .level_blocks import level_drawings
-from .mesh_drawings import field, layout, spatial
+from .mesh_drawings import TURN, field, layout, spatial
 from .shown import CALM, Shown
 
 MOST_MODES = 60  # of a matrix that can be read
@@ -66,20 +67,40 @@ def drawings(case: Case, result: DiagnosisResult, shown: Shown) -> list[Drawing]
 
 def where(result: DiagnosisResult, shown: Shown) -> Drawing:
     """Places of named effects, sensors and shakers; without an effect, where the fit fails."""
-    named: list[tuple[str, Location | LeftPlace]] = [
-        (": ".join(t for t in (e.name, e.where.text) if t), e.where) for e in result.effects
+    named: list[tuple[str, str, Location | LeftPlace, int]] = [
+        (e.name, _words(e.name, e.where.text), e.where, 0) for e in result.effects
     ]
     if not named and result.adequate is not None:
-        named = [(f"not explained: {place.text}", place) for place in result.adequate.where]
-    content = spatial("structure", shown, lambda: {
-        "spots": live_mesh.spots(named, shown), "setup": live_mesh.setup(shown)
-    })  # fmt: skip
+        named = [("not explained", _words("not explained", place.text), place, 0)
+                 for place in result.adequate.where]  # fmt: skip
+    tied = set(result.one_of[0] if result.one_of else ()) - {e.name for e in result.effects}
+    named += [(a.name, _words(a.name, a.where.text), a.where, 1)
+              for a in result.alternatives if a.where is not None and a.name in tied]  # fmt: skip
+    content = spatial("structure", shown, lambda: _structure(named, shown))
     stills = {}
     for k, effect in enumerate(result.effects):
         if (picture := _place_still(effect, shown)) is not None:
             stills["where" if k == 0 else f"where_{k + 1}"] = picture
-    caption = "Drag to turn, scroll to zoom, point at anything for its name."
+    caption = f"{TURN} Point at anything for its name."
+    if any(rank for *_, rank in named):
+        caption += " Ochre: explanations that the data cannot distinguish from the finding."
     return Drawing("where", content, caption, stills, first="where", place="first")
+
+
+def _words(name: str, place: str) -> str:
+    return ": ".join(t for t in (name, place) if t)
+
+
+def _structure(
+    named: Sequence[tuple[str, str, Location | LeftPlace, int]], shown: Shown
+) -> dict[str, object]:
+    """Data of the first screen, seen from where the places are visible."""
+    found, faces = live_mesh.spots(named, shown), shown.seen.points[shown.seen.faces].mean(axis=1)
+    part = np.asarray(shown.seen.part)
+    meant = [p for s in found for p in (s["at"], faces[np.isin(part, s["parts"])])]
+    focus = np.concatenate([np.zeros((0, 3)), *meant])
+    return {"spots": found, "setup": live_mesh.setup(shown),
+            "from": live_mesh.view_of(focus, shown)}  # fmt: skip
 
 
 def _place_still(effect: NamedEffect, shown: Shown) -> Still | None:
@@ -152,7 +173,10 @@ def frequencies(
     sides = {names[0]: before}
     if np.isfinite(after).any():
         sides[names[1]] = after
-    chart, caption = charts.ladder(test, sides), "Deviation of each frequency from the test."
+    chart, caption = (
+        charts.ladder(test, sides, "shapes"),
+        "Deviation of each frequency from the test.",
+    )
     yield Drawing("ladder", chart, caption, {"frequencies": still(chart)}, place="modes")
 
 
@@ -195,37 +219,61 @@ def stages(result: DiagnosisResult) -> dict[str, Modelled]:
     return found | ({"after": models.final.model} if result.deck_changed else {})
 
 
-def mac_of(
+def near_test(
     case: Case, result: DiagnosisResult
-) -> Mapping[str, tuple[np.ndarray, np.ndarray, list[tuple[int, int]]]]:
-    """MAC (test, model) of each deck, the model's frequencies up to the test's, the pairs."""
+) -> dict[str, tuple[Modelled, ModalModel, np.ndarray | None, list[tuple[int, int]]]]:
+    """Each deck with its modes near the test's, their MAC (test, model), and the pairs."""
     made = {}
     for name, model in stages(result).items():
         assert result.models is not None
-        test = result.models.test
-        if test.shapes is None or not len(test.frequency):
-            return {}
-        modes, every = test.near(model), [getattr(r, f"{name}_hz") for r in result.frequencies]
+        test, every = result.models.test, [getattr(r, f"{name}_hz") for r in result.frequencies]
+        modes = test.near(model)
         modes = modes.sel(modes.frequency <= 1.1 * max([*filter(None, every), *test.frequency]))
         value = test.mac(case.outputs, model, modes)
         pairs = [(k, int(np.abs(modes.frequency - f).argmin())) for k, f in enumerate(every) if f]
-        if value is not None and max(value.shape) <= MOST_MODES:
-            made[name] = (value.T, modes.frequency, pairs)
+        made[name] = (model, modes, None if value is None else value.T, pairs)
     return made
 
 
 def _modes(case: Case, result: DiagnosisResult, shown: Shown) -> Iterator[Drawing]:
     if result.models is None or not result.frequencies:
         return
-    test, rows, decks = result.models.test, result.frequencies, stages(result)
-    content = spatial(
-        "shapes", shown, lambda: live_mesh.shapes(test, rows, decks, case.outputs, shown)
-    )
-    partners = any(r.after_hz for r in rows)
+    decks = near_test(case, result)
+    content = spatial("shapes", shown, lambda: _shapes(case, result, decks, shown))
+    partners = any(r.after_hz for r in result.frequencies)
     picture = {"modes": partial(_montage, result, shown)} if partners else {}
-    yield Drawing("shapes", content, _SHAPES_SHOWN, picture, place="modes")
-    if found := mac_of(case, result):
-        yield Drawing("mac", charts.mac(test.frequency, found), _MAC, place="modes")
+    yield Drawing("shapes", content, f"{TURN} {_SHAPES_SHOWN}", picture, place="modes")
+    found = {name: (mac, modes.frequency, pairs) for name, (_, modes, mac, pairs) in decks.items()
+             if mac is not None and mac.size and max(mac.shape) <= MOST_MODES}  # fmt: skip
+    if found:
+        chart = charts.mac(result.models.test.frequency, found, opens="shapes")
+        yield Drawing("mac", chart, _MAC, place="modes")
+
+
+def _shapes(
+    case: Case, result: DiagnosisResult,
+    decks: Mapping[str, tuple[Modelled, ModalModel, np.ndarray | None, list[tuple[int, int]]]],
+    shown: Shown,
+) -> dict[str, object]:  # fmt: skip
+    """Every mode of the test at its sensors, and the whole motion of the decks' modes."""
+    assert result.models is not None
+    rows, used = result.frequencies, shown.seen.without_joints().used
+    f = np.array([r.test_hz for r in rows], dtype=float)
+    test = live_mesh.ModeSet(
+        f, sensors=result.models.test.shapes, damping=[r.damping for r in rows]
+    )
+    sides = {"test": test}
+    for name, (model, modes, *_) in decks.items():
+        s = model.structure
+        motion = np.asarray(s.T @ modes.shapes).reshape(-1, 6, len(modes))
+        sides[name] = live_mesh.ModeSet(
+            modes.frequency, motion[s.assembly.rows(shown.ids[used]), :3],
+            case.outputs.rows(s) @ modes.shapes,
+        )  # fmt: skip
+    partners = {name: dict(pairs) for name, (*_, pairs) in decks.items()}
+    belong = [[k, *(of.get(k) for of in partners.values())] for k in range(len(rows))]
+    mac = {f"test|{name}": value for name, (_, _, value, _) in decks.items() if value is not None}
+    return live_mesh.shapes(sides, belong, shown, shown.outputs, mac)
 
 
 def _montage(result: DiagnosisResult, shown: Shown, path: Path) -> None:

@@ -36,7 +36,8 @@ def _entry(d: Drawing) -> dict[str, Any]:
         held = {"draw": "chart", **page(held)}
     elif isinstance(held, Spatial):
         held = {"draw": held.draw, "data": held.data}
-    about = {"name": d.name, "place": d.place, "caption": d.caption, "stills": list(d.pictures)}
+    about = {"name": d.name, "place": d.place, "caption": d.caption, "wide": d.wide,
+             "stills": list(d.pictures)}  # fmt: skip
     return {**held, "about": about}
 
 

@@ -1,28 +1,41 @@
 """Identified modes as a page: the table, the stabilisation diagram, indicators, shapes, the fit."""
 
+import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..case import Case
+from ..dofs import parse
 from ..dynamics.frf import FRF, UNIT
 from ..ema.correlation import auto_mac
 from ..ema.finding import of_all
 from ..ema.identification import evaluate
 from ..ema.level_table import level_tables
 from ..ema.mode_indicators import cmif, mif
-from ..ema.shapes import driven_shapes, shape_spread, shapes
+from ..ema.shapes import driven_shapes, real_shapes, shape_spread, shapes
+from ..errors import LabelError
 from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_levels, write_poles
 from ..view import charts
+from ..view.annotations import Marker
 from ..view.chart import Chart, ChartAxis, Mark, Panel, Series
+from ..view.surface import Surface, surface
+from ..workflows.case_model import markers
 from ..workflows.identify import Identification, RecordingModes
 from . import frf_charts
 from .blocks import Block, Drawing, PageParts, Section, Table, still
 from .level_blocks import level_drawings, level_section
+from .live_mesh import ModeSet
+from .live_mesh import shapes as live_shapes
+from .mesh_drawings import TURN, mesh_of, spatial
 from .screening_blocks import SEVERAL, screening_json, screening_section
+from .shown import Shown
 from .typed_fields import as_data
 from .words import hertz, number
 
@@ -45,15 +58,21 @@ _POLES = (
 _AROUND = 4.0  # half bandwidths of a circle
 
 
-def identification_page(folder: Path, found: Identification) -> PageParts:
-    """Sections of the page; its tables are written into the folder."""
-    sections, files = [screening_section(*(r.screening for r in found.recordings))], []
-    share = len(found.recordings)
+def identification_page(folder: Path, found: Identification, command: str = "") -> PageParts:
+    """Sections of the page; its tables are written into the folder.
+
+    ``command`` is the line to which a click on a pole adds it.
+    """
+    sections, files = [], []
+    share, (shown, sensors) = len(found.recordings), _places(found)
+    command = command or shlex.join(["chladni", "identify", *_paths(found)])
     for k, r in enumerate(found.recordings):
         stem, name = "" if len(found.recordings) == 1 else f"_{k + 1}", r.recording.name
         write_poles(folder / f"poles{stem}.csv", r.poles)
         files.append((f"poles{stem}.csv", f"poles of {name}"))
-        sections.append(Section(name, [_table(r), *_drawings(stem, r, share)]))
+        shapes = _shapes(f"shapes{stem}", r, shown, sensors)
+        table = replace(_table(r), opens=f"shapes{stem}" if shapes else "")
+        sections.append(Section(name, [*shapes, table, *_drawings(stem, r, share, command)]))
         files += _modal_files(folder, stem, r)
     for k, study in enumerate(found.levels):
         tables = level_tables(study)
@@ -61,6 +80,7 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
         write_levels(folder / f"levels{stem}.csv", tables)
         files.append((f"levels{stem}.csv", "every mode at every level, with its intervals"))
         sections.insert(k, level_section(tables, level_drawings(tables, stem)))
+    sections.append(screening_section(*(r.screening for r in found.recordings), folded=True))
     return PageParts(_lead(found.recordings), sections, found.notes, files)
 
 
@@ -121,10 +141,61 @@ def _table(r: RecordingModes) -> Table:
     if len(struck):
         said = ", ".join(number(f, 4) for f in struck)
         caption += f" Rejected, because they have no peak and no other order has them: {said} Hz."
-    return Table(heads, rows, caption=caption)
+    return Table(heads, rows, caption=caption, at=range(len(rows)))
 
 
-def _drawings(stem: str, r: RecordingModes, share: int) -> list[Block]:
+def _paths(found: Identification) -> list[str]:
+    """The case, or the file of the recording."""
+    case = found.origin
+    return [str(case.path.parent if isinstance(case, Case) else found.recordings[0].recording.name)]
+
+
+def _places(found: Identification) -> tuple[Shown | None, dict[str, Marker]]:
+    """The ground of the shapes, and sensors by label: of the case, else of the recordings."""
+    if isinstance(case := found.origin, Case):
+        return mesh_of(surface(case.assembly), case.assembly), {
+            m.label: m for m in markers(case.outputs)
+        }
+    nodes: dict[int, np.ndarray] = {}
+    axes: dict[int, np.ndarray] = {}
+    lines: list[tuple[int, int]] = []
+    for r in (one.recording for one in reversed(found.recordings)):
+        nodes, axes = {**nodes, **r.nodes}, {**axes, **r.axes}
+        lines += [pair for element in r.elements for pair in pairwise(element)]
+    if not nodes:
+        return None, {}
+    row = {node: k for k, node in enumerate(nodes)}
+    held = [(row[a], row[b]) for a, b in lines if a in row and b in row]
+    seen = Surface(np.array(list(nodes.values())), lines=np.array(held, int).reshape(-1, 2))
+    sensors = {}
+    for label in dict.fromkeys(o for r in found.recordings for o in r.modes.outputs):
+        with suppress(LabelError):  # 12:n has no axis here
+            node, component, sign = parse(label)
+            if node in nodes and component <= 3:
+                x, y, z = (float(v) for v in nodes[node])
+                a, b, c = (sign * float(v) for v in axes.get(node, np.eye(3))[component - 1])
+                sensors[label] = Marker((x, y, z), (a, b, c), label)
+    return Shown(seen, ids=np.array(list(nodes))), sensors
+
+
+def _shapes(
+    name: str, r: RecordingModes, shown: Shown | None, sensors: Mapping[str, Marker]
+) -> list[Drawing]:
+    """The identified modes, which move at their sensors."""
+    m = r.modes.sel(r.firm)
+    held = [k for k, output in enumerate(m.outputs) if output in sensors]
+    if shown is None or not held or not m.order:
+        return []
+    side = ModeSet(m.frequency, sensors=real_shapes(m)[held], damping=m.damping.tolist())
+    auto = {"test|test": auto_mac(driven_shapes(m))} if 1 < m.order <= _MATRIX else {}
+    content = spatial("shapes", shown, lambda: live_shapes(
+        {"test": side}, [[k] for k in range(m.order)], shown,
+        [sensors[m.outputs[k]] for k in held], auto,
+    ))  # fmt: skip
+    return [Drawing(name, content, f"{TURN} Click a row of the table for its mode.", {})]
+
+
+def _drawings(stem: str, r: RecordingModes, share: int, command: str) -> list[Block]:
     """The stabilisation diagram, indicators, the fit, circles, AutoMAC.
 
     The page shows ``share`` recordings.
@@ -137,7 +208,8 @@ def _drawings(stem: str, r: RecordingModes, share: int) -> list[Block]:
     fit, _ = frf_charts.responses({"test": test, "identified": fitted}, share=share)
     kept = modal.frequency[r.firm]
     blocks: list[Block] = [
-        Drawing(f"stabilisation{stem}", stabilisation(r), _POLES, what="stabilisation diagram"),
+        Drawing(f"stabilisation{stem}", stabilisation(r, command), _POLES,
+                what="stabilisation diagram"),
         Drawing(f"indicators{stem}", indicators(r, test), "Singular values of the responses; share "
                 "in quadrature.", what="mode indicators"),
         Drawing(f"fit{stem}", fit, frf_charts.CAPTION,
@@ -154,13 +226,16 @@ def _drawings(stem: str, r: RecordingModes, share: int) -> list[Block]:
     if 1 < len(kept) <= _MATRIX and len(frf.outputs) > 1:
         auto: dict[str, Any] = {"test": (auto_mac(driven_shapes(modal.sel(r.firm))), kept, [])}
         text = "Off the diagonal: modes that are similar at these sensors."
-        chart = charts.mac(kept, auto)
+        chart = charts.mac(kept, auto, opens=f"shapes{stem}")
         blocks.append(Drawing(f"automac{stem}", chart, text, what="AutoMAC of the modes"))
     return blocks
 
 
-def stabilisation(r: RecordingModes) -> Chart:
-    """Poles over model order by class, kept ones as lines, struck ones as dotted lines."""
+def stabilisation(r: RecordingModes, command: str) -> Chart:
+    """Poles over model order by class, kept ones as lines, struck ones as dotted lines.
+
+    A click on a pole adds it to the command.
+    """
     frf, d = r.recording.frf, r.diagram
     assert frf is not None
     low, high = (float(f) for f in r.modes.band)
@@ -185,7 +260,7 @@ def stabilisation(r: RecordingModes) -> Chart:
     behind = ChartAxis(f"rms of |H| [{unit}]" if unit else "rms of |H|", log=True)
     x = replace(charts.FREQUENCY, limits=(low, high))
     panel = Panel(series, x, ChartAxis("states"), marks=marks, right=behind)
-    return Chart.of(panel, size=(8.2, 4.6), height=28, pick="chladni identify ...")
+    return Chart.of(panel, size=(8.2, 4.6), height=28, pick=command)
 
 
 def indicators(r: RecordingModes, test: FRF) -> Chart:

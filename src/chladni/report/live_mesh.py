@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,12 +13,8 @@ from ..view.camera import best_view
 
 if TYPE_CHECKING:
     from ..effects.estimate import Location
-    from ..fem.measured_dofs import MeasuredDofs
-    from ..fem.modelled import Modelled
-    from ..inference.result import FrequencyRow, LeftPlace
-    from ..search.measured_modes import MeasuredModes
+    from ..inference.result import LeftPlace
     from ..view.annotations import Marker
-    from ..view.paired_shapes import PairedShapes
     from ..view.surface import Surface
     from .shown import Shown
 
@@ -71,12 +68,14 @@ def _triangles(seen: Surface) -> tuple[np.ndarray, np.ndarray]:
     return corners, np.concatenate([np.arange(len(seen.faces)), np.flatnonzero(four)])
 
 
-def spots(places: Sequence[tuple[str, Location | LeftPlace]], shown: Shown) -> list[dict[str, Any]]:
-    """Named places: a point with its radius, else grids, else parts, else channels."""
+def spots(
+    places: Sequence[tuple[str, str, Location | LeftPlace, int]], shown: Shown
+) -> list[dict[str, Any]]:
+    """Places (name, words, place, rank): a point with its radius, else grids, parts, channels."""
     from ..effects.estimate import Location as Place
 
     found = []
-    for text, where in places:
+    for name, text, where, rank in places:
         at, radius = np.zeros((0, 3)), 0.0
         if where.point_m is not None:
             at = np.array([where.point_m], dtype=float)
@@ -85,11 +84,19 @@ def spots(places: Sequence[tuple[str, Location | LeftPlace]], shown: Shown) -> l
             if not len(at) and len(shown.ids):
                 at = shown.seen.points[np.isin(shown.ids, where.grids)]
             if not len(at):
-                at = np.array([m.point for m in shown.outputs if m.label in where.channels])
+                marked = [m.point for m in shown.outputs if m.label in where.channels]
+                at = np.array(marked).reshape(-1, 3)
         parts = [] if len(at) else [k for k, p in enumerate(shown.parts) if p in where.parts]
         if len(at) or parts:
-            found.append({"text": text, "at": at, "radius": radius, "parts": parts})
+            found.append({"name": name, "text": text, "at": at, "radius": radius, "parts": parts,
+                          "rank": rank})  # fmt: skip
     return found
+
+
+def view_of(points: np.ndarray, shown: Shown) -> dict[str, np.ndarray]:
+    """The camera from which places (k, 3) are seen, for a drawing."""
+    camera = best_view(shown.seen.without_joints(), points)
+    return {"eye": camera.toward, "up": camera.up}
 
 
 def setup(shown: Shown) -> dict[str, Any]:
@@ -119,84 +126,57 @@ def field(
             "colours": colours}  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class ModeSet:
+    """Modes of the test or of a deck, as they are drawn next to others."""
+
+    f: np.ndarray  # (r,) [Hz]
+    motion: np.ndarray | None = None  # (n, 3, r) of the points in use; None: of the sensors alone
+    sensors: np.ndarray | None = None  # (k, r) along the sensors' directions
+    numbers: Sequence[int] = ()
+    damping: Sequence[float | None] = ()
+
+    def drawn(self, k: int) -> dict[str, Any]:
+        """One mode, its motion over the largest in thousandths."""
+        mode: dict[str, Any] = {"hz": float(self.f[k])}
+        mode |= {"number": int(self.numbers[k])} if len(self.numbers) else {}
+        mode |= {"damping": self.damping[k]} if len(self.damping) else {}
+        at_sensors = None if self.sensors is None else _shares(self.sensors[:, k])
+        if self.motion is None:
+            return mode | {"motion": at_sensors}
+        return mode | {"motion": _shares(self.motion[:, :, k]), "sensors": at_sensors}
+
+
+def _shares(motion: np.ndarray) -> list[Any]:
+    """Motion (k,), or by axis of (n, 3), over the largest."""
+    size = np.abs(motion) if motion.ndim == 1 else np.linalg.norm(motion, axis=1)
+    return rounded(motion.T / max(float(size.max(initial=0.0)), 1e-300), _THOUSANDTH)
+
+
 def shapes(
-    test: MeasuredModes, rows: Sequence[FrequencyRow], stages: Mapping[str, Modelled],
-    outputs: MeasuredDofs, shown: Shown,
+    sides: Mapping[str, ModeSet], rows: Sequence[Sequence[int | None]], shown: Shown,
+    sensors: Sequence[Marker] = (), mac: Mapping[str, np.ndarray] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Every mode of the test at its sensors, and of its partners the whole motion."""
-    used = shown.seen.without_joints().used
-    room = _SHAPE_VALUES // max(1, 3 * len(used) * len(stages))
-    motions = {name: _motions(model, name, rows[:room], shown, used, outputs)
-               for name, model in stages.items()}  # fmt: skip
-    modes = []
-    for k, row in enumerate(rows[:room]):
-        seen = None if test.shapes is None else test.shapes[:, k]
-        mode: dict[str, Any] = {"test": {"hz": row.test_hz, "damping": row.damping}}
-        sign = 1.0
-        for name in stages:
-            if k in motions[name]:
-                motion, at_sensors = motions[name][k]
-                if seen is not None:  # the test has no sign of its own, the first model lends it
-                    sign = sign if len(mode) > 1 else np.sign(seen @ at_sensors) or 1.0
-                    motion = motion * (np.sign(sign * seen @ at_sensors) or 1.0)
-                mode[name] = {
-                    "hz": getattr(row, f"{name}_hz"),
-                    "mac": getattr(row, f"mac_{name}"),
-                    "motion": [rounded(axis, _THOUSANDTH) for axis in motion.T],
-                }
-        if seen is not None:
-            share = sign * seen / max(float(np.abs(seen).max()), 1e-300)
-            mode["test"]["motion"] = rounded(share, _THOUSANDTH)
-        modes.append(mode)
-    return {"modes": modes, "left_out": len(rows) - len(modes), "sensors": _markers(shown.outputs)}
+    """Modes of every side, and rows of those that belong together.
 
+    Parameters
+    ----------
+    rows : positions of the modes in the sides, None without a partner
+    mac : by "side|side", (modes of one, modes of the other)
+    """
+    decks = [side for side in sides.values() if side.motion is not None]
+    values = sum(side.motion[:, :, :1].size for side in decks if side.motion is not None)
+    room = _SHAPE_VALUES // max(1, values)  # modes of each deck
 
-def model_shapes(
-    motion: np.ndarray, f: np.ndarray, numbers: Sequence[int], shown: Shown
-) -> dict[str, Any]:
-    """Modes (n, 3, r) of a model alone, with their numbers."""
-    used = shown.seen.without_joints().used
-    room = _SHAPE_VALUES // max(1, 3 * len(used))
-    modes = [
-        {"model": {"hz": float(f[k]), "number": int(number), "motion": _axes(motion[used, :, k])}}
-        for k, number in enumerate(numbers[:room])
-    ]
-    return {"modes": modes, "left_out": len(numbers) - len(modes), "sensors": []}
+    def held(name: str) -> int:
+        return len(sides[name].f) if sides[name].motion is None else min(room, len(sides[name].f))
 
-
-def paired_shapes(found: PairedShapes, sensors: Sequence[str], shown: Shown) -> dict[str, Any]:
-    """Pairs of test and model."""
-    used = shown.seen.without_joints().used
-    room = _SHAPE_VALUES // max(1, 3 * len(used))
-    modes = []
-    for k in range(min(room, len(found.f_test))):
-        of_model = {"hz": float(found.f_model[k]), "mac": float(found.mac[k]),
-                    "motion": _axes(found.motion[used, :, k])}  # fmt: skip
-        of_test = {"hz": float(found.f_test[k]), "motion": rounded(found.test[:, k], _THOUSANDTH)}
-        modes.append({"test": of_test, "model": of_model})
-    at = zip(found.points.tolist(), found.directions.tolist(), sensors, strict=True)
-    places = [{"at": point, "along": along, "label": label} for point, along, label in at]
-    return {"modes": modes, "left_out": len(found.f_test) - len(modes), "sensors": places}
-
-
-def _axes(motion: np.ndarray) -> list[Any]:
-    """Motion (n, 3) of largest 1, by axis."""
-    largest = max(float(np.linalg.norm(motion, axis=1).max(initial=0.0)), 1e-300)
-    return [rounded(axis, _THOUSANDTH) for axis in motion.T / largest]
-
-
-def _motions(
-    model: Modelled, name: str, rows: Sequence[FrequencyRow], shown: Shown, used: np.ndarray,
-    outputs: MeasuredDofs,
-) -> dict[int, tuple[np.ndarray, np.ndarray]]:  # fmt: skip
-    """By row: the partner's motion of all points (n, 3), of largest 1, and at the sensors."""
-    s, found = model.structure, {}
-    at = s.assembly.rows(shown.ids[used])
-    sensors = outputs.rows(s)
-    for k, row in enumerate(rows):
-        if f := getattr(row, f"{name}_hz"):
-            phi = model.modes.shapes[:, np.abs(model.modes.frequency - f).argmin()]
-            motion = np.asarray(s.T @ phi).reshape(-1, 6)[at, :3]
-            largest = max(float(np.linalg.norm(motion, axis=1).max()), 1e-300)
-            found[k] = motion / largest, np.asarray(sensors @ phi) / largest
-    return found
+    kept = [[None if k is None or k >= held(name) else k
+             for name, k in zip(sides, row, strict=True)] for row in rows]  # fmt: skip
+    return {
+        "sides": {name: [side.drawn(k) for k in range(held(name))]
+                  for name, side in sides.items()},
+        "rows": [row for row in kept if row != [None] * len(sides)],
+        "mac": {name: np.round(value, 3).tolist() for name, value in (mac or {}).items()},
+        "sensors": _markers(sensors),
+    }  # fmt: skip

@@ -10,7 +10,7 @@ from ..workflows.loaded_model import on_faces
 from ..workflows.map import MappedDeck
 from .blocks import Block, Facts, PageParts, Section, Table
 from .mesh_drawings import field, mesh_of
-from .words import number
+from .words import number, percent
 
 _HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
           "was [kg]", "error of t [%]")  # fmt: skip
@@ -19,6 +19,7 @@ _CAPTION = (
     "Error of t: thickness mapped onto the deck and back, compared with the file, rms. Shells "
     "without a match keep the deck's thickness."
 )
+_DARK = "The thinnest is darkest."
 _GUESS = (
     "Thinning estimated from curvature. Each part was left out and estimated from the others: "
     "the table gives the error of its thickness. The last column is the error of the unchanged "
@@ -36,8 +37,8 @@ def map_page(found: MappedDeck) -> PageParts:
     mm = on_faces(seen, 1e3 * t)
     limits = [scene.usual_limits(seen, values) for values in (mm, change)]
     maps = [
-        field(shown, mm, limits[0], "thickness", "thickness [mm]"),
-        field(shown, change, limits[1], "change", "change of thickness [%]", colours="YlGnBu_r"),
+        field(shown, mm, limits[0], "thickness", "thickness [mm]", _DARK),
+        field(shown, change, limits[1], "change", "change of thickness [%]", _DARK),
     ]
     was, now = found.mass
     facts = [("Sheets before", f"{number(was)} kg"), ("after", f"{number(now)} kg")]
@@ -59,7 +60,7 @@ def _lead(found: MappedDeck) -> str:
     known = f"; error of the mapping {100 * max(errors):.2g} % rms at most" if errors else ""
     return (
         f"{found.found.source.name} mapped onto {len(parts)} parts: the sheets go from "
-        f"{number(was)} to {number(now)} kg ({100 * (now / was - 1):+.1f} %){known}."
+        f"{number(was)} to {number(now)} kg ({percent(now, was)}){known}."
     )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..view.annotations import Marker
 from . import live_mesh
 from .blocks import Drawing, Spatial
 from .shown import Shown
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
     from ..view.surface import Surface
     from .blocks import Still
 
-_SHAPES = "Choose a mode; drag to turn, scroll to zoom. Colour: share of the largest motion."
+TURN = "Drag to turn; click, then scroll to zoom."
+_PAIRED = "The test moves at its sensors, the model as a whole."
 _PAIRS = 8  # in a picture
+_OUTSIDE = 0.02  # of the structure's size: as far from a wall a place is looked at
 
 
 def mesh_of(seen: Surface, assembly: Assembly) -> Shown:
@@ -54,6 +57,7 @@ def mode_shapes(
     drawn: int = 12,
     what: str = "",
     picture: str = "shapes",
+    mac: Mapping[str, np.ndarray] | None = None,
 ) -> list[Drawing]:
     """Shapes (n, 3, r) of a model that move; the ``picture`` has the first of them."""
     if not len(f):
@@ -61,39 +65,65 @@ def mode_shapes(
     some = slice(drawn)
     still = _picture("montage", seen=shown.seen, shapes=motion[:, :, some], frequency=f[some],
                       numbers=numbers[some])  # fmt: skip
-    data = spatial("shapes", shown, lambda: live_mesh.model_shapes(motion, f, numbers, shown))
-    return [Drawing("shapes", data, _SHAPES, {picture: still}, what)]
+
+    def moving() -> Mapping[str, Any]:
+        used = motion[shown.seen.without_joints().used]
+        sides = {"model": live_mesh.ModeSet(f, used, numbers=numbers)}
+        return live_mesh.shapes(sides, [[k] for k in range(len(f))], shown, mac=mac)
+
+    return [Drawing("shapes", spatial("shapes", shown, moving), TURN, {picture: still}, what)]
 
 
 def shape_pairs(
-    shown: Shown, found: PairedShapes | None, sensors: Sequence[str], caption: str
+    shown: Shown, found: PairedShapes | None, sensors: Sequence[str], mac: np.ndarray | None
 ) -> list[Drawing]:
-    """Draw test next to model."""
+    """Draw test next to model; MAC (test, model)."""
     if found is None or not len(found.f_test):
         return []
-    data = spatial("shapes", shown, lambda: live_mesh.paired_shapes(found, sensors, shown))
+
+    def moving() -> Mapping[str, Any]:
+        at = zip(found.points.tolist(), found.directions.tolist(), sensors, strict=True)
+        used = shown.seen.without_joints().used
+        partner = dict(found.pairs)
+        sides = {
+            "test": live_mesh.ModeSet(found.f_test, sensors=found.test),
+            "model": live_mesh.ModeSet(found.f_model, found.motion[used], found.model,
+                                       found.numbers),
+        }  # fmt: skip
+        rows = [[k, partner.get(k)] for k in range(len(found.f_test))]
+        places = [Marker(x, n, label) for x, n, label in at]
+        return live_mesh.shapes(sides, rows, shown, places, {} if mac is None else
+                                {"test|model": mac})  # fmt: skip
 
     def draw(path: Path) -> object:
         from ..view.shape_pairs import shape_pairs as picture
 
-        return picture(path, shown.seen, found.first(_PAIRS))
+        return picture(path, shown.seen, found, _PAIRS)
 
-    stills: dict[str, Still] = {"shapes": draw}
-    return [Drawing("shapes", data, f"{_SHAPES} {caption}".strip(), stills, "shapes")]
+    stills: dict[str, Still] = {"shapes": draw} if len(found.pairs) else {}
+    return [Drawing("shapes", spatial("shapes", shown, moving), f"{TURN} {_PAIRED}", stills,
+                    "shapes", wide=mac is None)]  # fmt: skip
 
 
 def layout(name: str, shown: Shown, picture: str, caption: str, what: str = "",
            shaker: str = "shaker") -> Drawing:  # fmt: skip
     """Sensors, shakers and cords on the mesh; ``picture`` is the name of the file."""
-    data = spatial("structure", shown, lambda: {"spots": [], "setup": live_mesh.setup(shown)})
+
+    def placed() -> Mapping[str, Any]:
+        chosen = shown.inputs or shown.outputs
+        at, along = (np.array([getattr(m, k) for m in chosen]).reshape(-1, 3)
+                     for k in ("point", "direction"))  # fmt: skip
+        seen_from = live_mesh.view_of(at + _OUTSIDE * shown.seen.size * along, shown)
+        return {"spots": [], "setup": live_mesh.setup(shown), "from": seen_from}
+
     still = _picture("sensors", seen=shown.seen, outputs=shown.outputs, inputs=shown.inputs,
                     cords=shown.cords, shaker=shaker)  # fmt: skip
-    return Drawing(name, data, caption, {picture: still}, what)
+    return Drawing(name, spatial("structure", shown, placed), caption, {picture: still}, what)
 
 
 def field(
     shown: Shown, values: np.ndarray, limits: tuple[float, float], name: str, title: str,
-    caption: str = "", colours: str = "YlGnBu",
+    caption: str = "", colours: str = "YlGnBu_r",
 ) -> Drawing:  # fmt: skip
     """Colours by a value of each face (m,); ``title`` is the quantity with its unit."""
     still = _picture("scalar_map", seen=shown.seen, values=values, name=title, cmap=colours,

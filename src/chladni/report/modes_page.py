@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 _SHOWN = 12  # modes in the picture; rigid ones on the page where there are no others
 LEFT = 1e-3  # of the strain energy; more of it that is in no part has a column
+_MASS = (
+    "Effective modal mass along X, Y and Z, of the mass; it is what a motion of the base excites. "
+    "Then the share of each part in the kinetic energy; the rest is in point masses."
+)
 _NODES = 20_000  # in the universal file, a text of a hundred bytes per node and mode
 
 
@@ -78,7 +82,18 @@ def _tables(found: NormalModes, kg: str) -> list[Facts | Table]:
         share, names = np.vstack([share, rest]), [*names, "springs, bushes"]
     rows = [(str(k + 1), hertz(f[k]), *(_share(e) for e in share[:, k])) for k in range(len(f))]
     heads = ("mode", "Hz", *names)
-    return [Facts(facts), Table(heads, rows, caption="Share of each part in the strain energy.")]
+    out: list[Facts | Table] = [
+        Facts(facts), Table(heads, rows, caption="Share of each part in the strain energy.")
+    ]  # fmt: skip
+    moving = [[_share(e) for e in found.kinetic_energy[:, k]] for k in range(len(f))]
+    effective = found.effective_mass[:3] / max(found.mass, 1e-300)
+    rows = [
+        (str(k + 1), hertz(f[k]), *(_share(e) for e in effective[:, k]), *moving[k])
+        for k in range(len(f))
+    ]
+    total = ("sum", "", *(_share(e) for e in effective.sum(axis=1)), *([""] * len(found.parts)))
+    heads = ("mode", "Hz", "X", "Y", "Z", *(name for name, _ in found.parts))
+    return [*out, Table(heads, [*rows, total], caption=_MASS)]
 
 
 def _share(value: float) -> str:
@@ -97,7 +112,12 @@ def modes_json(result: NormalModes) -> dict[str, Any]:
         centre: result.centre_of_gravity,
         "rigid": result.rigid,
         "parts": {
-            name: {"id": id, "strain_energy": share}
-            for (name, id), share in zip(result.parts, result.strain_energy, strict=True)
+            name: {"id": id, "strain_energy": strain, "kinetic_energy": kinetic}
+            for (name, id), strain, kinetic in zip(
+                result.parts, result.strain_energy, result.kinetic_energy, strict=True
+            )
         },
+        "effective_mass": dict(
+            zip(("X", "Y", "Z", "RX", "RY", "RZ"), result.effective_mass, strict=True)
+        ),
     }

@@ -65,7 +65,8 @@ def _advised(result: DiagnosisResult) -> list[str]:
         ]
     return [
         f"Measure with {what}: one explanation then has odds of {ODDS:.0f} : 1 or better in "
-        f"{every[-1].settles:.0%} of cases, and a wrong one in {every[-1].misleads:.0%}."
+        f"{100 * every[-1].settles:.0f} % of cases, and a wrong one in "
+        f"{100 * every[-1].misleads:.0f} %."
     ]
 
 

@@ -9,7 +9,7 @@ from ..workflows.loaded_model import Model
 from ..workflows.other_modes import OtherModes
 from .blocks import Block, Drawing, PageParts, Section, Table
 from .mesh_drawings import mesh_of, mode_shapes
-from .words import criterion, hertz
+from .words import criterion, hertz, percent
 
 _SHOWN = 12  # shapes in a picture
 _MOST = 60  # modes of a MAC matrix that can be read
@@ -69,7 +69,7 @@ def _table(found: OtherModes) -> Table:
         i, value = partner.get(j, (None, None))
         own = ("–", "–", "–")
         if i is not None:
-            off = f"{100 * (found.f_model[i] / f - 1):+.2g} %"
+            off = percent(found.f_model[i], f)
             own = (str(found.numbers_model[i]), hertz(found.f_model[i]), off)
         rows.append((str(number), hertz(f), *own, criterion(value), criterion(found.in_span[j])))
     return Table(_HEADS, rows, caption=_CAPTION)

@@ -162,7 +162,7 @@ _PAGES: Mapping[str, Paged] = {
     "chladni.workflows.correlate.Correlation": Paged(
         "correlate",
         ".correlation_page",
-        lambda m, at, x: m.correlation_page(x.origin, x),
+        lambda m, at, x: m.correlation_page(x.origin, x, at),
         "correlation.json",
     ),
     "chladni.workflows.other_modes.OtherModes": Paged(

@@ -14,11 +14,16 @@ SEVERAL = 2  # recordings, beyond which equal findings are reported once
 _WORD = {True: "in order", False: "check it", None: "not possible"}
 
 
-def screening_section(*screenings: Screening | None) -> Section:
-    """Tabulate findings first, then every check; nothing without a screening."""
+def screening_section(*screenings: Screening | None, folded: bool = False) -> Section:
+    """Tabulate findings first, then every check; nothing without a screening.
+
+    A folded section shows its summary, unless there is a finding.
+    """
     done = [s for s in screenings if s is not None and (s.checks or s.findings)]
+    calm = folded and not any(s.findings for s in done)
+    said = f"{sum(len(s.checks) for s in done)} checks, no fault found" if calm else ""
     if len(done) > SEVERAL:
-        return Section("The recordings", _of_several(done))
+        return Section("The recordings", _of_several(done), said)
     blocks: list[Block] = []
     for s in done:
         of = s.name if len(done) > 1 else ""
@@ -27,7 +32,7 @@ def screening_section(*screenings: Screening | None) -> Section:
             blocks.append(Table(_FINDING, [_found(f) for f in s.findings], _FINDING, of))
         looked = [(c.name, c.result, _WORD[c.passed]) for c in s.checks]
         blocks.append(Table(_CHECK, looked, _CHECK, of))
-    return Section("The recording", blocks)
+    return Section("The recording", blocks, said)
 
 
 def lead_of(screenings: Sequence[Screening]) -> str:

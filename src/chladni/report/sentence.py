@@ -98,7 +98,7 @@ def _tied(result: DiagnosisResult) -> str:
 def _gain(result: DiagnosisResult) -> str:
     """State Q of the last deck and of the one before it, on data that only report."""
     held = Scores() if result.agreement is None else result.agreement.held_out
-    if result.compared == "frequencies":
+    if result.compared != "responses":
         return _closer(result)
     (one, before), (last, after) = held.last_step(bool(result.effects)).items()
     if not before or after is None:

@@ -22,7 +22,7 @@ from .level_blocks import level_section
 from .recording_scores import recording_scores
 from .screening_blocks import screening_section
 from .states_table import states_table
-from .words import criterion, hertz, interval, number, percent, quantity
+from .words import criterion, fixed, hertz, interval, number, percent, quantity
 
 HEADING = {
     "missing physics": "Missing physics found",
@@ -158,7 +158,10 @@ def next_measurements(every: Sequence[NextMeasurement], odds: float = ODDS) -> T
     """Tabulate the measurements that would separate what the data cannot."""
     if every and every[0].about:
         return _narrowing(every)
-    rows = [(m.what, number(m.bits, 2), f"{m.settles:.0%}", f"{m.misleads:.0%}") for m in every]
+    rows = [
+        (m.what, number(m.bits, 2), f"{100 * m.settles:.0f} %", f"{100 * m.misleads:.0f} %")
+        for m in every
+    ]
     heads = ("measure", "bits", f"settles at {odds:.0f} : 1", "misleads")
     what = (
         "Each row counts the rows above it. Bits: information expected about which explanation is "
@@ -263,7 +266,7 @@ def _place(where: Location) -> list[tuple[str, str]]:
     some = ", ".join(grids[:12]) + (f" … ({len(grids)} in all)" if len(grids) > 12 else "")
     at = ""
     if where.point_m:
-        at = "(" + ", ".join(f"{round(x, 4) + 0.0:.4f}" for x in where.point_m) + ") m"
+        at = "(" + ", ".join(fixed(x, 4) for x in where.point_m) + ") m"
         at += f", within {quantity(where.radius_m, 'm')}" if where.radius_m else ""
     return [
         ("place", where.text),
@@ -360,6 +363,8 @@ _MEANING = {
     "better. Every run of the same deck gives the same Q.",
     "frequencies": "Q: mean over the paired frequencies of |log10(f model / f test)|²; lower is "
     "better. Every run of the same deck gives the same Q.",
+    "modes": "Q: mean over the paired modes of |log10(f model / f test)|² + (1 - MAC)/ln²10; lower "
+    "is better. Every run of the same deck gives the same Q.",
 }
 
 
@@ -379,7 +384,7 @@ def _frequencies(result: DiagnosisResult) -> list[Block]:
     ]
     heads = ("test [Hz]", "damping [%]", "before [Hz]", "off", "after [Hz]", "off ", "MAC before",
              "MAC after")  # fmt: skip
-    return [Table(heads, rows)] if rows else []
+    return [Table(heads, rows, opens="shapes", at=range(len(rows)))] if rows else []
 
 
 def _alternatives(result: DiagnosisResult) -> list[Block]:

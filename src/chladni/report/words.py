@@ -3,22 +3,11 @@
 import math
 from collections.abc import Sequence
 
+from ..units import number as number
+
 _PREFIX = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 _SCALED = ("Pa", "N/m", "N m", "N s/m")  # units that take a prefix in front
 _NONE = "–"
-
-
-def number(value: float | None, digits: int = 4) -> str:
-    """A number with so many significant digits.
-
-    >>> number(0.0123456), number(31794.2), number(None), number(1e-9)
-    ('0.01235', '31794', '–', '1e-09')
-    """
-    if value is None or not math.isfinite(value):
-        return _NONE
-    if value and digits - 1 < math.log10(abs(value)) < 6:
-        return f"{value:.0f}"
-    return f"{value:.{digits}g}"
 
 
 def rounded(value: float, digits: int = 2) -> float:
@@ -67,7 +56,7 @@ def quantity(value: float | None, unit: str = "", reference: float | None = None
     >>> quantity(3.1e9, "N/m2"), quantity(0.0007, "m"), quantity(0.4, "-")
     ('3.1 GN/m²', '0.7 mm', '0.4')
     """
-    scale, named = _scale(value if reference is None else reference, unit)
+    scale, named = display_unit(value if reference is None else reference, unit)
     shown = number(None if value is None else value / scale)
     return f"{shown} {named}".strip() if shown != _NONE else _NONE
 
@@ -78,7 +67,7 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
     >>> interval(3.1e9, 2.2e9, 4.4e9, "N/m2")
     '3.1 GN/m² (2.2 to 4.4)'
     """
-    scale, _ = _scale(value, unit)
+    scale, _ = display_unit(value, unit)
     text = quantity(value, unit)
     if low is None or high is None:
         return text
@@ -100,12 +89,24 @@ def percent(new: float | None, old: float | None) -> str:
 
     >>> percent(0.02, 0.2), percent(1.03, 1.0), percent(0.9997, 1.0), percent(1.0, None)
     ('-90 %', '+3.0 %', '-0.03 %', '–')
+    >>> percent(0.999999, 1.0)
+    '0.00 %'
     """
     if new is None or not old or not math.isfinite(new / old):
         return _NONE
     change = 100 * (new / old - 1)
     decimals = 0 if abs(change) >= 10 else 1 if abs(change) >= 1 else 2
-    return f"{change:+.{decimals}f} %"
+    sign = "+" if round(change, decimals) > 0 else ""
+    return f"{sign}{fixed(change, decimals)} %"
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals, zero without a sign.
+
+    >>> fixed(-0.0004, 3), fixed(-1.5, 1)
+    ('0.000', '-1.5')
+    """
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 def direction(vector: Sequence[float]) -> str:
@@ -119,7 +120,7 @@ def direction(vector: Sequence[float]) -> str:
     axis = max(range(3), key=lambda k: abs(vector[k]))
     if abs(vector[axis]) > 1 - 1e-6:
         return ("+" if vector[axis] > 0 else "-") + "XYZ"[axis]
-    return " ".join(f"{round(x, 2) + 0.0:.2f}" for x in vector)  # no -0.00
+    return " ".join(fixed(x, 2) for x in vector)
 
 
 def counted(n: int, one: str, many: str) -> str:
@@ -131,7 +132,12 @@ def counted(n: int, one: str, many: str) -> str:
     return f"{n} {one if n == 1 else many}"
 
 
-def _scale(value: float | None, unit: str) -> tuple[float, str]:
+def display_unit(value: float | None, unit: str) -> tuple[float, str]:
+    """The unit in which a value is shown, as a multiple of its own, and its name.
+
+    >>> display_unit(2.1e11, "N/m2"), display_unit(0.0012, "m")
+    ((1000000000.0, 'GN/m²'), (0.001, 'mm'))
+    """
     shown = unit_text(unit)
     if not value or not math.isfinite(value):
         return 1.0, shown

@@ -43,8 +43,8 @@ class Refinement:
             return ()
         return (
             "the frequencies of the reduced model differ from the full model by "
-            f"{self.worst:.2%}, above the limit of {LIMIT:.2%}: do not trust the result; narrow "
-            "the band, or correct the deck first",
+            f"{_percent(self.worst)}, above the limit of {_percent(LIMIT)}: do not trust the "
+            "result; narrow the band, or correct the deck first",
         )
 
 
@@ -62,7 +62,7 @@ def refined(
     if any(e.traits.remakes_structure for e in hypothesis.effects):
         problem, hypothesis = _on_new_structure(question, problem, hypothesis)
     found = _accuracy(problem, hypothesis)
-    note = _said(found)
+    note, first = _said(found), found.worst
     for _ in range(TRIES):
         if found.serves():
             break
@@ -76,7 +76,7 @@ def refined(
             break
         hypothesis = replace(hypothesis, fit=made, model=model)
         found = _accuracy(problem, hypothesis)
-        note = f"{note}; on the refined basis {found.worst:.2%}"
+        note = f"{_said(found)}, after {_percent(first)} before its basis was refined"
     return Refinement(hypothesis, note, found.worst)
 
 
@@ -88,8 +88,17 @@ def _accuracy(problem: UpdatingProblem, hypothesis: HypothesisFit) -> Accuracy:
 def _said(found: Accuracy) -> str:
     return (
         "the frequencies of the reduced model differ from the full model by at most "
-        f"{found.worst:.2%} (limit {LIMIT:.2%})"
+        f"{_percent(found.worst)} (limit {_percent(LIMIT)})"
     )
+
+
+def _percent(share: float) -> str:
+    """A share in per cent, to a hundredth.
+
+    >>> _percent(0.0012), _percent(1e-6)
+    ('0.12 %', 'less than 0.01 %')
+    """
+    return f"{100 * share:.2f} %" if share >= 5e-5 else "less than 0.01 %"
 
 
 def _on_new_structure(
@@ -107,7 +116,8 @@ def _on_new_structure(
     assert isinstance(data, (Responses, Poles))
     model = modelled(changed.searched(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
-    mesh = mesh_hidden(model, f_max, measured_on(changed) if rows else None)
+    seen = rows or (isinstance(data, Poles) and data.shapes is not None)
+    mesh = mesh_hidden(model, f_max, measured_on(changed) if seen else None)
     reduced = reduced_problem(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,

@@ -14,6 +14,7 @@ from ..effects.joints import Connection
 from ..effects.search_context import Candidate
 from ..inference.hypothesis_fit import FAILED, HypothesisFit, UpdatingProblem
 from ..inference.likelihood import Responses
+from ..inference.local_scores import local_scores
 from ..inference.pole_data import Poles
 from ..inference.scan import (
     Baseline,
@@ -198,6 +199,12 @@ class UpdatingContext:
         data = self.problem.data
         return Scan(self, data) if isinstance(data, Responses) else None
 
+    @property
+    def tells_places(self) -> bool:
+        """True if the data tell neighbouring places apart: responses, or modes with shapes."""
+        data = self.problem.data
+        return isinstance(data, Responses) or data.shapes is not None
+
     @cached_property
     def loosened(self) -> tuple[Loosened, ...]:
         """Welds and fasteners with what the sheets give where they are loaded."""
@@ -226,7 +233,11 @@ class UpdatingContext:
 
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
-        base, reduced = self.baselines[about], self.problem.reduced
+        base, reduced, data = self.baselines[about], self.problem.reduced, self.problem.data
+        if extended and isinstance(data, Responses):
+            local = local_scores(base, reduced, data, effect, starts)
+            if local is not None:
+                return local[None]
         wider = extended or effect.release is not None
         widened = reduced.model_for if wider else reduced.model.split_for
         model = widened(effect, starts[0])

@@ -114,4 +114,4 @@ def _log_change(effect: Effect, x: np.ndarray) -> float:
 def _more(change: float, up: str, down: str) -> Iterator[str]:
     """A change of more than half a per cent in words."""
     if abs(change) > LEAST:
-        yield f"{abs(np.expm1(change)):.1%} {up if change > 0 else down}"
+        yield f"{100 * abs(np.expm1(change)):.1f} % {up if change > 0 else down}"

@@ -105,7 +105,7 @@ class DecisionWords:
         if test is None or one is None:
             return ""
         note = (
-            f"{test.p:.0%} of recordings drawn from a right model are as unusual with "
+            f"{100 * test.p:.0f} % of recordings drawn from a right model are as unusual with "
             f"{one.name or ALONE}: {test.what}"
         )
         if test.passes:

@@ -15,8 +15,9 @@ lines, all other modes to first order:
 N_0 = b P⁻¹ M P⁻¹ bᵀ, d_r(s) = 1/(λ_r + s²).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,10 +30,12 @@ from ..inference.likelihood import Responses
 from ..inference.scan import Baseline, whitened
 from ..reduced.reduced_model import State
 from ..reduced.reduced_problem import ReducedProblem
+from ..sparse.factor import Factor
 
 MOST_FASTENERS = 400  # fasteners that are tried; of more, so many spread over the structure
 AT_ONCE = 24  # of them are solved for together
 LEAST_CHANGE = 1e-9  # of R: rounding of the solves
+_KNOWN: WeakKeyDictionary[Factor, tuple["LoosenedRow", ...]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +80,16 @@ class LoosenedRow:
 def loosened_rows(reduced: ReducedProblem) -> tuple[LoosenedRow, ...]:
     """Every fastener of the structure with what the sheets give where it is loaded, by lines.
 
-    Long lines are divided so that every run of ``MOST_RUN`` fasteners lies in one row.
+    Long lines are divided so that every run of ``MOST_RUN`` fasteners lies in one row. They are
+    those of the structure as given: the rounds of a search share them, whatever was found.
     """
+    if reduced.factor not in _KNOWN:
+        _KNOWN[reduced.factor] = tuple(_solved(reduced))
+    return _KNOWN[reduced.factor]
+
+
+def _solved(reduced: ReducedProblem) -> Iterator[LoosenedRow]:
+    """The rows of :func:`loosened_rows`, several solved for together."""
     joints = fasteners(reduced.structure)
     if len(joints) > MOST_FASTENERS:
         spread = farthest_point_sample(np.array([j.point for j in joints]), MOST_FASTENERS)
@@ -88,12 +99,10 @@ def loosened_rows(reduced: ReducedProblem) -> tuple[LoosenedRow, ...]:
         for line in lines(joints)
         for begin in range(0, max(1, len(line) - MOST_RUN + 1), AT_ONCE - MOST_RUN + 1)
     ]
-    out: list[LoosenedRow] = []
     for some in batched(rows):
         every = [tuple(joints[k] for k in at) for at in some]
         for at, row, whole in zip(some, every, together(reduced, every), strict=True):
-            out.append(LoosenedRow(at, row, whole))
-    return tuple(out)
+            yield LoosenedRow(at, row, whole)
 
 
 def batched(rows: Sequence[tuple[int, ...]]) -> list[list[tuple[int, ...]]]:

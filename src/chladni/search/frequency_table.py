@@ -25,8 +25,8 @@ def frequency_rows(
     """Identified frequencies and those of every stage ("before", "calibrated", "after")."""
     if not len(test.frequency):
         return ()
-    none = [None] * len(test.frequency)
-    damping = none if test.damping is None else test.damping.tolist()
+    known = np.full(len(test.frequency), np.nan) if test.damping is None else test.damping
+    damping = [None if np.isnan(zeta) else float(zeta) for zeta in known]
     both = zip(test.frequency.tolist(), damping, strict=True)
     rows = [FrequencyRow(f, damping=zeta) for f, zeta in both]
     for name, model in stages:
@@ -48,7 +48,7 @@ def _paired(
     """Model mode of every test mode (-1: none) and their MAC (n,)."""
     n = len(test.frequency)
     at, value = np.full(n, -1), np.full(n, np.nan)
-    if not isinstance(prepared.score, Poles):
+    if not isinstance(prepared.score, Poles) or test.shapes is not None:
         pairs = test.pairs(question.outputs, model, modes)
         at[pairs.test], value[pairs.test] = pairs.model, pairs.mac
         return at, value

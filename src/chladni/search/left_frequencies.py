@@ -68,8 +68,9 @@ def _folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> Iterator[str]:
         yield (
             f"the folds are {'softer' if kappa < 1 else 'stiffer'} than in the deck: shells along "
             f"them with about {kappa:.2g} of their bending stiffness remove "
-            f"{1 - left / plain:.0%} of the squared deviations; that is {away:.2g} standard "
-            "deviations of the differences between meshes; look at the joints along the folds"
+            f"{100 * (1 - left / plain):.0f} % of the squared deviations; that is {away:.2g} "
+            "standard deviations of the differences between meshes; look at the joints along the "
+            "folds"
         )
 
 

@@ -19,19 +19,12 @@ def frequencies(
     frf = question.frf
     if frf is None:
         assert question.frequency is not None
-        sd = question.frequency_sd
-        f = np.asarray(question.frequency, float)
-        sd = np.full(len(f), np.nan) if sd is None else sd
-        inside = (f >= question.band[0]) & (f <= question.band[1]) & _kept(f, question.exclude)
-        if not inside.any():
-            raise FileError(
-                f"none of the {len(f)} poles, {f.min():g} to {f.max():g} Hz, lies in the band "
-                f"{question.band[0]:g}-{question.band[1]:g} Hz"
-            )
-        order = np.argsort(f[inside])
+        at = listed(question)
+        f, sd = np.asarray(question.frequency, float)[at], question.frequency_sd
+        sd = np.full(len(f), np.nan) if sd is None else sd[at]
         sd = np.where(np.isnan(sd), 1e-3 * f, sd)
         note = "no FRF exists: natural frequencies were compared"
-        return f[inside][order], sd[inside][order], np.ones(len(order)), None, (note,)
+        return f, sd, np.ones(len(f)), None, () if question.shapes is not None else (note,)
     band = band_of(question, frf)
     use = counted(frf, question.exclude)
     found = identify(frf, widened(frf, band), use=use, progress=progress)
@@ -51,6 +44,19 @@ def frequencies(
     peak = _peaks(found)[keep]
     sd = np.maximum(found.frequency_sd[keep], 1e-4 * f[keep])
     return f[keep], sd, peak / peak.max(), found, (note,)
+
+
+def listed(question: Question, above: float = 0.0) -> np.ndarray:
+    """Positions of the given poles in the band and above a frequency [Hz], in increasing order."""
+    f = np.asarray(question.frequency, float)
+    inside = (f >= question.band[0]) & (f <= question.band[1]) & _kept(f, question.exclude)
+    if not inside.any():
+        raise FileError(
+            f"none of the {len(f)} poles, {f.min():g} to {f.max():g} Hz, lies in the band "
+            f"{question.band[0]:g}-{question.band[1]:g} Hz"
+        )
+    kept = np.flatnonzero(inside & (f > above))
+    return kept[np.argsort(f[kept])]
 
 
 LEAST_DELTA_CHI2 = 3.0  # least drop of χ² over the penalty of a pole for it to count as a mode

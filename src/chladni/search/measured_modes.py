@@ -24,7 +24,7 @@ class MeasuredModes:
     Attributes
     ----------
     frequency : (r,)          [Hz]
-    damping : (r,) or None    ratios; None of a table of frequencies
+    damping : (r,) or None    ratios, nan where a table has none
     shapes : (n_out, r) or None    real, of any scale; None where there are too few sensors
     """
 
@@ -64,14 +64,16 @@ class MeasuredModes:
         loss = sp.csr_array(s.hysteretic().K.imag)
         own = np.einsum("ir,ir->r", phi, (s.system.V @ phi) * omega + loss @ phi) / (2 * omega**2)
         first = int(np.searchsorted(model.modes.frequency, modes.frequency[0]))
-        damping[first + found.model] = np.maximum(self.damping[found.test] - own, 0.0)
+        seen = self.damping[found.test] - own
+        damping[first + found.model] = np.where(np.isnan(seen), other, np.maximum(seen, 0.0))
         return damping
 
 
 def measured_modes(prepared: Prepared) -> MeasuredModes:
     """Modes that the test shows beyond doubt; of a table all of them."""
     if isinstance(prepared.score, Poles):
-        return MeasuredModes(prepared.score.frequency)
+        f, shapes = prepared.score.frequency, prepared.score.shapes
+        return MeasuredModes(f, prepared.damping, None if shapes is None else shapes.values.T)
     found = prepared.identified
     assert found is not None
     low, high = found.band

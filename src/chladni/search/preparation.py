@@ -10,14 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.calibration_parameters import defaults
 from ..effects.channels import channel_gain
 from ..effects.effect import Effect
-from ..effects.effect_context import EffectContext, Setup
 from ..effects.joint_stiffness import joint_nuisances
-from ..effects.registry import catalogue, family
-from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
-from ..effects.weld_patch import PATCHES, weld_patch
+from ..effects.registry import catalogue
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
@@ -26,7 +22,6 @@ from ..ema.recording_noise import equalised_noise, sample_noise
 from ..ema.recording_screening import strong_modes
 from ..ema.response_variance import noise_source
 from ..errors import FileError
-from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..inference.complex_modes import mode_coupling
 from ..inference.damping_scatter import modal_damping
@@ -37,13 +32,21 @@ from ..inference.likelihood import Responses, rms_over_lines
 from ..inference.map_fit import APART, unknowns
 from ..inference.pole_data import Poles
 from ..inference.sensor_errors import sensor_errors
-from ..model.free_parameter import FreeParameter
 from ..progress import Progress, silent, within
 from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
 from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
+from .freed_parameters import freed_by, setup_of
 from .held_out_data import HeldOutChoice, held_out_sensors, of_poles, upper_part
-from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
+from .measured_frequencies import (
+    LEAST_DELTA_CHI2,
+    band_of,
+    counted,
+    frequencies,
+    listed,
+    widened,
+)
+from .measured_shapes import shape_data
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .question import Prepared, Question
@@ -106,7 +109,7 @@ def _by_responses(
     if not ((lines[0] >= low) & (lines[0] <= fit_max)).any():
         raise FileError(
             f"[band] exclude leaves no line between {low:g} and {fit_max:g} Hz to compare with the "
-            f"model (its lines lie {0.75 * ZETA:.0%} apart); exclude less, or widen the band"
+            f"model (its lines lie {75 * ZETA:.0f} % apart); exclude less, or widen the band"
         )
     progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
@@ -150,8 +153,9 @@ def _by_responses(
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
-        f"model and test were given {ZETA:.0%} damping for the search and {ZETA_Q:.0%} for Q "
-        "(damping equalisation): modes need no pairing, and damping cannot appear as stiffness",
+        f"model and test were given {100 * ZETA:.0f} % damping for the search and "
+        f"{100 * ZETA_Q:.0f} % for Q (damping equalisation): modes need no pairing, and damping "
+        "cannot appear as stiffness",
         f"the noise of the recording: {noise_source(frf)}",
     ]
     if question.base is not None:
@@ -218,7 +222,15 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     frequency, sd, strength = (v[frequency > above] for v in (frequency, sd, strength))
     if question.frf is not None:
         refuse_silent(nominal, question.outputs, question.inputs)
-    built, mesh = nominal.structure, mesh_hidden(nominal, f_max) if fitted else []
+    built, shapes = nominal.structure, None
+    damping = None
+    if question.frf is None:
+        at = listed(question, above)
+        damping = None if question.damping is None else question.damping[at]
+        shapes, said = shape_data(question, at, nominal)
+        notes = (*notes, *said)
+    seen = None if shapes is None else measured_on(question)
+    mesh = mesh_hidden(nominal, f_max, seen) if fitted else []
     reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))
     held = np.zeros(len(frequency), bool)
@@ -233,6 +245,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
         spurious=SPURIOUS_LISTED if question.frf is None else share_spurious(strength),
+        shapes=shapes,
     ).rebased(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, mesh, f_max)
     problem = updating_problem(question, reduced, data, nuisance, f_max)
@@ -240,9 +253,20 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     n = int(left_out.reporting.sum())
     what = f"{n} of {len(held)} frequencies" if n else "nothing"
     notes = (*notes, *_unscored(question), *_mass_note(question, problem), *suspension_note(above))
-    few = _few(problem, len(frequency), 0)
+    few = _few(problem, len(frequency), 0 if shapes is None else shapes.values.shape[1] - 1)
     return Prepared(
-        problem, data, left_out, left_out, what, notes, nominal, None, found, *few, ~held
+        problem,
+        data,
+        left_out,
+        left_out,
+        what,
+        notes,
+        nominal,
+        None,
+        found,
+        *few,
+        ~held,
+        damping=damping,
     )
 
 
@@ -280,56 +304,6 @@ def updating_problem(
         reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
         setup_of(question, f_max), question.outputs.labels, families=catalogue(question.effects),
     )  # fmt: skip
-
-
-def setup_of(question: Question, f_max: float) -> Setup:
-    """The description of the test that effects may use."""
-    weight = mass_properties(question.assembly)[0]
-    sensors = question.outputs.shares(question.assembly)
-    forces = question.inputs.shares(question.assembly)
-    ways = question.inputs.directions[~question.inputs.base].tolist()
-    drives = tuple((share, (x, y, z)) for share, (x, y, z) in zip(forces, ways, strict=True))
-    return Setup(sensors, question.hangers, weight, f_max, drives)
-
-
-def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
-    """Parameters that the user frees; else E and t (wall) of every part, rho of every material.
-
-    This default holds for shells and beams.  Without either, it is E and rho of every material of
-    solids.
-    """
-    if question.parameters:
-        return [_freed(question, reduced, f_max, p) for p in question.parameters]
-    if len(reduced.groups):
-        return list(defaults(reduced.groups))
-    return [user_parameter(reduced.groups, p) for p in defaults_of_solids(question.assembly)]
-
-
-def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreeParameter) -> Effect:
-    """One number, or an effect of known place, for the parts that the user names.
-
-    Raises
-    ------
-    FileError
-        If deck and test do not determine the place of the effect.
-    """
-    if p.field in UNITS:
-        return user_parameter(reduced.groups, p)
-    if p.field in PATCHES:
-        return weld_patch(reduced.groups, p)
-    placed = family(p.field).placed
-    assert placed is not None
-    setup = setup_of(question, f_max)
-    where = EffectContext(reduced.groups, reduced.grids, reduced.candidates, setup)
-    names = {question.assembly.parts[k].name for k in p.positions}
-    found = [e for e in placed(where) if not names or set(e.parts) <= names]
-    if not found:
-        raise FileError(
-            f"{p.field} cannot be freed: deck and test do not define its place; "
-            "orthotropic-material needs all parts of a material, suspension [test] hangers, "
-            "sensor-mass sensors on the structure, shaker-restraint one to three drive points"
-        )
-    return freed_effect(found[0], p.name)
 
 
 def ready_for_responses(question: Question, nominal: Modelled, f_max: float) -> ReducedProblem:

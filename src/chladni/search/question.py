@@ -57,6 +57,9 @@ class Question:
     frf: FRF | None = None
     frequency: np.ndarray | None = None  # poles where no FRF exists [Hz]
     frequency_sd: np.ndarray | None = None  # [Hz]
+    damping: np.ndarray | None = None  # of these poles, nan where unknown
+    shapes: np.ndarray | None = None  # (n_out, r) of these poles, real or complex, any scale
+    shape_sd: np.ndarray | None = None  # (n_out, r) of each entry, nan where unknown
     mass_measurement: MassMeasurement | None = None
     hangers: tuple[int, ...] = ()
     band: tuple[float, float] = (0.0, np.inf)
@@ -151,4 +154,5 @@ class Prepared:
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     others: tuple[OtherTest, ...] = ()
     levels: LevelStudy = field(default_factory=LevelStudy)
+    damping: np.ndarray | None = None  # of listed poles that are compared, nan where unknown
     above: float = 0.0  # [Hz]: a free deck is compared above the modes of the suspension

@@ -99,8 +99,9 @@ def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
     rows = found.effect.reported(found.own.x, found.own.sd)
     values = list(dict.fromkeys(w for v in found.nearly if (w := _values_apart(rows, v))))
     own = found.effect.location(found.own.x, found.own.sd).text
+    best = found.own.neg2_log_evidence
     places = [
-        f"{place} ({np.exp((found.own.neg2_log_evidence - v.neg2_log_evidence) / 2):.0%} as likely)"
+        f"{place} ({100 * np.exp((best - v.neg2_log_evidence) / 2):.0f} % as likely)"
         for v in found.nearly
         if (place := v.effect.location(v.x, v.sd).text) != own
     ]
@@ -138,9 +139,9 @@ def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> 
         return ()
     off = weighed / deck - 1
     return (
-        f"the article weighs {abs(off):.1%} {'more' if off > 0 else 'less'} than the deck, so "
-        "calibration changes density and thickness; trim or mastic on a whole sheet has the same "
-        "effect: the drawing, or one part weighed alone, distinguishes them",
+        f"the article weighs {100 * abs(off):.1f} % {'more' if off > 0 else 'less'} than the deck, "
+        "so calibration changes density and thickness; trim or mastic on a whole sheet has the "
+        "same effect; the drawing, or one part weighed alone, distinguishes them",
     )
 
 
@@ -336,6 +337,6 @@ def blind_note(spot: ResidualLocalisation | None) -> tuple[str, ...]:
     if spot is None or spot.blind < BLIND_SHARE:
         return ()
     return (
-        f"on {spot.blind:.0%} of the structure the test cannot detect a local loss of half the "
-        "stiffness or mass (grey in the map of the remaining gain)",
+        f"on {100 * spot.blind:.0f} % of the structure the test is blind; half the stiffness or "
+        "mass could be missing there (grey in the map of the remaining gain)",
     )

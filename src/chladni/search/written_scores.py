@@ -89,10 +89,10 @@ def seen(
     basis = modes.shapes
     if isinstance(score, Poles):
         lam = (2 * np.pi * modes.frequency) ** 2
-        if score.outputs is not None and score.inputs is not None:
-            a = question.outputs.around(built) @ basis
-            b = question.driven_around(built) @ basis
-            score = replace(score, a=a, b=b)
+        if score.a is not None:
+            score = replace(score, a=question.outputs.around(built) @ basis)
+        if score.b is not None:
+            score = replace(score, b=question.driven_around(built) @ basis)
         return score, _state(lam, np.eye(len(lam)))
     rows_o, rows_i = question.outputs.rows(built), question.inputs.loads(built)
     flexible = modes.frequency[modes.frequency > 0.02 * f_max]
@@ -116,7 +116,7 @@ def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None)
     """
     if isinstance(prepared.score, Poles):
         chosen = use if real is None else use & real
-        variance = (prepared.score.sd[chosen] / LN10) ** 2
+        variance = prepared.score.noise(chosen)
     else:
         assert prepared.noise is not None
         variance = prepared.noise[use]

@@ -26,8 +26,12 @@ class Factor(Protocol):
         """X = A⁻¹ B for one (n,) or several (n, k) right sides."""
         ...
 
+    def between(self, B: sp.csr_array) -> np.ndarray:
+        """Bᵀ A⁻¹ B (k, k) of sparse columns (n, k)."""
+        return np.asarray(B.T @ self.solve(B.toarray()))
 
-class SuperLUFactor:
+
+class SuperLUFactor(Factor):
     """L U without symmetry, real or complex, definite or not: the last resort.
 
     Minimum degree on Aᵀ + A and diagonal pivots keep a symmetric pattern sparse. Without
@@ -61,7 +65,7 @@ class SuperLUFactor:
         return self._lu.solve(np.asarray(B))
 
 
-class CholmodFactor:
+class CholmodFactor(Factor):
     """CHOLMOD's supernodal Cholesky, ordered by METIS (Chen et al. 2008); needs scikit-sparse."""
 
     def __init__(self, A: sp.sparray) -> None:

@@ -153,6 +153,24 @@ class Multifrontal:
             X[fronts.order] = solved
         return X.reshape(B.shape)
 
+    def between(self, B: sp.csr_array) -> np.ndarray:
+        """Bᵀ A⁻¹ B (k, k) of sparse columns (n, k): (L⁻¹ B)ᵀ L⁻¹ B, on the fronts they reach."""
+        if not self.definite:
+            return np.asarray(B.T @ self.solve(B.toarray()))
+        fronts, B = self.fronts, B[self.fronts.order]
+        X, out = B.toarray(), np.zeros(2 * B.shape[1:])
+        front_of = np.repeat(np.arange(len(self._parts)), np.diff(fronts.start))
+        reached = np.zeros(len(self._parts), bool)
+        reached[front_of[np.diff(B.indptr) > 0]] = True
+        for i, part in enumerate(self._parts):
+            if reached[i]:
+                y, down = part.forward(X[fronts.start[i] : fronts.start[i + 1]])
+                out += y.T @ y
+                if len(rows := fronts.boundary[i]):
+                    X[rows] -= down
+                    reached[front_of[rows[0]]] = True
+        return out
+
 
 def counted(
     A: sp.sparray,

@@ -45,6 +45,7 @@ class Series:
     labels: Sequence[str] = ()  # words at the end of each bar
     values: np.ndarray | None = None  # (n,) shown by the colours of the points
     sample: np.ndarray | None = None  # (n,) number of the sample that a point belongs to
+    opens: str = ""  # drawing of the page that a click on a bar opens at its place
 
     def __post_init__(self) -> None:
         if np.shape(self.x) != np.shape(self.y) or np.ndim(self.x) != 1:
@@ -98,6 +99,8 @@ class Matrix:
     least: float = 0.0  # size from which a square has its number
     tips: Sequence[Sequence[str]] = ()
     frames: Sequence[tuple[int, int]] = ()  # (row, column) with a frame
+    # drawing of modes that a click on a square opens, and what its rows and its columns are there
+    opens: tuple[str, str, str] | None = None
 
     def __post_init__(self) -> None:
         due = (len(self.rows), len(self.columns))

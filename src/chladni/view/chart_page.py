@@ -161,8 +161,11 @@ def _add_panel(
     if panel.matrix is not None:
         layout["shapes"] += [_frame(i, j, x, y) for i, j in panel.matrix.frames]
     note = {"showarrow": False, "font": {"size": 10, "color": "@soft"}}
-    layout["annotations"] += [{**note, "x": n.x, "y": n.y, "xref": x, "yref": y,
-                               "text": escape(n.text, False)} for n in panel.notes]  # fmt: skip
+    for n in panel.notes:
+        high = float(np.log10(n.y)) if panel.y.log else n.y  # Plotly's annotations are in decades
+        words = escape(n.text, False)
+        layout["annotations"].append({**note, "x": n.x, "y": high, "xref": x, "yref": y,
+                                      "text": words})  # fmt: skip
     if panel.title:
         layout["annotations"].append(_title(panel.title, x, y))
     if panel.equal:
@@ -220,6 +223,8 @@ def _traces(s: Series, looks: Any, show: bool, panel: Panel) -> list[Spec]:
         "legendgroup": name, "showlegend": show, "opacity": s.opacity,
     }  # fmt: skip
     made |= _bar(s, colour, panel) if s.kind == "bars" else _scatter(s, colour, dash)
+    if s.opens:
+        made["meta"] = {"opens": s.opens}
     if s.sample is not None:
         made["customdata"] = [None if v < 0 else int(v) for v in s.sample]
     made |= _under_pointer(s, name)
@@ -316,6 +321,8 @@ def _heatmap(m: Matrix) -> Spec:
         "hoverinfo": "text",
         "hovertext": [[escape(t, False).replace("\n", "<br>") for t in row] for row in m.tips],
     }  # fmt: skip
+    if m.opens is not None:
+        made["meta"] = {"opens": m.opens[0], "sides": m.opens[1:]}
     if m.digits is not None:
         shown = np.isfinite(m.values) & (np.abs(m.values) >= m.least)
         made["texttemplate"] = "%{text}"

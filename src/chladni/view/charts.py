@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .chart import Chart, ChartAxis, Mark, Matrix, Panel, Series
+from .chart import Chart, ChartAxis, Mark, Matrix, Note, Panel, Series
 
 Curves = Mapping[str, tuple[np.ndarray, np.ndarray]]  # name: frequency [Hz] (n,), complex H (n,)
 Bands = Sequence[tuple[float, float]]
@@ -83,11 +83,13 @@ def mac(
     test: np.ndarray,
     found: Mapping[str, tuple[np.ndarray, np.ndarray, Sequence[tuple[int, int]]]],
     rows: str = "test",
+    opens: str = "",
 ) -> Chart:
     """MAC (test, model) of each deck, side by side; framed: pairs (row, column).
 
     Parameters
     ----------
+    opens : drawing of the modes that a click on a square opens
     test : (r,) frequencies of the rows [Hz]
     found : name: MAC (r, c), frequencies of the columns (c,) [Hz], pairs
     """
@@ -99,7 +101,8 @@ def mac(
         names, heads = ([f"{f:.1f}" for f in side] for side in (test, model))
         digits = 0 if len(model) <= _MOST_LABELS // 2 else None
         squares = Matrix(100 * value, names, heads, (0.0, 100.0), "MAC [%]", digits=digits, least=5,
-                         tips=tips, frames=pairs)  # fmt: skip
+                         tips=tips, frames=pairs,
+                         opens=(opens, rows, name) if opens else None)  # fmt: skip
         title = f"{name} [Hz]" if name in ("test", "model") else f"deck {name} [Hz]"
         return Panel((), _places(heads, title), _places(names, f"{rows} [Hz]", True),
                      matrix=squares)  # fmt: skip
@@ -126,13 +129,14 @@ def matrix(squares: Matrix, **more: Any) -> Chart:
                     height=9 + 1.5 * len(squares.rows), **more)  # fmt: skip
 
 
-def ladder(test: np.ndarray, sides: Mapping[str, np.ndarray]) -> Chart:
+def ladder(test: np.ndarray, sides: Mapping[str, np.ndarray], opens: str = "") -> Chart:
     """Deviation f_model / f_test - 1 of each mode in per cent.
 
     Parameters
     ----------
     test : (r,) [Hz]
     sides : name: frequencies of the partners (r,) [Hz]; not-a-number without one
+    opens : drawing that a click on a bar opens at its mode
     """
     at = np.arange(len(test), dtype=float)
     bars = []
@@ -140,7 +144,8 @@ def ladder(test: np.ndarray, sides: Mapping[str, np.ndarray]) -> Chart:
         off = 100 * (np.asarray(model, dtype=float) / test - 1)
         said = ["no partner" if not np.isfinite(v) else f"{v:+.3g} %" for v in off]
         tips = [f"test {f:.2f} Hz\n{name} {s}" for f, s in zip(test, said, strict=True)]
-        bars.append(Series(name, at, off, "bars", style(name).get("tint", "before"), tips=tips))
+        bars.append(Series(name, at, off, "bars", style(name).get("tint", "before"), tips=tips,
+                           opens=opens))  # fmt: skip
     axis = _places([f"{f:.4g}" for f in test], "frequency of the test [Hz]")
     width = min(max(5.0, 0.55 * len(test) + 1.6), _WIDEST)
     panel = Panel(bars, axis, ChartAxis("model - test [%]"), marks=(Mark(0.0, "x", "ink"),))
@@ -153,24 +158,27 @@ def steps(
 ) -> Chart:  # fmt: skip
     """Deviation Q from the nominal model, step by step, on each side of the data.
 
-    ``floors`` are the least Q of each side, ``of`` their name.
+    ``floors`` are the least Q of each side, ``of`` their name. A Q of zero is drawn at the lower
+    edge of the logarithmic axis.
     """
     names = list(dict.fromkeys(n for q in sides.values() for n in q))
     tints = dict(zip(sides, ("neutral", "before"), strict=False))
-    bars = []
-    for side, q in sides.items():
-        known = [(k, q[n]) for k, n in enumerate(names) if n in q and np.isfinite(q[n])]
+    every = [v for q in (*sides.values(), floors or {}) for v in q.values() if v > 0]
+    low, high = min(every, default=1.0) / 2, 3 * max(every, default=1.0)
+    points, notes = [], []
+    for k, (side, q) in enumerate(sides.items()):
+        known = [(j, q[n]) for j, n in enumerate(names) if n in q and np.isfinite(q[n])]
         at, value = np.array(known, dtype=float).reshape(-1, 2).T
+        at, drawn = at + 0.12 * (2 * k - len(sides) + 1), np.maximum(value, low)
         first = value[0] if len(value) else 0.0
-        said = [f"{v:.4g}" + (f" ({100 * (v / first - 1):+.0f} %)" if k and first else "")
-                for k, v in enumerate(value)]  # fmt: skip
-        bars.append(Series(side, at, value, "bars", tints[side], labels=said))
+        said = [f"{v:.4g}" + (f" ({round(100 * (v / first - 1)):+d} %)" if j and first else "")
+                for j, v in enumerate(value)]  # fmt: skip
+        points.append(Series(side, at, drawn, "both", tints[side], size=7, tips=said))
+        notes += [Note(x, 1.25 * y, text) for x, y, text in zip(at, drawn, said, strict=True)]
     lines = [Mark(v, "x", tints[side], "dash", f"{of}, {side}")
-             for side, v in (floors or {}).items() if np.isfinite(v) and side in sides]  # fmt: skip
-    top = max((float(s.y.max()) for s in bars if len(s.y)), default=0.0)
-    panel = Panel(
-        bars, _places(names, ""), ChartAxis("Q", limits=(0, 1.22 * top or 1.0)), marks=lines
-    )
+             for side, v in (floors or {}).items() if v > 0 and side in sides]  # fmt: skip
+    axis = ChartAxis("Q", log=True, limits=(low, high))
+    panel = Panel(points, _places(names, ""), axis, marks=lines, notes=notes)
     return Chart.of(panel, size=(max(4.6, 1.9 * len(names)), 3.2))
 
 

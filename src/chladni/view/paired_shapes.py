@@ -1,32 +1,27 @@
-"""Data of a picture of paired modes."""
+"""Data of a picture of modes of test and model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import OneScreen
 
-@dataclass(frozen=True, eq=False)
-class PairedShapes:
-    """Paired modes at the sensors, each of largest entry 1, and the model's whole shape."""
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PairedShapes(OneScreen):
+    """Modes of test and model at the sensors, and the model's whole shapes; which are partners."""
 
     # points, directions: (k, 3) of the sensors [m], unit vectors
     points: np.ndarray
     directions: np.ndarray
-    # test, model: (k, r) real, of the same sign and scale
+    # (k, r_test), (k, r_model) real, of largest entry 1; a test's of the scale of its partner
     test: np.ndarray
     model: np.ndarray
-    motion: np.ndarray  # (n, 3, r) of every point of the model
-    # f_test, f_model: (r,) [Hz]
+    motion: np.ndarray  # (n, 3, r_model) of every point of the model
+    # f_test, f_model: (r_test,), (r_model,) [Hz]
     f_test: np.ndarray
     f_model: np.ndarray
     numbers: Sequence[int]  # model's mode numbers
-    mac: np.ndarray  # (r,)
-
-    def first(self, count: int) -> "PairedShapes":
-        """The pairs lowest in frequency."""
-        r = slice(count)
-        return PairedShapes(
-            self.points, self.directions, self.test[:, r], self.model[:, r],
-            self.motion[:, :, r], self.f_test[r], self.f_model[r], self.numbers[r], self.mac[r],
-        )  # fmt: skip
+    pairs: Sequence[tuple[int, int]]  # (test, model), lowest first
+    mac: np.ndarray  # of each pair

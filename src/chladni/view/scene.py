@@ -168,10 +168,10 @@ def usual_limits(seen: Surface, values: np.ndarray, share: float = 0.02) -> tupl
 
 
 def thickness_map(path: Path | str, seen: Surface, thickness: np.ndarray) -> Path:
-    """Draw the thickness [m] of every face in millimetres; small thick plates set no limit."""
+    """Draw the thickness [m] of every face in millimetres, the thinnest darkest."""
     scale, unit = (1e3, "mm") if seen.unit == "m" else (1.0, seen.unit)
     t = scale * np.asarray(thickness)
-    return scalar_map(path, seen, t, "thickness", unit, "YlGnBu", usual_limits(seen, t))
+    return scalar_map(path, seen, t, "thickness", unit, "YlGnBu_r", usual_limits(seen, t))
 
 
 def sensors(

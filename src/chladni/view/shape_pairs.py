@@ -18,30 +18,31 @@ _PAIRS_A_ROW = 2
 _LONG = 0.12  # the longest arrow, as a part of the structure's size
 
 
-def shape_pairs(path: Path | str, seen: Surface, found: PairedShapes) -> Path:
-    """Draw two pictures a pair: test arrows on the sheet at rest, model arrows on its shape.
+def shape_pairs(path: Path | str, seen: Surface, found: PairedShapes, most: int = 8) -> Path:
+    """Draw two pictures of each low pair: test arrows on the sheet, model arrows on its shape.
 
     Length and colour of an arrow show the motion over the largest: orange along the direction of
     the sensor, blue against it.
     """
-    seen, count = seen.without_joints(), len(found.f_test)
+    seen, pairs = seen.without_joints(), found.pairs[:most]
+    count = len(pairs)
     columns = 2 * min(_PAIRS_A_ROW, count)
     rows = -(-2 * count // columns)
-    cameras = [for_mode(seen, found.motion[:, :, k]) for k in range(count)]
+    cameras = [for_mode(seen, found.motion[:, :, j]) for _, j in pairs]
     tile = 13.0 / columns
     height = rows * (tile / max(cameras[0][0].aspect, 0.7) + 0.45) + 0.5
     figure = Figure(figsize=(13.0, height))
-    for k, (camera, phi) in enumerate(cameras):
-        sign = -1.0 if (phi * found.motion[:, :, k]).sum() < 0 else 1.0
+    for k, ((camera, phi), (i, j)) in enumerate(zip(cameras, pairs, strict=True)):
+        sign = -1.0 if (phi * found.motion[:, :, j]).sum() < 0 else 1.0
         left, right = (
             figure.add_axes(cell(2 * k + side, rows, columns, 0.45 / height)) for side in (0, 1)
         )
         draw(left, seen, camera, Paint(edges=False))
-        _arrows(left, camera, seen, found, sign * found.test[:, k])
-        left.set_title(f"test  {found.f_test[k]:.2f} Hz", fontsize=9)
+        _arrows(left, camera, seen, found, sign * found.test[:, i])
+        left.set_title(f"test  {found.f_test[i]:.2f} Hz", fontsize=9)
         swung(right, seen, phi, camera, edges=False)
-        _arrows(right, camera, seen, found, sign * found.model[:, k])
-        name = f"model {found.numbers[k]}  {found.f_model[k]:.2f} Hz   MAC {found.mac[k]:.3f}"
+        _arrows(right, camera, seen, found, sign * found.model[:, j])
+        name = f"model {found.numbers[j]}  {found.f_model[j]:.2f} Hz   MAC {found.mac[k]:.3f}"
         right.set_title(name, fontsize=9)
     paper.motion_bar(figure, 0.42, 0.2 / height, 0.16, "viridis")
     return paper.save(figure, path, dpi=140)

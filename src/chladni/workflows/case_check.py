@@ -1,7 +1,7 @@
 """Check a case before a long run: what will be used, what not, and what looks wrong."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Unpack
 
 import numpy as np
@@ -10,18 +10,21 @@ from ..arguments import checked
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..case.recordings import DEAD
+from ..effects.model_errors import ABOVE, mesh_errors
 from ..ema.finding import Screening
 from ..errors import ChladniError, FileError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
+from ..fem.modelled import solved
 from ..geometry.nearest import ShellSurface
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
 from ..results import Result
+from ..search.left_frequencies import OTHERS, SHELLS
 from ..search.preparation import ANOTHER_MASS, off_the_scales
 from .case_draft import said_of
 from .given_case import Source, given_case
-from .loaded_model import as_model
+from .loaded_model import Model, as_model
 from .modes import loose_parts
 from .output_only import with_natural_frequencies
 from .ready_case import ready, refuse_without_effects
@@ -72,6 +75,7 @@ class CaseCheck(Result):
     dofs : tuple of CheckedDof
     findings : tuple of CaseFinding
     unused : {command: sentences}   words each command does not use, and how the rest is read
+    converged : (r,)      these frequencies on an infinitely fine mesh [Hz]; empty: not requested
     """
 
     facts: tuple[tuple[str, str], ...]
@@ -79,6 +83,7 @@ class CaseCheck(Result):
     dofs: tuple[CheckedDof, ...]
     findings: tuple[CaseFinding, ...]
     unused: dict[str, tuple[str, ...]]
+    converged: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def faults(self) -> tuple[CaseFinding, ...]:
@@ -92,6 +97,7 @@ def check(
     source: Source,
     recording: Measured | Sequence[Measured] = (),
     *,
+    mesh: bool = False,
     progress: Progress = silent,
     **words: Unpack[CaseWords],
 ) -> CaseCheck:
@@ -100,6 +106,7 @@ def check(
     Parameters
     ----------
     source, recording, progress, words : as in :func:`chladni.diagnose` (SI, Hz)
+    mesh : True compares the modes with those of a mesh twice as fine
 
     Raises
     ------
@@ -112,11 +119,16 @@ def check(
     modal = model.normal_modes(MODES + 6)
     f = modal.frequency
     elastic = f[f > 1e-3 * f[-1]][:MODES]
+    converged = np.zeros(0)
+    if mesh:
+        progress("a mesh twice as fine", 0.3)
+        converged = _converged(model, elastic)
     progress("places", 0.7)
     dofs = (*_dofs(case, case.outputs, "output"), *_dofs(case, case.inputs, "input"))
     findings = [
         *_units(case), *_mass(case), *_size(case), *_places(case, dofs), *_band(case, elastic),
-        *_dead(case), *(CaseFinding(said, HANGS) for said in loose_parts(model, modal)),
+        *_dead(case), *_mesh(elastic, converged, bool(len(case.assembly.shells))),
+        *(CaseFinding(said, HANGS) for said in loose_parts(model, modal)),
     ]  # fmt: skip
     if not case.recordings:
         findings.append(CaseFinding("there is no recording yet", NO_RECORDING))
@@ -125,7 +137,32 @@ def check(
         sure = {f.remedy for f in more if f.fault or f.remedy == ANOTHER_MASS}  # no guess any more
         findings = [f for f in findings if f.remedy.partition(", if ")[0] not in sure] + more
     unused = {c: tuple(case.said(c)) for c in COMMANDS}
-    return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused, origin=case)
+    return CaseCheck(
+        tuple(_facts(case)), elastic, dofs, tuple(findings), unused, converged, origin=case
+    )
+
+
+def _converged(model: Model, elastic: np.ndarray) -> np.ndarray:
+    """Elastic frequencies on an infinitely fine mesh (r,); nan where no mesh can be refined."""
+    top = float(elastic[-1])
+    errors = mesh_errors(solved(model.structure, ABOVE[1] * top), top)
+    if not errors:
+        return np.full(len(elastic), np.nan)
+    return errors[0].limit[: len(elastic)]
+
+
+def _mesh(elastic: np.ndarray, converged: np.ndarray, shells: bool) -> list[CaseFinding]:
+    """Report modes whose error by the mesh alone exceeds that of a careful model."""
+    off = 100 * np.abs(np.log(elastic[: len(converged)] / converged))
+    most = SHELLS if shells else OTHERS
+    wrong = np.flatnonzero(off > most)
+    if not len(wrong):
+        return []
+    said = (
+        f"the mesh alone moves {len(wrong)} of {len(off)} modes by more than {most:g} %, the one "
+        f"at {elastic[wrong[0]]:.4g} Hz by {off[wrong[0]]:.2g} %"
+    )
+    return [CaseFinding(said, f"refine the mesh, or trust modes below {elastic[wrong[0]]:.4g} Hz")]
 
 
 NO_RECORDING = "all commands need one except modes, frf, plan, bench, render and study"

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Unpack
+from typing import Self, Unpack
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.mac_significance import CLOSE, Likeness, likeness
 from ..ema.mode_pairing import LEAST_CHANNELS, ModePairs, pair
-from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
-from ..errors import ChladniError
+from ..ema.shapes import driven_shapes, real_shapes, shape_covariance, turned
+from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
+from ..inference.channel_screening import shapes_against_model
 from ..inference.pole_data import ABOVE, Poles
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
@@ -41,6 +42,7 @@ from .unit_check import refuse_other_units
 BANDS = 6
 NEAR = 1.3  # times the highest line: as far as the partner of an identified mode is looked for
 LONG = 100_000  # values of a recording: 210 000 took 190 s on a busy machine
+SEPARATE = 1e3  # condition of Φ at the sensors from which they cannot tell modes apart
 RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid motions
 
 
@@ -60,8 +62,12 @@ class Correlation(Result):
     model : responses of the model on the lines of the recording, or None
     screening : faults of the recording, found alone and by comparison with the model
     numbers : of the model's modes, the rigid ones counted, as in ``f_model``
-    shapes : of the pairs at the sensors, with the model's whole motion; None without FRFs
+    shapes : of the pairs at the sensors, with the model's whole motion; None of frequencies alone
     likeness : significance of the MAC of each pair; empty without a MAC
+    cross_orthogonality : (r_model, r_test) or None
+        ΦᵀMΨ with the model's mass on the sensors and shapes of unit modal mass (SEREP)
+    expanded : (n_points, 3, r_test) or None
+        the test's shapes on the whole model, of largest entry 1, basic frame (SEREP)
     """
 
     channels: tuple[str, ...]
@@ -79,6 +85,8 @@ class Correlation(Result):
     numbers: tuple[int, ...] = ()
     shapes: PairedShapes | None = None
     likeness: tuple[Likeness, ...] = ()
+    cross_orthogonality: np.ndarray | None = None
+    expanded: np.ndarray | None = None
 
 
 @checked
@@ -121,7 +129,9 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     near = model.modes.sel(np.flatnonzero(inside))
     numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
-        return replace(_by_poles(case, near), numbers=numbers)
+        by_shapes = bool(case.recordings) and case.recordings[0].modal is not None
+        made = _by_shapes(case, model, near, numbers) if by_shapes else _by_poles(case, near)
+        return replace(made, numbers=numbers)
     refuse_silent(model, case.outputs, case.inputs)
     use = case.lines(test.frequency)
     progress(_identifying(len(test.outputs) * len(test.inputs), int(use.sum())), 0.4)
@@ -131,20 +141,93 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     found = found.sel(firm(found) & found.inside)
     refuse_turned_axes(case, found, model)
     phi, psi = case.outputs.rows(model.structure) @ near.shapes, driven_shapes(found)
-    M = mac(phi, psi) if len(test.outputs) >= LEAST_CHANNELS else None
-    pairs = pair(near.frequency, found.frequency, M)
-    by_dof = None
-    if M is not None and len(pairs):
-        by_dof = comac(phi[:, pairs.model], psi[:, pairs.test])
+    alike = _Alike.of(phi, psi, near.frequency, found.frequency)
+    pairs = alike.pairs
     progress("responses", 0.6)
     responses, _ = scored(case, model, test)
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
-        case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
-        responses, (*screening.notes, *case.said("correlate"), *notes), screening, numbers,
+        case.outputs.labels, found, found.frequency, near.frequency, alike.mac, pairs, alike.comac,
+        q, responses, (*screening.notes, *case.said("correlate"), *notes), screening, numbers,
         _paired_shapes(case, model, near, (phi, psi), pairs, found.frequency, numbers),
-        () if M is None else _likeness(found, phi, near.frequency, pairs),
+        () if alike.mac is None or not len(pairs) else _likeness(
+            real_shapes(found), shape_covariance(found), phi, near.frequency, pairs),
+        *_on_the_model(model, near, phi, psi, f_max),
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Alike:
+    """Modes of model and test at the sensors: MAC (m, r) or None, pairs, CoMAC or None."""
+
+    mac: np.ndarray | None
+    pairs: ModePairs
+    comac: np.ndarray | None
+
+    @classmethod
+    def of(cls, phi: np.ndarray, psi: np.ndarray, f_model: np.ndarray, f_test: np.ndarray) -> Self:
+        """Pair modes; by shape where there are channels enough."""
+        M = mac(phi, psi) if len(phi) >= LEAST_CHANNELS else None
+        pairs = pair(f_model, f_test, M)
+        by_dof = None
+        if M is not None and len(pairs):
+            by_dof = comac(phi[:, pairs.model], psi[:, pairs.test])
+        return cls(M, pairs, by_dof)
+
+
+def _by_shapes(
+    case: Case, model: Modelled, near: ModalModel, numbers: tuple[int, ...]
+) -> Correlation:
+    """Compare a modal model: frequencies and shapes."""
+    modal = case.recordings[0].modal
+    assert modal is not None
+    used = case.lines(modal.frequency)
+    if not used.any():
+        raise FileError(f"{case.path}: none of the {len(used)} modes lies in the band")
+    modal = modal.sel(np.flatnonzero(used))
+    phi, psi = case.outputs.rows(model.structure) @ near.shapes, modal.values
+    alike = _Alike.of(phi, psi, near.frequency, modal.frequency)
+    likely: tuple[Likeness, ...] = ()
+    real, name = turned(psi.T).T.real, case.recordings[0].name
+    screening = shapes_against_model(name, real, modal.frequency, model, case.outputs)
+    if alike.mac is not None and len(alike.pairs):
+        norm = np.maximum(np.linalg.norm(real, axis=0), 1e-300)
+        sd = np.zeros(psi.shape) if modal.sd is None else np.nan_to_num(modal.sd / norm)
+        covariance = sd.T[:, :, None] ** 2 * np.eye(len(psi))
+        likely = _likeness(real / norm, covariance, phi, near.frequency, alike.pairs)
+    across, whole = _on_the_model(model, near, phi, psi, float(modal.frequency.max()))
+    return Correlation(
+        (), case.outputs.labels, None, modal.frequency, near.frequency, alike.mac, alike.pairs,
+        alike.comac, screening=screening, likeness=likely,
+        notes=(*screening.notes, *case.said("correlate")),
+        shapes=_paired_shapes(
+            case, model, near, (phi, psi), alike.pairs, modal.frequency, numbers
+        ),
+        cross_orthogonality=across, expanded=whole,
+    )  # fmt: skip
+
+
+def _on_the_model(
+    model: Modelled, near: ModalModel, phi: np.ndarray, psi: np.ndarray, f_max: float
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Cross-orthogonality (m, r), and the test's shapes on the whole model (n_points, 3, r).
+
+    Both follow from q = Φ_s⁺ ψ, the best mixture of the model's modes up to ``f_max``. The model's
+    mass on the sensors is Φ_s⁺ᵀ Φ_s⁺ (SEREP; O'Callahan, Avitabile and Riemer 1989, IMAC VII,
+    29-37).
+    None where the sensors cannot tell these modes apart.
+    """
+    modes = np.flatnonzero(near.frequency <= NEAR * f_max)
+    at = phi[:, modes]
+    if not at.size or len(at) < len(modes) or np.linalg.cond(at) > SEPARATE:
+        return None, None
+    q = np.zeros((phi.shape[1], psi.shape[1]), psi.dtype)
+    q[modes] = np.linalg.pinv(at) @ psi
+    q = turned(q.T).T.real if np.iscomplexobj(q) else q
+    q /= np.maximum(np.linalg.norm(q, axis=0), 1e-300)
+    s = model.structure
+    whole = np.asarray(s.T @ (near.shapes @ q)).reshape(len(s.assembly.points), 6, -1)[:, :3]
+    return q, whole / np.maximum(np.abs(whole).max(axis=(0, 1)), 1e-300)
 
 
 def _identifying(channels: int, lines: int) -> str:
@@ -160,12 +243,9 @@ def _identifying(channels: int, lines: int) -> str:
 
 
 def _likeness(
-    found: Identified, phi: np.ndarray, f_model: np.ndarray, pairs: ModePairs
+    psi: np.ndarray, covariance: np.ndarray, phi: np.ndarray, f_model: np.ndarray, pairs: ModePairs
 ) -> tuple[Likeness, ...]:
-    """Rate the MAC of every pair, with test shapes rotated to be as real as possible."""
-    if not len(pairs):
-        return ()
-    psi, covariance = real_shapes(found), shape_covariance(found)
+    """Rate the MAC of every pair, with test shapes (n, r) real and of unit norm."""
     near = [np.flatnonzero(np.abs(f_model / f_model[i] - 1) < CLOSE) for i in pairs.model]
     found_of = zip(pairs.model, pairs.test, pairs.mac, near, strict=True)
     return tuple(
@@ -178,18 +258,20 @@ def _paired_shapes(
     case: Case, model: Modelled, near: ModalModel, at_sensors: tuple[np.ndarray, np.ndarray],
     pairs: ModePairs, f_test: np.ndarray, numbers: tuple[int, ...],
 ) -> PairedShapes:  # fmt: skip
-    """Return model shapes of largest entry 1, and test shapes made real and scaled to them."""
-    phi, psi = at_sensors[0][:, pairs.model], at_sensors[1][:, pairs.test]
+    """Return model shapes of largest entry 1; test shapes made real, scaled to their partners."""
+    phi, psi = at_sensors
     scale = np.maximum(np.abs(phi).max(axis=0, initial=0.0), 1e-300)
-    phi = phi / scale
-    factor = (psi.conj() * phi).sum(axis=0) / np.maximum((np.abs(psi) ** 2).sum(axis=0), 1e-300)
-    s, q = model.structure, near.shapes[:, pairs.model] / scale
-    motion = (s.T @ q).reshape(len(s.assembly.points), 6, -1)[:, :3]
+    phi, power = phi / scale, np.maximum((np.abs(psi) ** 2).sum(axis=0), 1e-300)
+    factor = np.exp(-0.5j * np.angle((psi**2).sum(axis=0))) / np.sqrt(power)
+    paired = psi[:, pairs.test]
+    factor[pairs.test] = (paired.conj() * phi[:, pairs.model]).sum(axis=0) / power[pairs.test]
+    s = model.structure
+    motion = (s.T @ (near.shapes / scale)).reshape(len(s.assembly.points), 6, -1)[:, :3]
     middle, base = s.assembly.points.mean(axis=0), case.outputs.base[:, None]
     place = np.where(base, middle, case.outputs.points)
     return PairedShapes(
-        place, case.outputs.directions, (psi * factor).real, phi, np.asarray(motion),
-        f_test[pairs.test], near.frequency[pairs.model], [numbers[i] for i in pairs.model],
+        place, case.outputs.directions, (psi * factor).real, phi, np.asarray(motion), f_test,
+        near.frequency, numbers, list(zip(pairs.test.tolist(), pairs.model.tolist(), strict=True)),
         pairs.mac,
     )  # fmt: skip
 

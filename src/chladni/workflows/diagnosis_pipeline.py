@@ -25,7 +25,6 @@ from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.implausible_values import implausible_values, in_doubt, strained
 from ..inference.joint_fit import Posterior, informed
 from ..inference.likelihood import Responses
-from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
 from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..io.nastran.edit.model_changes import changes
@@ -181,7 +180,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*foretells_worse(result.agreement, bool(result.effects)), *distrust)
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
-    if result.compared == "frequencies":
+    if result.compared != "responses":
         distrust = (*left_frequencies(result.frequencies, stages.final.model), *distrust)
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
@@ -374,7 +373,7 @@ def _result(
             *blind_note(spot),
         ),
         one_of=(found.one_of,) if found.one_of else (),
-        compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
+        compared=prepared.score.compared,
         models=stages,
         recordings=scored_others(question, prepared, [model for _, model in every]),
     )

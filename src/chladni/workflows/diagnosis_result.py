@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..arrays import OneScreen
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
 from ..ema.level_table import LevelTable
@@ -35,7 +36,7 @@ from ..results import Result
 from ..search.measured_modes import MeasuredModes
 from ..search.next_measurement import Outlook
 
-Compared = Literal["responses", "frequencies"]
+Compared = Literal["responses", "frequencies", "modes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +57,8 @@ class ChangedDeck:
         return self.changes is not None or self.whole is not None
 
 
-@dataclass(frozen=True, eq=False)
-class UpdatedModels:
+@dataclass(frozen=True, eq=False, repr=False)
+class UpdatedModels(OneScreen):
     """The three structures of a diagnosis, with their responses and the recording's."""
 
     nominal: Modelled  # the deck as it was given

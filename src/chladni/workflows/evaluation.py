@@ -21,6 +21,7 @@ from ..fem.modelled import modelled
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
+from ..units import number
 from .case_model import REACH
 from .identify import without_window
 from .recordings_of import read_source
@@ -165,6 +166,9 @@ def _with_time(
         checks.append(Check("harmonic distortion", said, worst <= DISTORTED))
     if decays:
         most = max(decays, key=lambda d: d.moves)
-        said = f"damping differs {most.moves:.3g}-fold over the decay at {most.frequency:.4g} Hz"
+        said = (
+            f"damping differs {number(most.moves, 3)}-fold over the decay at "
+            f"{most.frequency:.4g} Hz"
+        )
         checks.append(Check("free decays", said, most.moves < MOVES))
     return screening.with_more(findings, checks)

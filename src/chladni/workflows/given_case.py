@@ -1,18 +1,16 @@
 """The case of a call: one that was loaded, one in a folder, or a deck with its recordings."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import cast
 
 from ..case import Case, load_case
 from ..case.make_case import CaseWords, Measured, make_case
 from ..errors import FileError
-from ..io.nastran import Deck, assembly, read_deck, write_assembly
+from ..io.nastran import Deck, assembly
 from ..io.nastran.edit.model_changes import changes
 from ..model.assembly import Assembly
-from .loaded_model import DeckModels, Model, is_case, opened, similar_names
+from .loaded_model import DeckModels, Model, exported_deck, is_case, opened, similar_names
 
 Source = Case | Model | DeckModels | Assembly | Deck | str | Path
 """A case (or its folder), a deck (or its path), a model that was loaded, or a structure in SI."""
@@ -52,14 +50,6 @@ def given_case(
         assert isinstance(model, Model)
         deck = exported_deck(model.assembly)
     return make_case(deck, recording, _changed(model), words)
-
-
-def exported_deck(made: Assembly) -> Deck:
-    """The deck that would be written of a structure in SI."""
-    name = Path("assembly.bdf")
-    with TemporaryDirectory(prefix="chladni-") as folder:
-        deck = read_deck(write_assembly(made, Path(folder) / name))
-    return replace(deck, path=name, sources=tuple(replace(s, path=name) for s in deck.sources))
 
 
 def _changed(source: Model | DeckModels) -> Assembly | None:

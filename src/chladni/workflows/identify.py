@@ -31,6 +31,7 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
 from ..results import Result
 from ..search.measured_frequencies import LEAST_DELTA_CHI2
+from ..units import number
 from .recordings_of import read_source
 
 TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted
@@ -308,6 +309,6 @@ def _doubts(found: Sequence[RecordingModes]) -> tuple[str, ...]:
         return ()
     names = ", ".join(r.recording.name for r in weak)
     return (
-        f"{names}: the residual of the poles is {max(r.modes.chi for r in found):.3g} times the "
-        "noise, so do not trust them; narrow the band (--band) or give --averages",
+        f"{names}: the residual of the poles is {number(max(r.modes.chi for r in found), 3)} times "
+        "the noise, so do not trust them; narrow the band (--band) or give --averages",
     )

@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import OneScreen
 from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import ArgumentError, FileError
@@ -32,8 +34,8 @@ LEAST_MODES = 7  # separate six rigid motions of a free structure from the first
 SOURCES = "the path of a deck or case, what chladni.load or load_case returned, or an Assembly"
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(OneScreen):
     """An assembly with its matrices, built at first use."""
 
     source: Path
@@ -119,6 +121,7 @@ class DeckModels:
     source: Path
     deck: Deck
     units: Units | None
+    notes: tuple[str, ...] = ()  # on the file that the deck was made of
 
     @cached_property
     def analysis(self) -> Analysis:
@@ -139,7 +142,7 @@ class DeckModels:
         from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
 
         made = assembly(self.deck, self.units, subcase)
-        notes = tuple(remarks(self.deck, STRUCTURAL))
+        notes = (*self.notes, *remarks(self.deck, STRUCTURAL))
         if self.units is None:
             return Model(self.source, made, "", notes, deck=self.deck)
         if doubt := doubt_of_units(made, str(self.source), self.units):
@@ -242,6 +245,22 @@ def load_deck(
         raise FileError(f"no file {source}{similar_names(source)}")
     system = None if units is None else unit_system(units)
     return DeckModels(source, read_deck(source, allow), system)
+
+
+def exported_deck(
+    made: Assembly, units: Units | None = None, name: Path = Path("assembly.bdf")
+) -> Deck:
+    """The deck that would be written of a structure in SI, or in numbers that units scale."""
+    from ..io.nastran import read_deck, write_assembly
+
+    with TemporaryDirectory(prefix="chladni-") as folder:
+        deck = read_deck(write_assembly(made, Path(folder) / name, units))
+    return replace(
+        deck,
+        path=name,
+        sources=tuple(replace(s, path=name) for s in deck.sources),
+        cards={n: replace(cards, files=(name,)) for n, cards in deck.cards.items()},
+    )
 
 
 def on_faces(seen: Surface, of_shells: np.ndarray) -> np.ndarray:

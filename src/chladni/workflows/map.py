@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +19,11 @@ from ..progress import Progress, silent
 from ..results import Result
 from ..units import Units
 from ..units import units as unit_system
-from .given_case import Source, exported_deck
-from .loaded_model import as_model
+from .given_case import Source
+from .loaded_model import as_model, exported_deck
+
+if TYPE_CHECKING:
+    from ..view.mesh_grid import UnstructuredGrid
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,6 +52,15 @@ class MappedDeck(Result):
         """Mass of all shells, before and after [kg]."""
         before, after = (float(shell_mass(a).sum()) for a in (self.before, self.after))
         return before, after
+
+    @property
+    def mesh(self) -> "UnstructuredGrid":
+        """The mesh with the mapped ``thickness`` [m] and the ``thickness_before``."""
+        from ..view.mesh_grid import mesh_grid
+
+        none = np.zeros(len(self.after.beams) + sum(map(len, self.after.solids)))
+        before = np.concatenate([self.before.thickness(), none])
+        return mesh_grid(self.after, of_elements={"thickness_before": before})
 
 
 @checked

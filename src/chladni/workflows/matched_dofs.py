@@ -15,6 +15,7 @@ from ..case.node_numbers import (
     scaled,
     size_of,
 )
+from ..case.sensor_places import ROLES, recorded_labels
 from ..ema.setup import Recording, Role, Sensor
 from ..errors import named
 from ..geometry.nearest import ShellSurface
@@ -57,16 +58,16 @@ class NodesOnDeck:
 def matched(
     made: Assembly, recording: Recording | None, table: Sequence[Sensor] = ()
 ) -> tuple[list[MatchedDof], list[str]]:
-    """Every dof of a recording's FRFs on the deck, and sentences on what was assumed.
+    """Every dof of a recording's FRFs or shapes on the deck, and sentences on what was assumed.
 
-    Without FRFs (of a test that is still to come) those of the table.
+    Without them (of a test that is still to come) those of the table.
 
     Parameters
     ----------
     made : the deck in SI
     table : rows of a table of sensors (of ``chladni plan``, say), which go before all else
     """
-    if recording is None or recording.frf is None:
+    if recording is None or (recording.frf is None and recording.modal is None):
         return [_of_table(s) for s in table], []
     size = size_of(made)
     unit, nodes = scaled(made, recording.nodes)
@@ -83,11 +84,10 @@ def matched(
             f"nodes of {recording.name} have the numbers of grids at other places: places are "
             "used, numbers are not"
         )
-    sides: tuple[tuple[Role, Sequence[str]], ...] = (
-        ("output", recording.frf.outputs), ("input", recording.frf.inputs),
-    )  # fmt: skip
+    outputs, inputs = (recorded_labels(recording, role) for role in ROLES)
+    sides: tuple[tuple[Role, Sequence[str]], ...] = (("output", outputs), ("input", inputs))
     rest = [label for role, labels in sides for label in labels if (label, role) not in own]
-    counted = number_channels(recording.frf.outputs, recording.frf.inputs, made.ids.tolist())
+    counted = number_channels(outputs, inputs, made.ids.tolist())
     channels = bool(rest) and counted and not on_structure(made, nodes)
     if channels:
         notes.append(

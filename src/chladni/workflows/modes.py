@@ -8,7 +8,14 @@ import numpy as np
 from ..arguments import checked
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import LabelError
-from ..fem.energy import mass_properties, part_energies
+from ..fem.energy import (
+    effective_masses,
+    element_energies,
+    element_volumes,
+    kinetic_energies,
+    mass_properties,
+    part_energies,
+)
 from ..fem.loose_parts import loose_grids
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
@@ -17,6 +24,7 @@ from ..units import Units
 from .loaded_model import LEAST_MODES, Model, as_model
 
 if TYPE_CHECKING:
+    from ..view.mesh_grid import UnstructuredGrid
     from .given_case import Source
 
 
@@ -32,6 +40,9 @@ class NormalModes(Result):
     centre_of_gravity : (3,)        [m], or the deck's own
     rigid : (r,) bool
     strain_energy : (parts, r)      share of each part; nan for rigid modes
+    kinetic_energy : (parts, r)     share of each part; the rest is in point masses
+    effective_mass : (6, r)         for motions of the base along X, Y, Z [kg], and about them at
+                                    the centre of gravity [kg m²]
     parts : ((name, id), ...)
     in_si : False where a bare deck came without its unit system
     """
@@ -42,6 +53,8 @@ class NormalModes(Result):
     centre_of_gravity: np.ndarray
     rigid: np.ndarray
     strain_energy: np.ndarray
+    kinetic_energy: np.ndarray
+    effective_mass: np.ndarray
     parts: tuple[tuple[str, int], ...]
     in_si: bool
     notes: tuple[str, ...] = ()
@@ -58,6 +71,31 @@ class NormalModes(Result):
     def shapes(self) -> np.ndarray:
         """Mass-normalised shapes Φ (n, r) [1/√kg], over the rows of ``modal.dofs``."""
         return self.modal.shapes
+
+    @checked
+    def mesh(self, mode: int) -> "UnstructuredGrid":
+        """The mesh of the model with a mode: ``shape`` (n, 3) [1/√kg] and ``frequency`` [Hz].
+
+        Its elements have ``strain_energy_density`` [J/m³] in addition to the arrays of
+        ``WorkingModel.mesh``; rigid modes have none.
+
+        Parameters
+        ----------
+        mode : number from 1, the rigid ones counted
+        """
+        from ..view.mesh_grid import mesh_grid
+
+        if not 1 <= mode <= len(self):
+            raise LabelError(f"no mode {mode}; there are 1 to {len(self)}")
+        phi, made = self.shapes[:, [mode - 1]], self.origin.assembly
+        density = element_energies(self.origin.structure, phi)[:, 0] / element_volumes(made)
+        grid = mesh_grid(
+            made,
+            {"shape": self.origin.motion(phi)[:, :, 0]},
+            {"strain_energy_density": np.where(self.rigid[mode - 1], 0.0, density)},
+        )
+        grid.field_data["frequency"] = [float(self.frequency[mode - 1])]
+        return grid
 
 
 @checked
@@ -100,6 +138,8 @@ def modes(
         centre,
         rigid,
         np.where(rigid, np.nan, part_energies(structure, phi)),
+        kinetic_energies(structure, phi),
+        effective_masses(structure, phi, np.nan_to_num(centre)),
         tuple((part.name, part.id) for part in model.assembly.parts),
         bool(model.unit),
         (*model.notes, *_notes(model, modal, count, int(still.sum())), *loose_parts(model, whole)),

@@ -56,7 +56,20 @@ def question_of(case: Case) -> Question:
             control=first.control, article=_article(first),
         )  # fmt: skip
     state = poles[0].of(poles[0].states[0])
-    return replace(base_question, frequency=state.frequency, frequency_sd=state.frequency_sd)
+    listed = replace(
+        base_question, frequency=state.frequency, frequency_sd=state.frequency_sd,
+        damping=state.damping,
+    )  # fmt: skip
+    modal = case.recordings[0].modal
+    if modal is None:
+        return listed
+    size = np.sqrt((np.abs(modal.values) ** 2).mean(axis=0))
+    sd = (
+        modal.sd
+        if case.shape_sd is None
+        else case.shape_sd * np.ones_like(modal.values.real) * size
+    )
+    return replace(listed, shapes=modal.values, shape_sd=sd)
 
 
 MASS_SD = 0.002  # of the mass, where the user gives none

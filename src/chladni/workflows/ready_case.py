@@ -59,7 +59,8 @@ def ready(
         refuse_turned_axes(case, prepared.identified, prepared.nominal)
     lines = None if use is None else case.lines(case.frfs[0].frequency) & use
     screening = screened_prepared(case, prepared, lines)
-    if screening is not None and unmendable(screening):
+    of_shapes = question.shapes is not None and screening is not None and bool(screening.faults)
+    if screening is not None and (unmendable(screening) or of_shapes):
         if diagnosing or mapped_away(case, screening, undone) is not None:
             raise RecordingAtFault(screening)
     return question, prepared, screening

@@ -12,7 +12,8 @@ from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..inference.chain_hypotheses import NOTHING_FITS, explains
-from ..inference.channel_screening import against_model
+from ..inference.channel_screening import against_model, shapes_against_model
+from ..inference.pole_data import Poles
 from ..inference.result import NamedEffect
 from ..inference.smoothed_responses import smoothed
 from ..model.point_masses import with_mass_pairs
@@ -99,12 +100,15 @@ def in_pounds(deck: float, weighed: float) -> bool:
 def screened_prepared(
     case: Case, prepared: Prepared, use: np.ndarray | None = None
 ) -> Screening | None:
-    """Screen with the poles and modes prepared for a diagnosis; None without an FRF.
+    """Screen with the poles and modes prepared for a diagnosis; None of frequencies alone.
 
     Parameters
     ----------
     use : (n_f,) bool, lines they were identified from, default all
     """
+    if isinstance(prepared.score, Poles) and (shapes := prepared.score.shapes) is not None:
+        f, name = prepared.score.frequency, case.recordings[0].name
+        return shapes_against_model(name, shapes.values.T, f, prepared.nominal, case.outputs)
     if not case.frfs or prepared.identified is None:
         return None
     return screened_by_model(case, prepared.identified, prepared.nominal, use, prepared.above)

@@ -28,6 +28,9 @@ from .loaded_model import DeckModels, Model, as_model, opened
 from .modes import NormalModes, at_least_one, modes
 
 if TYPE_CHECKING:
+    from ..io.meshes.mesh_files import MeshObject
+    from ..view.mesh_grid import UnstructuredGrid
+    from .convert import PartWords
     from .given_case import Source
 
 OF_PARTS = tuple(name for name in FIELDS if name not in ("K", "M"))
@@ -48,6 +51,16 @@ class WorkingModel(Model):
     notes : cards of the deck that were left out
     deck : Deck               that was read
     """
+
+    @property
+    def mesh(self) -> "UnstructuredGrid":
+        """Shells, solids and beams [m] with ``grid`` ids, ``element`` ids, ``part``, ``thickness``.
+
+        Elements with nodes on their edges are drawn by their corners.
+        """
+        from ..view.mesh_grid import mesh_grid
+
+        return mesh_grid(self.assembly)
 
     @checked
     def modes(self, count: int = 20) -> NormalModes:
@@ -198,20 +211,24 @@ class WorkingModel(Model):
 
 @checked
 def load(
-    source: "Source",
+    source: "Source | MeshObject",
     units: str | Units | None = None,
     *,
     allow: Sequence[str] = (),
     subcase: int | None = None,
+    parts: "PartWords" = (),
 ) -> WorkingModel:
-    """Load the model of a Nastran deck or of a case, converted to SI.
+    """Load a model, converted to SI: of a deck, of a case, of another program.
 
     Parameters
     ----------
     source : a deck; or a case (folder or case.toml), which says its units itself; or an Assembly,
-        which is in SI
+        which is in SI; or a file that ``chladni convert`` reads, a data set of pyvista or a mesh of
+        meshio with the arrays ``part``, ``thickness`` and ``material`` as far as it has them
     allow : cards of the deck to leave out although they carry stiffness
     subcase : whose supports hold; default the first that seeks modes
+    parts : properties of a mesh without them, as {"door": "t=0.8 mm, steel"}, ["t=1 mm, steel"] for
+        all parts, or the path of a CSV
     units : the deck's consistent system: SI, mm-t-s, mm-kg-ms, mm-kg-s or in-lb-s; without it its
         numbers are kept as they are (frequencies are Hz in any system that counts seconds)
 
@@ -220,7 +237,10 @@ def load(
     FileError, ModelError
         One sentence naming file, line, card and the alternatives.
     """
-    found = opened(source, units, allow)
+    from .convert import converted
+
+    other = converted(source, units, parts)
+    found = opened(cast("Source", source), units, allow) if other is None else other.models
     model = found.model(subcase) if isinstance(found, DeckModels) else as_model(found)
     return WorkingModel(**{each.name: getattr(model, each.name) for each in fields(model)})
 

@@ -454,3 +454,4 @@ def test_stations_that_repeat_end_A_make_no_taper(bulk, card):
     assert section.kind == "beam"
     assert section.area == pytest.approx(2.0)
     assert section.nonstructural == pytest.approx(0.1)
+    assert not section.stations

@@ -22,6 +22,7 @@ from chladni.model.assembly import (
 from chladni.model.properties import (
     Anisotropic,
     BeamSection,
+    BeamStation,
     Isotropic,
     Orthotropic,
     Part,
@@ -89,12 +90,16 @@ def everything():
         Part(11, "mast", BeamSection(steel, 1e-4, 2e-9, 3e-9, 0.0, 4e-9, (0.8, 0.7), 0.1, "beam",
                                      (1e-3, 2e-3), (3e-3, 4e-3), 0.05)),
         Part(12, "wood", ShellSection(3e-3, wood, wood, rigid_shear=True)),
+        Part(13, "boom", BeamSection(steel, 1e-4, 2e-9, 3e-9, 1e-10, 4e-9, (0.8, 0.7), 0.1, "beam",
+                                     stations=(BeamStation(1.0, 0.7, 0.6, 0.5, 0.02, 0.3, 0.2, 0.03,
+                                                           (1e-3, 2e-3), (3e-3, 4e-3)),))),
     )  # fmt: skip
     nodes = np.array([[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [0, 1, 2, 2]])
     axis = np.array([[1.0, 0, 0], [0.6, 0.8, 0], [1, 0.1, 0], [0, 1, 0]])
     shells = Shells(np.array([1, 2, 3, 4]), nodes, np.array([0, 1, 6, 0]),
                     np.array([[1.1e-3] * 4, [1e-3, 2e-3, 3e-3, 4e-3], [3e-3] * 4, [1e-3 / 3] * 4]),
-                    _in_plane(axis, points[nodes]), np.array([0, 1e-3 / 3, 0, -2e-3]))  # fmt: skip
+                    _in_plane(axis, points[nodes]), np.array([0, 1e-3 / 3, 0, -2e-3]),
+                    nonstructural=np.array([0.0, 0.3, 0.0, 1.0]))  # fmt: skip
     mass = np.zeros((2, 6, 6))
     mass[0] = np.diag([2, 2, 2, 0.1, 0.2, 0.3])
     mass[1] = np.diag([1, 2, 3, 0.1, 0.2, 0.3]) + 0.01
@@ -107,10 +112,12 @@ def everything():
             Solids(np.array([10]), np.arange(8)[None], np.array([2])),
             Solids(np.array([29]), np.array([[0, 1, 3, 4, 8, 1, 3, 0, 1, 3]]), np.array([2])),
         ),
-        beams=Beams(np.array([11, 12, 13]), np.array([[0, 8], [2, 5], [3, 8]]), np.array([3, 5, 4]),
-                    np.array([[0, 0, 1.0], [1, 0.2, 0], [0, 0, 0]]),
-                    np.array([[[0.1, 0.2, 0.3]] * 2, [[0, 0, 0]] * 2, [[0, 0, 0]] * 2]),
-                    np.array([[[0, 0, 0, 1, 1, 0], [0] * 6], [[0] * 6] * 2, [[0] * 6] * 2], bool)),
+        beams=Beams(np.array([11, 31, 12, 13]), np.array([[0, 8], [1, 7], [2, 5], [3, 8]]),
+                    np.array([3, 7, 5, 4]),
+                    np.array([[0, 0, 1.0], [0, 1.0, 0], [1, 0.2, 0], [0, 0, 0]]),
+                    np.array([[[0.1, 0.2, 0.3]] * 2, *[[[0, 0, 0]] * 2] * 3]),
+                    np.array([[[0, 0, 0, 1, 1, 0], [0] * 6], *[[[0] * 6] * 2] * 3], bool),
+                    np.array([0.0, 0.0, 0.7, 0.2])),
         springs=Scalars(np.array([14, 15]), np.array([[0, 9], [-1, 3]]), np.array([[5, 1], [1, 4]]),
                         np.array([1e5 / 3, 7.0]), np.array([0.02, 0])),
         dampers=Scalars(np.array([16]), np.array([[1, 2]]), np.array([[1, 6]]), np.array([3.3]),

@@ -62,11 +62,11 @@ def test_all_that_is_not_known_is_said_at_once(bulk):
 
 @pytest.mark.parametrize(
     ("card", "command"),
-    [("NSM1,5,PSHELL,NSM,1.", "NSM"), ("BGSET,1,1", "BGSET"), ("TF,1,1,1", "TFL"),
+    [("BGSET,1,1", "BGSET"), ("TF,1,1,1", "TFL"),
      ("MFLUID,1", "MFLUID")],
 )  # fmt: skip
 def test_what_the_case_control_would_have_to_select_acts_where_it_does(bulk, card, command):
-    """QRG, NSM1: it is used where NSM of the case control names its set."""
+    """QRG, BGSET: it is used where the case control names its set."""
     text, name = f"{PLATE}{card}\n", card.partition(",")[0]
     assert assembly(bulk(text, before="SOL 103\nCEND\n")).parts == assembly(bulk(PLATE)).parts
     said = rf"the command {command} .*{name}: 1 card.* not understood"

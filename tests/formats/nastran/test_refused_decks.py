@@ -49,7 +49,7 @@ def test_a_subcase_that_is_not_there(bulk):
 
 @pytest.mark.parametrize(
     "card",
-    """NSM,5,PSHELL,101,1. NSM1,5,PSHELL,NSM,1. NSML1,5,PSHELL,NSM,1. NSMADD,5,1 RBAR1,9,1,3,123456
+    """RBAR1,9,1,3,123456
     RBE22,9,1,123456,3 SPCC1,1,123456,1 MFLUID,1 MLIST,1 SESET,1,2 BCTABLE,1 TF,1,1,1
     BCPROP,1 SNORM,1 XYZ,4 CGAP,9,1,1,2 CSEAM,9,1 CQUAD,9,1 GENEL,9""".split(),
 )
@@ -61,7 +61,7 @@ def test_a_card_not_known_is_refused_unless_allowed(bulk, card):
 
 @pytest.mark.parametrize(
     "line",
-    ["NSM = 5", "SPCC = 1", "MFLUID = 1", "BCONTACT = 1", "STATSUB = 1", "TFL = 3", "NOSUCH",
+    ["SPCC = 1", "MFLUID = 1", "BCONTACT = 1", "STATSUB = 1", "TFL = 3", "NOSUCH",
      "SUBCASE 1\n  LOADD = 3"],
 )  # fmt: skip
 def test_a_command_not_known_is_refused_unless_allowed(bulk, line):

@@ -196,3 +196,9 @@ def _check_header(
             raise FileError(f"{path.name}, line 1: unknown column {name!r}; known are {known}")
         if header.count(name) > 1:
             raise FileError(f"{path.name}, line 1: column {name!r} occurs twice")
+
+
+def distinct_texts(texts: list[str]) -> tuple[tuple[str, ...], np.ndarray]:
+    """Distinct texts in order of appearance, and the position of each among them."""
+    distinct = {text: k for k, text in enumerate(dict.fromkeys(texts))}
+    return tuple(distinct), np.array([distinct[text] for text in texts])

@@ -1,4 +1,4 @@
-"""Recordings as tables in: FRF in CSV and NPZ, poles in CSV (SI)."""
+"""Recordings as tables in: FRF and modal models in CSV and NPZ, poles in CSV (SI)."""
 
 import zipfile
 from collections.abc import Iterable, Sequence
@@ -9,7 +9,7 @@ from typing import cast, get_args
 import numpy as np
 
 from ...arrays import measurable
-from ...dynamics.frf import FRF, Quantity
+from ...dynamics.frf import FRF, MOTION_OVER_FORCE, Quantity
 from ...ema.response_correlations import of_responses
 from ...ema.setup import PoleTable, Recording
 from ...ema.time_record import TimeRecord
@@ -25,10 +25,19 @@ from ..time.read_time import (
     time_of_mat,
 )
 from ..time.time_channels import is_time, only_known
-from .csv_table import CsvTable, files_next_to, names_of, read_table
+from .array_fields import numbers_of, word_of, words_of
+from .csv_table import CsvTable, distinct_texts, files_next_to, names_of, read_table
+from .read_shapes import (
+    MODAL,
+    MODAL_OPTIONAL,
+    modal_of_arrays,
+    read_result_modes,
+    read_shape_table,
+)
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
-ENDINGS = (".npz", ".csv", ".wav", ".mat", *_UNIVERSAL)
+_RESULTS = (".op2", ".pch", ".punch")
+ENDINGS = (".npz", ".csv", ".wav", ".mat", *_RESULTS, *_UNIVERSAL)
 _CHANNEL = ("frequency_hz", "output", "input")
 _CARTESIAN = ("real", "imag")
 _PHASE = {"phase_deg": np.pi / 180, "phase_rad": 1.0}  # radians each
@@ -41,10 +50,15 @@ _NPZ_OPTIONAL = ("coherence", "variance", "quantity", "level", "article")
 
 
 def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
-    """Contents of a file, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat.
+    """Contents of a file, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat, .op2.
 
-    A CSV, NPZ or MAT holds FRFs, poles (CSV) or time data; WAV holds time data.
+    A CSV, NPZ or MAT holds FRFs, modes with shapes, poles (CSV) or time data; WAV holds time data;
+    OP2 and punch files hold modes of another program. Force over motion (apparent mass, dynamic
+    stiffness, impedance) of one force at a time is turned into its reciprocal.
     """
+    if quantity in MOTION_OVER_FORCE and Path(path).suffix.lower() not in _UNIVERSAL:
+        read = read_recordings(path, MOTION_OVER_FORCE[quantity])
+        return tuple(r.reciprocal(quantity) for r in read)
     path = Path(path)
     ending = path.suffix.lower()
     if path.is_file():
@@ -64,8 +78,11 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
 
         found = read_uff(path, quantity)
         return (_as_quantity(found, quantity),)
+    if ending in _RESULTS:
+        return (read_result_modes(path),)
     raise FileError(
-        f"{path.name}: recordings end in .uff, .unv, .npz, .csv, .mat or .wav, not {ending!r}"
+        f"{path.name}: recordings end in .uff, .unv, .npz, .csv, .mat, .wav, .op2 or .pch, not "
+        f"{ending!r}"
     )
 
 
@@ -117,12 +134,15 @@ def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, 
     """FRFs (one recording per article and level) or poles; the header decides."""
     path = Path(path)
     head = set(names_of(path)) - {""} if path.is_file() else set()
+    if {"label", "mode"} <= head:
+        return (read_shape_table(path),)
     if head and head.isdisjoint({*_CARTESIAN, "output", "input", "magnitude"}):
         if "mode" not in head:
             raise FileError(
                 f"{path.name}, line 1: neither FRFs (columns {', '.join(_FRF)}; or magnitude and "
-                f"phase_deg or phase_rad for the last two) nor poles (columns mode, frequency_hz); "
-                f"there are {', '.join(sorted(head))}"
+                f"phase_deg or phase_rad for the last two) nor poles (columns mode, frequency_hz) "
+                "nor shapes (columns label, mode, frequency_hz, real); there are "
+                f"{', '.join(sorted(head))}"
             )
         return (Recording(name=path.name, poles=read_poles(path)),)
     parts = _CARTESIAN
@@ -178,8 +198,8 @@ def _recording(
     article, level = key
     said = [f"article {article}"] * bool(article) + [f"level {level:g}"] * (level >= 0)
     name = ", ".join([table.path.name, *said])
-    outputs, i = _coded([table.columns["output"][k] for k in rows])
-    inputs, j = _coded([table.columns["input"][k] for k in rows])
+    outputs, i = distinct_texts([table.columns["output"][k] for k in rows])
+    inputs, j = distinct_texts([table.columns["input"][k] for k in rows])
     frequency, f = np.unique(numbers["frequency_hz"][rows], return_inverse=True)
     shape = (len(frequency), len(outputs), len(inputs))
     count = np.zeros(shape, int)
@@ -194,12 +214,6 @@ def _recording(
     extra = {n: array(numbers[n]) for n in ("coherence", "variance") if n in numbers}
     frf = _frf(name, array(values), frequency, outputs, inputs, quantity, **extra)
     return Recording(name=name, frf=frf, level=level if level >= 0 else None, article=article)
-
-
-def _coded(texts: list[str]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Distinct texts in order of appearance, and the position of each among them."""
-    distinct = {text: k for k, text in enumerate(dict.fromkeys(texts))}
-    return tuple(distinct), np.array([distinct[text] for text in texts])
 
 
 def _complete(
@@ -285,31 +299,33 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
 
 
 def _of_arrays(path: Path, arrays: dict[str, np.ndarray], quantity: str | None) -> Recording:
-    """FRF of named arrays."""
+    """FRF, or modal model, of named arrays."""
+    if "shapes" in arrays:
+        return modal_of_arrays(path, arrays)
     if missing := [name for name in _NPZ if name not in arrays]:
         raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {named(arrays)}")
-    quantity = quantity or (_word(path, arrays, "quantity") if "quantity" in arrays else None)
+    quantity = quantity or (word_of(path, arrays, "quantity") if "quantity" in arrays else None)
     if quantity is None:
         raise FileError(f"{path.name} does not say its quantity: one of {_quantities()}")
     frf = _frf(
         path.name,
-        _numbers(path, arrays, "values", "biufc").astype(complex),
-        _numbers(path, arrays, "frequency_hz").astype(float),
-        _words(path, arrays, "outputs"),
-        _words(path, arrays, "inputs"),
+        numbers_of(path, arrays, "values", "biufc").astype(complex),
+        numbers_of(path, arrays, "frequency_hz").astype(float),
+        words_of(path, arrays, "outputs"),
+        words_of(path, arrays, "inputs"),
         quantity,
         **{
-            name: _numbers(path, arrays, name).astype(float)
+            name: numbers_of(path, arrays, name).astype(float)
             for name in ("coherence", "variance")
             if name in arrays
         },
     )
     level = None
     if "level" in arrays:
-        if (found := _numbers(path, arrays, "level")).size != 1:
+        if (found := numbers_of(path, arrays, "level")).size != 1:
             raise FileError(f"{path.name}: level has {found.size} values; it must be one number")
         level = _amplitude(path.name, float(found.reshape(-1)[0]))
-    article = _word(path, arrays, "article") if "article" in arrays else ""
+    article = word_of(path, arrays, "article") if "article" in arrays else ""
     return Recording(path.name, frf, level=level, article=article)
 
 
@@ -324,42 +340,14 @@ def _amplitude(where: str, level: float) -> float:
 
 def _only_known(path: Path, names: Sequence[str]) -> None:
     """Refuse arrays nobody reads before they are unpacked."""
-    if unknown := [name for name in names if name not in (*_NPZ, *_NPZ_OPTIONAL)]:
-        missing = [name for name in _NPZ if name not in names]
+    due, more = (MODAL, MODAL_OPTIONAL) if "shapes" in names else (_NPZ, _NPZ_OPTIONAL)
+    if unknown := [name for name in names if name not in (*due, *more)]:
+        missing = [name for name in due if name not in names]
         lacks = f"; there is no array {', '.join(missing)}" if missing else ""
         raise FileError(
             f"{path.name}: unknown array {', '.join(unknown)}{lacks}; known are "
-            f"{', '.join((*_NPZ, *_NPZ_OPTIONAL))}"
+            f"{', '.join((*due, *more))}"
         )
-
-
-def _numbers(
-    path: Path, arrays: dict[str, np.ndarray], name: str, kinds: str = "biuf"
-) -> np.ndarray:
-    """An array of numbers of these kinds."""
-    if arrays[name].dtype.kind not in kinds:
-        kind = "records" if arrays[name].dtype.names else str(arrays[name].dtype)
-        raise FileError(f"{path.name}: {name} has {kind}, not numbers")
-    return arrays[name]
-
-
-def _words(path: Path, arrays: dict[str, np.ndarray], name: str) -> list[str]:
-    """An array of texts in a row; bytes are read as UTF-8, numbers as they are written."""
-    found = np.atleast_1d(arrays[name])
-    if found.ndim != 1 or found.dtype.names:
-        kind = "records" if found.dtype.names else f"an array of {found.ndim} dimensions"
-        raise FileError(f"{path.name}: {name} has {kind}, not a row of texts")
-    if found.dtype.kind == "S":
-        found = np.char.decode(found, "utf-8", "replace")
-    return [str(text) for text in found]
-
-
-def _word(path: Path, arrays: dict[str, np.ndarray], name: str) -> str:
-    """A single text, alone or as the only one of a row."""
-    found = _words(path, arrays, name)
-    if len(found) != 1:
-        raise FileError(f"{path.name}: {name} has {len(found)} texts; it must be one")
-    return found[0]
 
 
 def read_poles(path: str | Path) -> PoleTable:

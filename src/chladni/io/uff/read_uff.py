@@ -13,9 +13,11 @@ import numpy as np
 
 from ...arrays import measurable
 from ...dofs import label
+from ...dynamics.frf import MOTION_OVER_FORCE
 from ...ema.response_correlations import responses
-from ...ema.setup import Function, PoleTable, Recording, Shapes
-from ...errors import ChladniError, FileError, named
+from ...ema.setup import Function, Recording, Shapes
+from ...ema.shape_setups import merged
+from ...errors import ChladniError, FileError, ShapeError, named
 from .estimate_stamp import read_stamp, with_variance
 from .uff_accumulator import Channel, Pair, Shape, TimeSignal, UffAccumulator
 from .uff_frf import frf_matrix
@@ -60,7 +62,8 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
     parts = _entities(records)
     for record in records:
         _take_function(uff, record, parts, uff.where(record.number, _FUNCTION), quantity)
-    frf, (averages, added) = frf_matrix(uff, quantity), read_stamp(uff.title)
+    asked = MOTION_OVER_FORCE.get(quantity or "", quantity)
+    frf, (averages, added) = frf_matrix(uff, asked), read_stamp(uff.title)
     time = time_record(uff) if frf is None else None
     alone = frf is None and time is None
     _name_unused(uff, alone)
@@ -68,11 +71,13 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
         frf = with_variance(frf, averages)
         uff.notes.append(f"{path.name}: its noise is that of the stated {averages:g} averages")
     turned = {n: uff.systems[s] for n, s in uff.turned.items() if s in uff.systems}
+    shapes = _shapes(uff)
+    modal = alone and not responses(uff.functions) and shapes is not None and any(shapes.frequency)
     return Recording(
         name=path.name,
         frf=frf,
-        poles=_poles(uff) if alone and not responses(uff.functions) else None,
-        shapes=_shapes(uff),
+        poles=shapes.poles() if modal and shapes is not None else None,
+        shapes=shapes,
         nodes=uff.nodes,
         axes={n: A for n, A in turned.items() if not np.allclose(A, np.eye(3), atol=1e-6)},
         elements=tuple(uff.elements),
@@ -227,6 +232,9 @@ def _take_frf(
 ) -> None:
     if not np.iscomplexobj(record.y):
         raise FileError(f"{where}: a frequency response needs phase, but these values are real")
+    force_above = False
+    if quantity in MOTION_OVER_FORCE:
+        quantity, force_above = MOTION_OVER_FORCE[quantity], True
     if dofs in uff.frf:
         raise FileError(
             f"{where}: repeats {dofs[0]} / {dofs[1]} of dataset {uff.frf[dofs].number}; put each "
@@ -247,9 +255,17 @@ def _take_frf(
             f"{where}: neither data type nor unit label states the measured quantity; state "
             "quantity = receptance, mobility, accelerance or transmissibility"
         )
-    f = hertz(record, where)
+    f, values, known = hertz(record, where), record.y * said.factor, said.quantity
+    if known in MOTION_OVER_FORCE:
+        known, force_above, dofs = MOTION_OVER_FORCE[known], True, dofs[::-1]
+    if force_above:
+        if not values.all():
+            raise FileError(f"{where}: force over motion is zero, so it has no reciprocal")
+        values = 1 / values
+        note = f"{uff.path.name}: force over motion was turned into its reciprocal"
+        uff.notes += [note] if note not in uff.notes else []
     uff.title = uff.title or record.title
-    uff.frf[dofs] = Channel(record.number, f, record.y * said.factor, said.quantity)
+    uff.frf[dofs] = Channel(record.number, f, values, known)
 
 
 def _take_units(uff: UffAccumulator, d: Dataset, where: str) -> None:
@@ -303,7 +319,10 @@ def _take_systems(uff: UffAccumulator, d: Dataset, where: str) -> None:
 
 
 def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
-    """A normal mode (analysis type 2) or a complex one (3 and 7) as motion; others are no modes."""
+    """A normal mode (analysis type 2) or a complex one (3 and 7) as motion; others are no modes.
+
+    Rotations are left out: no sensor measures them.
+    """
     analysis = int(d["analysis_type"])
     if int(d["spec_data_type"]) not in _MOTION:
         return
@@ -315,7 +334,7 @@ def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
         f, zeta = abs(pole) / (2 * np.pi), -pole.real / max(abs(pole), 1e-300)
     else:
         return
-    components = [d[f"r{k}"] for k in range(1, 7) if f"r{k}" in d]
+    components = [d[f"r{k}"] for k in range(1, 4) if f"r{k}" in d]
     values = {
         label(int(node), k + 1): component[i]
         for i, node in enumerate(d["node_nums"])
@@ -326,7 +345,6 @@ def _take_shape(uff: UffAccumulator, d: Dataset, where: str) -> None:
 
 _UNITS, _FUNCTION = 164, 58
 _MOTION = (0, 1, 8, 11, 12)  # data types: unknown, general, displacement, velocity, acceleration
-_RIGID = 1e-3  # of the highest frequency: modes below are rigid motions
 _TAKE = {
     15: _take_nodes,
     55: _take_shape,
@@ -339,26 +357,24 @@ _TAKE = {
 _SILENT = frozenset({151, 1858})  # header; channel settings that come with every function
 
 
-def _poles(uff: UffAccumulator) -> PoleTable | None:
-    """Frequencies of the mode shapes as a table, rigid motions left out; None without any."""
-    shapes = sorted(uff.shapes, key=lambda shape: shape.frequency)
-    elastic = [s for s in shapes if s.frequency > _RIGID * shapes[-1].frequency]
-    if not elastic:
-        return None
-    uff.notes.append(
-        f"{uff.path.name}: the natural frequencies of its {len(elastic)} mode shapes are compared; "
-        "chladni correlate DECK --modes compares the shapes"
-    )
-    f, zeta = np.array([(s.frequency, s.damping or np.nan) for s in elastic]).T
-    n = len(elastic)
-    return PoleTable(f, np.full(n, np.nan), zeta, np.arange(1, n + 1), ("",) * n)
-
-
 def _shapes(uff: UffAccumulator) -> Shapes | None:
-    if not uff.shapes:
+    """Mode shapes; of several set-ups, merged."""
+    setups: dict[frozenset[str], list[Shape]] = {}
+    for shape in uff.shapes:
+        setups.setdefault(frozenset(shape.values), []).append(shape)
+    if not setups:
         return None
-    dofs = tuple(dict.fromkeys(dof for shape in uff.shapes for dof in shape.values))
-    table = np.array([[shape.values.get(dof, 0.0) for shape in uff.shapes] for dof in dofs])
-    f = np.array([shape.frequency for shape in uff.shapes], float)
-    zeta = np.array([shape.damping for shape in uff.shapes], float)
-    return Shapes(f, zeta, table, dofs)
+    try:
+        found = merged([_setup(shapes) for shapes in setups.values()])
+    except ShapeError as error:
+        raise FileError(f"{uff.path.name}: {error}") from error
+    if len(setups) > 1:
+        uff.notes.append(f"{uff.path.name}: the shapes of {len(setups)} set-ups are merged")
+    return found
+
+
+def _setup(shapes: Sequence[Shape]) -> Shapes:
+    dofs = tuple(shapes[0].values)
+    values = np.array([[shape.values[dof] for shape in shapes] for dof in dofs])
+    f, zeta = np.array([(shape.frequency, shape.damping or np.nan) for shape in shapes], float).T
+    return Shapes(f, zeta, values, dofs)

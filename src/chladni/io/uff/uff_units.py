@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...dynamics.frf import MOTION_OVER_FORCE
 from ...errors import FileError
 from .uff_function import FunctionSet
 from .unit_labels import is_force, plain, unit
@@ -103,6 +104,8 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
     """Quantity and SI factor of an FRF: unit labels first, then data types and dataset 164."""
     typed = _RESPONSE.get(record.ordinate.kind)
     motion_below = record.denominator.kind in _RESPONSE
+    if over := _force_over_motion(record, units):
+        return over
     if record.function == 5 or (typed and motion_below):
         return Meaning("transmissibility", 1.0)
     said, length, force = ratio(record.ordinate.unit)
@@ -123,6 +126,21 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
         return Meaning(said, length / force if length and force else 1.0)
     force = force or force_factor(below) or units.force
     return Meaning(said or typed, (length or units.length) / force)
+
+
+_FORCE = 13  # data type of a force
+_RECIPROCAL: dict[str, str] = {name: dual for dual, name in MOTION_OVER_FORCE.items()}
+
+
+def _force_over_motion(record: FunctionSet, units: FileUnits) -> Meaning | None:
+    """Apparent mass, impedance or dynamic stiffness; None for any other record."""
+    force = force_factor(record.ordinate.unit)
+    said, length = numerator(record.denominator.unit)
+    motion = said or _RESPONSE.get(record.denominator.kind)
+    if motion is None or not (record.ordinate.kind == _FORCE or force):
+        return None
+    length = length if said else units.length
+    return Meaning(_RECIPROCAL[motion], (force or units.force) / length)
 
 
 def hertz(record: FunctionSet, where: str) -> np.ndarray:

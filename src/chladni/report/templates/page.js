@@ -46,7 +46,7 @@ function layout(more) {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: 15, t: 25, b: 45 },
     font: { color: colour("ink"), size: 12, family: "system-ui, DejaVu Sans, sans-serif" },
     hoverlabel: { align: "left", bgcolor: colour("sheet"), font: { color: colour("ink") } },
-    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("ink") },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("ink"), orientation: more.showlegend ? "v" : "h" },
     legend: { orientation: "h", y: -0.12 }, ...more,
   };
   for (const key of Object.keys(made)) if (/^[xy]axis/.test(key)) made[key] = { ...axis, automargin: true, ...made[key] };
@@ -54,7 +54,7 @@ function layout(more) {
 }
 
 const draw = (at, traces, more) =>
-  Plotly.react(at, traces, layout(more), { responsive: true, displaylogo: false, displayModeBar: at.clientWidth > 600, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] });
+  Plotly.react(at, traces, layout(more), { responsive: true, displaylogo: false, displayModeBar: at.clientWidth > 600, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d", "resetCameraLastSave3d"] });
 
 // ---- the mesh
 
@@ -81,33 +81,82 @@ const lines = (where, width, tint) => ({
   type: "scatter3d", mode: "lines", ...where, line: { width, color: colour(tint) }, hoverinfo: "skip", showlegend: false,
 });
 
-function triad(mesh, [x, y, z]) {
-  const low = [x, y, z].map((axis) => axis.reduce((a, b) => Math.min(a, b), Infinity));
-  const long = 0.1 * mesh.size, start = low.map((v) => v - 0.05 * mesh.size);
-  return ["#d62728", "#2ca02c", "#1f77b4"].map((tint, k) => {
-    const tip = start.map((v, n) => v + (n === k ? long : 0));
-    const [a, b, c] = start.map((v, n) => [v, tip[n]]);
-    return { type: "scatter3d", mode: "lines+text", x: a, y: b, z: c, text: ["", "XYZ"[k]], textfont: { color: tint },
-      line: { width: 5, color: tint }, hoverinfo: "skip", showlegend: false };
-  });
-}
+// ---- scenes: seen from one place, as large as they fit, with the axes in a corner
 
-// A box that holds pins and triad, so large that the structure fills its share of the picture.
-// A colour bar of ``bar`` pixels leaves the rest of the width to it.
-function space(at, mesh, key = "scene", domain = {}, bar = 0) {
-  const xyz = places(mesh), room = 0.12 * mesh.size, kept = at.layout?.[key];
+const dot = (a, b) => a.reduce((sum, v, k) => sum + v * b[k], 0);
+const cross = (a, b) => [0, 1, 2].map((k) => a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+const unit = (a) => { const long = Math.hypot(...a) || 1; return a.map((v) => v / long); };
+const vector = ([x, y, z]) => ({ x, y, z });
+const AXES = [["X", "#d62728"], ["Y", "#2ca02c"], ["Z", "#1f77b4"]];
+const VIEWS = { X: [[1, 0, 0], [0, 0, 1]], Y: [[0, -1, 0], [0, 0, 1]], Z: [[0, 0, 1], [0, 1, 0]] };
+
+const FOOT = 66, FLAT = { l: 0, r: 0, t: 0, b: FOOT };  // [px] for the axes, a legend, a colour bar
+
+// ``bar`` pixels of the width are left to a colour bar.
+function stage(at, mesh, box, from, bar = 0) {
+  const xyz = places(mesh), room = 0.22 * mesh.size;  // of pins, and of shapes that move
   const least = (axis) => axis.reduce((a, b) => Math.min(a, b), Infinity), most = (axis) => axis.reduce((a, b) => Math.max(a, b), -Infinity);
   const range = xyz.map((axis) => [least(axis) - room, most(axis) + room]), long = range.map(([a, b]) => b - a), centre = range.map(([a, b]) => (a + b) / 2);
-  const [e, u] = [mesh.eye, mesh.up], right = [u[1] * e[2] - u[2] * e[1], u[2] * e[0] - u[0] * e[2], u[0] * e[1] - u[1] * e[0]];
-  const reach = (d) => most(xyz[0].map((_, n) => Math.abs(d.reduce((sum, v, k) => sum + v * (xyz[k][n] - centre[k]), 0)))) + room / 2;
-  const share = ([a, b] = [0, 1]) => b - a, wide = ((at.clientWidth - bar) * share(domain.x)) / (at.clientHeight * share(domain.y));
-  const size = 0.95 * Math.min(wide / reach(right), 1 / reach(u)), vector = ([x, y, z]) => ({ x, y, z });
-  const far = 1.5 * Math.max(1, size * Math.max(...long)), axis = (k) => ({ visible: false, showspikes: false, range: range[k] });
-  return { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "manual", dragmode: "orbit", domain, aspectratio: kept?.aspectratio ?? vector(long.map((v) => size * v)),
-    camera: kept?.camera ?? { eye: vector(e.map((v) => far * v)), up: vector(u), projection: { type: "orthographic" } } };
+  const first = !at.view, view = (at.view ??= { eye: mesh.eye, up: mesh.up, ...from, zoom: 1 });
+  const share = ([a, b] = [0, 1]) => b - a, reach = (d) => most(xyz[0].map((_, n) => Math.abs(d[0] * (xyz[0][n] - centre[0]) + d[1] * (xyz[1][n] - centre[1]) + d[2] * (xyz[2][n] - centre[2])))) + 0.06 * mesh.size;
+  const frame = () => { const toward = unit(view.eye), right = unit(cross(view.up, toward)); return [right, cross(toward, right), toward]; };
+  function fitted(domain) {  // a structure that turns stays within its picture
+    const [right, above, toward] = frame(), high = (at.clientHeight - FOOT) * share(domain.y), wide = ((at.clientWidth - bar) * share(domain.x)) / high;
+    const size = 0.95 * view.zoom * Math.min(wide / reach(right), 1 / reach(above)), far = 1.5 * Math.max(1, size * Math.max(...long));
+    return { aspectratio: vector(long.map((v) => size * v)), camera: { center: vector([0, 0, 0]), eye: vector(toward.map((v) => far * v)), up: vector(above), projection: { type: "orthographic" } } };
+  }
+  const keys = () => Object.keys(at._fullLayout).filter((key) => /^scene\d?$/.test(key));
+  function apply(turned) {  // the scene that is being turned has its camera already
+    for (const key of keys()) {
+      const seen = fitted(at._fullLayout[key].domain), { _scene } = at._fullLayout[key];
+      for (const held of [at.layout[key], at._fullLayout[key]]) Object.assign(held, seen);
+      if (key === turned) _scene.glplot.setAspectratio(seen.aspectratio);
+      else _scene.setViewport(seen);
+    }
+    axes();
+  }
+  function axes() {
+    const [right, above] = frame();
+    if (!at.querySelector(".triad")) at.insertAdjacentHTML("beforeend", '<svg class="triad" viewBox="-32 -32 64 64"></svg>');
+    at.querySelector(".triad").innerHTML = AXES.map(([name, tint], k) => {
+      const [x, y] = [22 * right[k], -22 * above[k]];
+      return `<line x2="${x}" y2="${y}" stroke="${tint}" stroke-width="2.5"/><text x="${1.3 * x}" y="${1.3 * y + 4}" fill="${tint}">${Math.hypot(x, y) > 6 ? name : ""}</text>`;
+    }).join("");
+  }
+  function follow(to) {
+    const key = keys().find((k) => to[k + ".camera"]);
+    if (!key) return;
+    const { _scene, domain } = at._fullLayout[key], camera = _scene.getCamera(), values = ({ x, y, z }) => [x, y, z];
+    const eye = unit(values(camera.eye)), up = values(camera.up);
+    if (dot(eye, unit(view.eye)) > 1 - 1e-9) view.zoom *= _scene.glplot.getAspectratio().x / fitted(domain).aspectratio.x;
+    Object.assign(view, { eye, up });
+    apply(key);
+  }
+  if (first) {
+    const [start, startUp] = [view.eye, view.up], look = (eye, up) => { Object.assign(view, { eye, up, zoom: 1 }); apply(); };
+    const group = box.appendChild(document.createElement("span"));
+    group.className = "views";
+    group.append("view ");
+    button(group, "start", () => look(start, startUp));
+    button(group, "behind", () => look(start.map((v) => -v), startUp));
+    for (const [name, seen] of Object.entries(VIEWS)) button(group, name, () => look(...seen));
+    at.tabIndex = 0;
+    at.addEventListener("pointerdown", () => at.focus({ preventScroll: true }), true);
+    at.addEventListener("keydown", (e) => { if (e.key === "Escape") at.blur(); });
+    at.addEventListener("wheel", (e) => { if (document.activeElement !== at) e.stopPropagation(); }, true);  // the page scrolls
+  }
+  const axis = (k) => ({ visible: false, showspikes: false, range: range[k] });
+  return {
+    scene: (domain = {}) => ({ xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "manual", dragmode: "orbit", domain, ...fitted(domain) }),
+    async drawn(shown) {
+      await shown;
+      axes();
+      if (first) for (const event of ["plotly_relayouting", "plotly_relayout"]) at.on(event, (to) => requestAnimationFrame(() => follow(to)));
+    },
+  };
 }
 
-function ball([x, y, z], r, name) {
+function ball([x, y, z], r, name, tint) {
   const p = [[], [], []], rows = 9, round = 16, faces = [[], [], []];
   for (let a = 0; a <= rows; a++)
     for (let b = 0; b < round; b++) {
@@ -116,7 +165,7 @@ function ball([x, y, z], r, name) {
       const [here, next, down] = [a * round + b, a * round + ((b + 1) % round), (a + 1) * round];
       if (a < rows) [[here, next, down + b], [next, down + ((b + 1) % round), down + b]].forEach((t) => t.forEach((w, k) => faces[k].push(w)));
     }
-  return { type: "mesh3d", x: p[0], y: p[1], z: p[2], i: faces[0], j: faces[1], k: faces[2], color: colour("found"), opacity: 0.25,
+  return { type: "mesh3d", x: p[0], y: p[1], z: p[2], i: faces[0], j: faces[1], k: faces[2], color: colour(tint), opacity: 0.25,
     hoverinfo: "text", hovertext: name, showlegend: false };
 }
 
@@ -132,92 +181,95 @@ function markers(list, name, tint, symbol, long) {
 
 const SYMBOLS = { sensors: ["neutral", "circle"], "held-out sensors": ["neutral", "circle-open"], "drive point": ["before", "diamond"], cords: ["calm", "square"] };
 
-function structure(at, data, shared) {
-  const mesh = shared.mesh, xyz = places(mesh), traces = [];
-  const meant = new Set(data.spots.flatMap((s) => s.parts));
+function structure(at, data, shared, box) {
+  const mesh = shared.mesh, xyz = places(mesh), traces = [], tints = ["found", "warn"];
+  const meant = new Map(data.spots.toReversed().flatMap((s) => s.parts.map((part) => [part, s]))), seen = stage(at, mesh, box, data.from);
   if (mesh.i.length) {
     traces.push(sheet(mesh, xyz, {}, meant.size ? (f) => !meant.has(mesh.part[f]) : null));
-    if (meant.size) traces.push(sheet(mesh, xyz, { color: colour("found"), hovertext: mesh.ids.map((id) => `grid ${id}, ${wrapped(data.spots[0].text)}`) }, (f) => meant.has(mesh.part[f])));
+    for (const [part, s] of meant) traces.push(sheet(mesh, xyz, { color: colour(tints[s.rank]), hovertext: mesh.ids.map((id) => `grid ${id}, ${wrapped(s.text)}`) }, (f) => mesh.part[f] === part));
   }
-  traces.push(lines(ends(mesh.fine, xyz), 1, "soft"), lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz));
+  traces.push(lines(ends(mesh.fine, xyz), 1, "soft"), lines(ends(mesh.edges, xyz), 3, "ink"));
   for (const [name, list] of Object.entries(data.setup)) traces.push(...markers(list, name, ...SYMBOLS[name], name === "cords" ? 0 : 0.06 * mesh.size));
   for (const spot of data.spots) {
-    const name = wrapped(spot.text);
-    if (spot.radius) for (const p of spot.at.slice(0, 3)) traces.push(ball(p, spot.radius, name));
-    if (spot.at.length) traces.push({ type: "scatter3d", mode: "markers", name: "finding", x: spot.at.map((p) => p[0]), y: spot.at.map((p) => p[1]), z: spot.at.map((p) => p[2]),
-      hoverinfo: "text", hovertext: name, marker: { size: 9, color: colour("found"), symbol: "cross" } });
+    const text = wrapped(spot.text), tint = tints[spot.rank], name = said(spot.name);
+    if (spot.radius) for (const p of spot.at.slice(0, 3)) traces.push(ball(p, spot.radius, text, tint));
+    if (spot.at.length) traces.push({ type: "scatter3d", mode: "markers+text", name, x: spot.at.map((p) => p[0]), y: spot.at.map((p) => p[1]), z: spot.at.map((p) => p[2]),
+      text: [name], textposition: "top center", textfont: { color: colour(tint), size: 13 }, hoverinfo: "text", hovertext: text, marker: { size: 9, color: colour(tint), symbol: "cross" } });
   }
-  return draw(at, traces, { scene: space(at, mesh), margin: { l: 0, r: 0, t: 0, b: 0 }, legend: { orientation: "h", y: 0 } });
+  return seen.drawn(draw(at, traces, { scene: seen.scene(), margin: FLAT, legend: { orientation: "h", x: 1, xanchor: "right", y: 0, yanchor: "top" } }));
 }
 
-function remainder(at, data, shared) {
-  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step), title = data.title;
-  const seen = (f) => value[f] != null, shown = mesh.face.filter(seen).map((f) => value[f]);
-  return draw(at, [
-    sheet(mesh, xyz, {}, (f) => !seen(f)),
+function remainder(at, data, shared, box) {
+  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step), title = data.title, seen = stage(at, mesh, box, {}, 100);
+  const known = (f) => value[f] != null, shown = mesh.face.filter(known).map((f) => value[f]);
+  return seen.drawn(draw(at, [
+    sheet(mesh, xyz, {}, (f) => !known(f)),
     sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: data.low, cmax: data.top, colorscale: data.colours.replace("_r", ""), reversescale: !data.colours.endsWith("_r"), colorbar: { thickness: 12, len: 0.8, title: { text: said(title), side: "right" } },
-      hovertemplate: `${said(title)} %{intensity:.4g}<extra></extra>` }, seen),
-    lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz),
-  ], { scene: space(at, mesh, "scene", {}, 100), margin: { l: 0, r: 0, t: 0, b: 0 } });
+      hovertemplate: `${said(title)} %{intensity:.4g}<extra></extra>` }, known),
+    lines(ends(mesh.edges, xyz), 3, "ink"),
+  ], { scene: seen.scene(), margin: FLAT }));
 }
 
+// Modes of the test and of decks, each ``data.sides`` a list of them; ``data.rows`` pairs their
+// positions, in the order of the sides. Two of them are seen next to each other.
 function shapes(at, data, shared, box) {
-  const mesh = shared.mesh, decks = Object.keys(data.modes[0]).concat("before", "after").filter((name, k, all) => name !== "test" && all.indexOf(name) === k && data.modes.some((m) => m[name]));
-  const sensed = data.modes.some((m) => m.test?.motion), own = (m) => m.test ?? m[decks[0]];
-  const state = { mode: 0, left: sensed ? "test" : decks[0], right: decks[decks.length - 1], size: 0.08, run: !matchMedia("(prefers-reduced-motion: reduce)").matches };
-  const title = (m, name) => {
-    const one = m[name];
-    if (!one) return `${name}: no partner`;
-    return `${name} ${hertz(one.hz)}` + (one.damping != null ? `, damping ${(100 * one.damping).toFixed(2)} %` : "") + (one.mac != null ? `, MAC ${one.mac.toFixed(3)}` : "");
-  };
-  const names = (sensed ? ["test"] : []).concat(decks).map((n) => [n, ["test", "model"].includes(n) ? n : "deck " + n]), both = names.length > 1;
-  const list = choice(box, "mode", data.modes.map((m, k) => [k, `${own(m).number ?? k + 1}: ${hertz(own(m).hz)}`]), (v) => show({ mode: Number(v) }));
-  const step = (by) => show({ mode: (list.value = (state.mode + by + data.modes.length) % data.modes.length) });
-  button(box, "previous", () => step(-1));
-  button(box, "next", () => step(1));
-  if (both) {
-    choice(box, "left", names, (v) => show({ left: v })).value = state.left;
-    choice(box, "right", names, (v) => show({ right: v })).value = state.right;
-  }
-  choice(box, "amplitude", [[0.03, "small"], [0.08, "medium"], [0.2, "large"]], (v) => show({ size: Number(v) })).value = state.size;
-  const stop = button(box, "", () => { state.run = !state.run; label(); tick(); });
+  const mesh = shared.mesh, names = Object.keys(data.sides), count = data.rows.length;
+  const state = { row: 0, side: [names[0], names.length > 1 ? names[names.length - 1] : null], at: [null, null], size: 0.08, run: !matchMedia("(prefers-reduced-motion: reduce)").matches };
+  const called = (name) => (["test", "model"].includes(name) ? name : "deck " + name), own = (row) => names.map((n, k) => data.sides[n][row[k]]).find((m) => m);
+  const mode = (n) => data.sides[state.side[n]]?.[state.at[n]], sensed = (n) => mode(n)?.[state.side[n] === "test" ? "motion" : "sensors"];
+  const list = choice(box, "mode", data.rows.map((row, k) => [k, `${own(row).number ?? k + 1}: ${hertz(own(row).hz)}`]), (v) => pair(Number(v)));
+  if (count > 1) for (const [word, by] of [["previous", -1], ["next", 1]]) button(box, word, () => pair(((state.row ?? 0) + by + count) % count));
+  const pickers = names.length < 2 ? [] : ["left", "right"].map((word, n) => choice(box, word, names.map((name) => [name, called(name)]), (v) => { state.side[n] = v; pair(state.row ?? 0); }));
+  choice(box, "amplitude", [[0.03, "small"], [0.08, "medium"], [0.2, "large"]], (v) => { state.size = Number(v); show(); }).value = state.size;
+  const stop = button(box, "", () => { state.run = !state.run; label(); tick(); }), seen = stage(at, mesh, box);
   const label = () => { stop.textContent = state.run ? "stop" : "play"; stop.setAttribute("aria-pressed", state.run); };
 
-  const motion = (name) => data.modes[state.mode][name]?.motion;
-  function side(name, phase) {  // coordinates of the traces of one side: sheet and edges, or sensors
-    const far = state.size * mesh.size * phase, m = motion(name);
-    if (name !== "test") {
-      const xyz = places(mesh, m, far / 1000);
-      return [{ x: xyz[0], y: xyz[1], z: xyz[2] }, ends(mesh.edges, xyz)];
+  function pair(k) {
+    Object.assign(state, { row: k, at: state.side.map((name) => data.rows[k][names.indexOf(name)] ?? null) });
+    return show();
+  }
+  function title(n) {
+    const m = mode(n), [a, b] = state.side, name = called(state.side[n]), [i, j] = state.at;
+    if (!m) return `${name}: no partner`;
+    const mac = n && mode(0) ? data.mac[`${a}|${b}`]?.[i]?.[j] ?? data.mac[`${b}|${a}`]?.[j]?.[i] : null;
+    return `${name} ${m.number ?? ""} ${hertz(m.hz)}` + (m.damping != null ? `, damping ${(100 * m.damping).toFixed(2)} %` : "") + (mac != null ? `, MAC ${mac.toFixed(3)}` : "");
+  }
+  function moved(n, phase) {  // coordinates of the traces that move: sensors with their sticks, or the mesh
+    const far = state.size * mesh.size * phase, m = mode(n)?.motion;
+    if (state.side[n] !== "test") {
+      const sign = n && sensed(0) && sensed(1) && dot(sensed(0), sensed(1)) < 0 ? -1 : 1, xyz = places(mesh, m, (sign * far) / 1000);
+      return [{ x: xyz[0], y: xyz[1], z: xyz[2] }, ends(mesh.edges, xyz), ends(mesh.fine, xyz)];
     }
-    const tip = (k) => data.sensors.map((s, n) => s.at[k] + ((m ? m[n] : 0) / 1000) * far * s.along[k]);
-    const [x, y, z] = [tip(0), tip(1), tip(2)], stick = (axis, k) => data.sensors.flatMap((s, n) => [s.at[k], axis[n], null]);
+    const tip = (k) => data.sensors.map((s, i) => s.at[k] + ((m ? m[i] : 0) / 1000) * far * s.along[k]);
+    const [x, y, z] = [tip(0), tip(1), tip(2)], stick = (axis, k) => data.sensors.flatMap((s, i) => [s.at[k], axis[i], null]);
     return [{ x, y, z }, { x: stick(x, 0), y: stick(y, 1), z: stick(z, 2) }];
   }
-  function traces(name, scene) {
-    const [first, second] = side(name, 1), m = motion(name);
-    if (name === "test") {
-      const rest = places(mesh);
-      return [{ type: "scatter3d", mode: "markers", ...first, scene, showlegend: false, hoverinfo: "text",
-        hovertext: data.sensors.map((s, n) => `${said(s.label)}: ${m ? (m[n] / 1000).toFixed(2) : "–"} of the largest`), marker: { size: 5, color: m ? m.map(Math.abs) : 0, cmin: 0, cmax: 1000, colorscale: "Viridis" } },
-      { ...lines(second, 5, "before"), scene }, { ...sheet(mesh, rest, { opacity: 0.35 }), scene }, { ...lines(ends(mesh.edges, rest), 2, "soft"), scene }];
+  const scale = (more) => ({ cmin: 0, cmax: 1000, colorscale: "Viridis", colorbar: { orientation: "h", thickness: 8, len: 0.5, x: 1, xanchor: "right", y: 0, yanchor: "top", tickvals: [0, 500, 1000], ticktext: ["0", "0.5", "1"], title: { text: "share of the largest motion", side: "top", font: { size: 11 } } }, ...more });
+  function traces(n, scene, last) {
+    const [first, second, third] = moved(n, 1), m = mode(n)?.motion, rest = places(mesh), ghost = lines(ends(mesh.edges, rest), 2, "soft");
+    if (state.side[n] === "test") {
+      const marks = { type: "scatter3d", mode: "markers", ...first, showlegend: false, hoverinfo: "text", hovertext: data.sensors.map((s, i) => `${said(s.label)}: ${m ? (m[i] / 1000).toFixed(2) : "–"} of the largest`),
+        marker: { size: 5, ...scale({ color: m ? m.map(Math.abs) : data.sensors.map(() => 0), showscale: last }) } };
+      return [marks, lines(second, 5, "before"), ...(mesh.i.length ? [sheet(mesh, rest, { opacity: 0.35 })] : []), ghost].map((t) => ({ ...t, scene }));
     }
-    const size = m ? m[0].map((_, n) => Math.hypot(m[0][n], m[1][n], m[2][n])) : mesh.x.map(() => 0);
-    const surface = mesh.i.length ? sheet(mesh, [first.x, first.y, first.z], { intensity: size, cmin: 0, cmax: 1000, colorscale: "Viridis", showscale: false,
-      hovertext: mesh.ids.map((id, n) => `grid ${id}: ${(size[n] / 1000).toFixed(2)} of the largest`) }) : lines(first, 1, "line");
-    return [{ ...surface, scene }, { ...lines(second, 3, "ink"), scene }];
+    const size = m ? m[0].map((_, k) => Math.hypot(m[0][k], m[1][k], m[2][k])) : mesh.x.map(() => 0);
+    const surface = mesh.i.length ? sheet(mesh, [first.x, first.y, first.z], scale({ intensity: size, showscale: last, hovertext: mesh.ids.map((id, k) => `grid ${id}: ${(size[k] / 1000).toFixed(2)} of the largest`) })) : lines(first, 1, "line");
+    return [surface, lines(second, 3, "ink"), lines(third, 1, "soft"), { ...ghost, opacity: 0.6 }].map((t) => ({ ...t, scene }));
   }
+  let parts = [];  // traces of each side
   const narrow = at.clientWidth < 600;
-  if (!both) at.style.height = "26rem";
-  async function show(change) {
-    Object.assign(state, change);
-    const m = data.modes[state.mode];
+  async function show() {
+    const both = state.side[1] != null;
+    list.value = state.row ?? "";
+    pickers.forEach((picker, n) => { picker.value = state.side[n]; });
+    at.style.height = both ? "" : "26rem";
     const note = (text, x, y) => ({ text: said(text), x, y, xref: "paper", yref: "paper", showarrow: false, xanchor: "left", yanchor: "top" });
-    const [one, two] = !both ? [{}] : narrow ? [{ x: [0, 1], y: [0.52, 1] }, { x: [0, 1], y: [0, 0.48] }] : [{ x: [0, 0.5], y: [0, 1] }, { x: [0.5, 1], y: [0, 1] }];
-    await draw(at, [...traces(state.left, "scene"), ...(both ? traces(state.right, "scene2") : [])], {
-      scene: space(at, mesh, "scene", one), ...(both && { scene2: space(at, mesh, "scene2", two) }), margin: { l: 0, r: 0, t: 0, b: 0 },
-      annotations: [note(title(m, state.left), 0.01, 1), ...(both ? [note(title(m, state.right), narrow ? 0.01 : 0.51, narrow ? 0.48 : 1)] : [])],
-    });
+    const domains = !both ? [{}] : narrow ? [{ x: [0, 1], y: [0.52, 1] }, { x: [0, 1], y: [0, 0.48] }] : [{ x: [0, 0.5], y: [0, 1] }, { x: [0.5, 1], y: [0, 1] }];
+    parts = domains.map((_, n) => traces(n, n ? "scene2" : "scene", n === domains.length - 1));
+    await seen.drawn(draw(at, parts.flat(), {
+      ...Object.fromEntries(domains.map((place, n) => [n ? "scene2" : "scene", seen.scene(place)])), margin: FLAT,
+      annotations: domains.map((place, n) => note(title(n), (place.x?.[0] ?? 0) + 0.01, place.y?.[1] ?? 1)),
+    }));
     label();
   }
   let busy = false, timer, inView = true;
@@ -226,29 +278,24 @@ function shapes(at, data, shared, box) {
     clearTimeout(timer);
     if (busy || !state.run || !inView || document.hidden) return;
     busy = true;
-    const phase = Math.sin((performance.now() - start) / 250);
-    const left = side(state.left, phase), right = side(state.right, phase), first = state.left === "test" ? 4 : 2;
-    const moved = both ? [...left, ...right] : left, of = (axis) => moved.map((p) => p[axis]);
-    await Plotly.restyle(at, { x: of("x"), y: of("y"), z: of("z") }, [0, 1, first, first + 1].slice(0, moved.length));
+    const phase = Math.sin((performance.now() - start) / 250), sides = parts.map((_, n) => moved(n, phase)), all = sides.flat();
+    const of = (axis) => all.map((p) => p[axis]);
+    await Plotly.restyle(at, { x: of("x"), y: of("y"), z: of("z") }, sides.flatMap((side, n) => side.map((_, k) => k + (n ? parts[0].length : 0))));
     at.dataset.frames = Number(at.dataset.frames || 0) + 1;
     busy = false;
     timer = setTimeout(tick, 30);
   }
-  at.redraw = () => show({});
+  at.redraw = () => show();
+  at.open = (to) => {  // a row, or a mode of each side
+    if (typeof to === "number") return pair(to);
+    Object.assign(state, { side: to.map(([name]) => name), at: to.map(([, k]) => k) });
+    const row = data.rows.findIndex((r) => to.every(([name, k]) => r[names.indexOf(name)] === k));
+    state.row = row < 0 ? null : row;
+    return show();
+  };
   document.addEventListener("visibilitychange", tick);
-  new IntersectionObserver(([seen]) => { inView = seen.isIntersecting; tick(); }).observe(at);
-  return show({}).then(() => { if (both) at.on("plotly_relayout", (to) => turned(at, to)); tick(); });
-}
-
-function turned(at, to) {  // both sides are seen from the same place
-  const change = {};
-  for (const [key, value] of Object.entries(to)) {
-    const found = key.match(/^scene(2?)\.(camera|aspectratio)$/);
-    if (found) change[`scene${found[1] ? "" : "2"}.${found[2]}`] = value;
-  }
-  if (at.following || !Object.keys(change).length) return;
-  at.following = true;
-  Plotly.relayout(at, change).then(() => { at.following = false; });
+  new IntersectionObserver(([shown]) => { inView = shown.isIntersecting; tick(); }).observe(at);
+  return pair(0).then(tick);
 }
 
 // ---- charts: data and layout come from Python; here are colours, choices and clicks
@@ -287,7 +334,14 @@ function chart(at, spec, shared, box) {
   });
   const brush = spec.brush && brushed(at, spec, box, show);
   at.redraw = show;
-  return show().then(() => { if (spec.pick) picks(at, spec.pick, box); brush?.listen(); });
+  if (choices.length) at.open = (k) => { picked[0] = k; box.querySelector("select").value = k; return show(); };
+  return show().then(() => { if (spec.pick) picks(at, spec.pick, box); brush?.listen(); at.on("plotly_click", opens); });
+}
+
+// A square of a matrix opens its pair of modes, a bar its row.
+function opens({ points: [p] }) {
+  const { opens, sides } = p.data.meta ?? {};
+  if (opens) open(opens, sides ? [[sides[0], p.y], [sides[1], p.x]] : p.x);
 }
 
 // A click on a point adds its x to a command.
@@ -370,9 +424,26 @@ function sortable(table) {
 
 const DRAWN = { structure, remainder, shapes, chart };
 const SPATIAL = ["structure", "remainder", "shapes"];
+let once = () => {};
+
+// Go to a drawing and show the given part of it.
+async function open(name, to) {
+  const figure = document.querySelector(`.live[data-name="${CSS.escape(name)}"]`);
+  if (!figure) return;
+  await once(figure);
+  figure.scrollIntoView({ block: "center", behavior: "smooth" });
+  await figure.querySelector(".plot").open?.(to);
+}
 
 async function begin() {
   document.querySelectorAll("table").forEach(sortable);
+  for (const row of document.querySelectorAll("[data-opens]")) {
+    const go = () => open(row.dataset.opens, Number(row.dataset.at));
+    row.addEventListener("click", () => { if (!getSelection().toString()) go(); });
+    row.addEventListener("keydown", (e) => { if (e.key === "Enter") go(); });
+  }
+  const unfold = () => document.querySelectorAll("details").forEach((d) => { d.open = true; });
+  addEventListener("beforeprint", unfold);
   const figures = [...document.querySelectorAll(".live[data-word]")];
   if (!figures.length || !window.DecompressionStream) return;
   const [common, ...words] = document.querySelectorAll(".numbers"), shared = JSON.parse(await unpacked(common));
@@ -394,8 +465,8 @@ async function begin() {
       console.error(error);
     }
   }
-  const begun = new Set();
-  const once = (figure) => begun.has(figure) || (begun.add(figure), start(figure));
+  const begun = new Map();
+  once = (figure) => begun.get(figure) ?? begun.set(figure, start(figure)).get(figure);
   const near = new IntersectionObserver((seen) => seen.filter((s) => s.isIntersecting).forEach((s) => once(s.target)), { rootMargin: "300px" });
   figures.forEach((figure) => near.observe(figure));
   const redraw = () => figures.filter((f) => f.dataset.ready).forEach((f) => f.querySelector(".plot").redraw());

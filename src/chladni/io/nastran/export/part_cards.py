@@ -109,7 +109,14 @@ def beam_card(s: BeamSection, pid: int, mid: Value, units: Units) -> tuple[str, 
         return "PBAR", [pid, mid, A, I1, I2, J, nsm, None, *points, *s.shear, I12]
     n, m = ([x / L for x in pair] for pair in (s.neutral, s.nonstructural_at))
     inertia = s.nonstructural_inertia / (units.inertia * L)
-    more: list[Value] = [*s.shear, None, None, inertia, inertia, None, None, *m, *m, *n, *n]
+    own, there = (inertia, m, n), (inertia, m, n)
+    for b in s.stations:
+        points += ["NO", b.x, b.area * A, b.I1 * I1, b.I2 * I2, b.I12 * I1, b.J * J]
+        points += [b.nonstructural / (units.inertia / L)]
+        y, z = ([x / L for x in pair] for pair in (b.neutral, b.nonstructural_at))
+        there = (b.nonstructural_inertia / (units.inertia * L), z, y)
+    more: list[Value] = [*s.shear, None, None, own[0], there[0], None, None]
+    more += [*own[1], *there[1], *own[2], *there[2]]
     return "PBEAM", [pid, mid, A, I1, I2, I12, J, nsm, *points, *more]
 
 

@@ -46,6 +46,7 @@ def write_assembly(
         *texts(_shells(assembly, units, ids), 1e-9),
         *texts(_solids(assembly, ids)),
         *texts(_beams(assembly, units, ids), 1e-9),
+        *texts(_nonstructural(assembly, units, ids), _EXACT),
         *texts(_joints(assembly, units, ids, systems), _EXACT),
         *texts(_supports(assembly)),
     ]
@@ -62,6 +63,8 @@ def _head(assembly: Assembly, units: Units, count: int) -> Iterator[str]:
         yield "SPC = 1"
     if any(isinstance(t, Equation) for t in assembly.rigid):
         yield "MPC = 1"
+    if any(np.any(family.nonstructural) for family in (assembly.shells, assembly.beams)):
+        yield "NSM = 1"
     yield "BEGIN BULK"
     yield from card("EIGRL", [1, None, None, count])
     yield from card("PARAM", ["COUPMASS", 1 if assembly.coupled_mass else -1])
@@ -133,6 +136,14 @@ def _beams(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
     numbered = replace(assembly, beams=replace(assembly.beams, ids=np.array(ids.beam, int)))
     for k, part in enumerate(assembly.beams.part.tolist()):
         yield part_cards.beam_element(numbered, k, ids.part[part], units)
+
+
+def _nonstructural(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:
+    """NSM of shells and beams that have more than their section."""
+    for family, own, power in ((assembly.shells, ids.shell, 2), (assembly.beams, ids.beam, 1)):
+        for k in np.flatnonzero(family.nonstructural).tolist():
+            load = float(family.nonstructural[k]) * units.length**power / units.inertia
+            yield ["NSM", 1, "ELEMENT", own[k], load]
 
 
 def _scalars(assembly: Assembly, units: Units, ids: Ids) -> Iterator[Card]:

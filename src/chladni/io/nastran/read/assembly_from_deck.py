@@ -15,6 +15,7 @@ from .beam_elements import beams
 from .connected import refuse_loose
 from .connectors import CONNECTORS, with_connectors
 from .context import Context, context, parameter, real_parameter
+from .nonstructural_mass import with_nonstructural
 from .rigid_elements import ties
 from .sections import Parts
 from .shell_elements import SHEETS, filled_thickness, shells
@@ -86,7 +87,7 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         auto_spc=parameter(deck, "AUTOSPC") != "NO",
         k6rot=_k6rot(deck),
     )
-    return with_connectors(ctx, made)
+    return with_connectors(ctx, with_nonstructural(ctx, made, selected(deck, "NSM", subcase)))
 
 
 def _k6rot(deck: Deck) -> float | None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....errors import ModelError
-from ....model.properties import BeamSection, Section
+from ....model.properties import BeamSection, BeamStation, Section
 from ..text.table import Cards
 from .beam_profiles import SHAPES, Profile, tube
 from .context import Context
@@ -65,71 +65,129 @@ def _pbar(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSectio
     return _section(ctx, materials, card, (A, I1, I2, I12, J), (K1, K2), nsm, "bar")
 
 
-def _shape(card: Cards) -> tuple[Profile, float]:
-    """The profile of a PBARL or PBEAML (its end A) and its mass a length."""
-    word = card.words(4)[0].decode("latin-1")
-    if word not in SHAPES:
-        raise card.refuse(0, f"TYPE {word!r} is not understood; there are {', '.join(SHAPES)}")
-    make, count = SHAPES[word]
-    sizes = card.block(9, count)[0]
+def _shape(card: Cards, sizes: np.ndarray) -> Profile:
+    """The profile of a PBARL or PBEAML with these dimensions."""
+    word = card.word(0, 4)
     if np.any(sizes < 0) or not np.any(sizes > 0):
         raise card.refuse(0, f"a dimension of the {word} is not positive")
     with np.errstate(all="ignore"):
         try:
-            profile = make(*sizes.tolist())
+            profile = SHAPES[word][0](*sizes.tolist())
         except ModelError as error:
             raise card.refuse(
                 0, f"the dimensions {sizes.tolist()} make no {word}: {error}"
             ) from None
     if not profile.area > 0 or not np.isfinite(profile.J) or min(profile.I1, profile.I2) <= 0:
         raise card.refuse(0, f"the dimensions {sizes.tolist()} make no {word}")
-    return profile, float(card.reals(9 + count, 0.0)[0])
+    return profile
 
 
 def _library(kind: str) -> Callable[[Context, Materials, Cards, int], BeamSection]:
     def read(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:
-        p, nsm = _shape(card)
-        if kind == "beam":  # end A, then stations of SO, X/XB and as many fields; blanks repeat A
-            count = SHAPES[card.words(4)[0].decode("latin-1")][1] + 1
-            own = np.nan_to_num(card.block(9, count, np.nan)[0])
-            k = 9 + count
-            while card.words(k)[0] in STATION:
-                _refuse_unlike(card, card.block(k + 2, count, np.nan)[0], own)
-                k += 2 + count
+        word = card.word(0, 4)
+        if word not in SHAPES:
+            raise card.refuse(0, f"TYPE {word!r} is not understood; there are {', '.join(SHAPES)}")
+        count = SHAPES[word][1]
+        own = np.append(card.block(9, count)[0], card.real(0, 9 + count, 0.0))
+        p = _shape(card, own[:-1])
         values = (p.area, p.I1, p.I2, p.I12, p.J)
-        return _section(ctx, materials, card, values, p.shear, nsm, kind)
+        made = _section(ctx, materials, card, values, p.shear, float(own[-1]), kind)
+        if kind == "bar":
+            return made
+        rows = []
+        for x, sizes in _stations(card, 10 + count, own, lambda _: 3 + count)[0]:
+            p = _shape(card, sizes[:-1])
+            rows.append((x, np.array([p.area, p.I1, p.I2, p.I12, p.J, sizes[-1]])))
+        return _tapered(ctx, card, made, rows)
 
     return read
 
 
-STATION = (b"YES", b"YESA", b"NO")  # SO: stress output at a station along the beam
+STATION = ("YES", "YESA", "NO")  # SO: stress output at a station along the beam
+_Rows = list[tuple[float, np.ndarray]]
 
 
-def _refuse_unlike(card: Cards, there: np.ndarray, own: np.ndarray) -> None:
-    """Refuse a station that differs from end A by more than rounding; blanks repeat it."""
-    if not np.allclose(np.where(np.isnan(there), own, there), own, rtol=2e-4, atol=0):
-        raise card.refuse(
-            0, "a tapered beam is not supported; give it several elements, each uniform"
-        )
+def _stations(
+    card: Cards, k: int, own: np.ndarray, width: Callable[[str], int]
+) -> tuple[_Rows, int]:
+    """(x, values) of the stations from field k on, by increasing x, and the field behind them.
+
+    Each is SO, X/XB and as many values as end A has. A blank at end B repeats end A, a blank
+    between lies on the line from A to B (MSC Nastran Quick Reference Guide, PBEAM, PBEAML).
+    """
+    found = []
+    while (word := card.word(0, k)) in STATION:
+        x = card.real(0, k + 1)
+        if not 0 <= x <= 1:
+            raise card.refuse(0, f"X/XB is {x:g}; it is between 0 and 1")
+        found.append((x, card.block(k + 2, len(own), np.nan)[0]))
+        k += width(word)
+    last = next((v for x, v in found if x == 1), own)
+    last = np.where(np.isnan(last), own, last)
+    between = {x: np.where(np.isnan(v), (1 - x) * own + x * last, v) for x, v in found if x < 1}
+    if not np.allclose(between.pop(0.0, own), own, rtol=_ALIKE, atol=0):
+        raise card.refuse(0, "its station X/XB = 0 differs from its end A")
+    return [*sorted(between.items()), (1.0, last)], k
+
+
+_ALIKE = 2e-4  # stations that differ by no more repeat end A: dimensions were rounded
+
+
+def _tapered(
+    ctx: Context,
+    card: Cards,
+    made: BeamSection,
+    rows: _Rows,
+    end: tuple[tuple[float, ...], tuple[float, ...], float] | None = None,
+) -> BeamSection:
+    """The section with stations of (x, (A, I1, I2, I12, J, NSM)), unless all of them are alike.
+
+    Parameters
+    ----------
+    end : neutral axis, place [m] and inertia [kg m] of the non-structural mass at end B
+    """
+    L, s = ctx.scale.length, made
+    own = np.array([s.neutral, s.nonstructural_at]).ravel()
+    own = np.append(own, s.nonstructural_inertia)
+    there = own if end is None else np.array([*end[0], *end[1], end[2]])
+    first = np.array([s.area, s.I1, s.I2, s.I12, s.J, s.nonstructural])
+    unit = np.array([L**2, L**4, L**4, L**4, L**4, ctx.scale.inertia / L])
+    alike = all(np.allclose(v * unit, first, rtol=_ALIKE, atol=0) for _, v in rows)
+    if alike and np.allclose(there, own, rtol=_ALIKE, atol=0):
+        return made
+    stations = []
+    for x, row in rows:
+        refuse_impossible(card, 0, tuple(row[:5].tolist()))
+        value = row * unit
+        if min(*value[:3], *first[:3]) <= 0:
+            raise card.refuse(0, "a tapered beam has an area and moments that are positive")
+        y1, z1, y2, z2, inertia = ((1 - x) * own + x * there).tolist()
+        ratio = value[:5] / np.array([s.area, s.I1, s.I2, s.I1, s.J or 1.0])
+        A, I1, I2, I12, J = ratio.tolist()
+        nsm = float(value[5])
+        stations.append(BeamStation(x, A, I1, I2, I12, J, nsm, inertia, (y1, z1), (y2, z2)))
+    return replace(made, stations=tuple(stations))
 
 
 def _pbeam(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:
-    """PBEAM, uniform: a tapered one is refused; K1, K2 are 1 unless given."""
-    A, I1, I2, I12, J, nsm = card.block(3, 6, 0.0)[0].tolist()
-    k = 9
-    if card.words(k)[0] not in STATION:
-        k += 8  # stress recovery points
-    while (word := card.words(k)[0]) in STATION:
-        _refuse_unlike(card, card.block(k + 2, 6, np.nan)[0], np.array([A, I1, I2, I12, J, nsm]))
-        k += 16 if word == b"YES" else 8
+    """PBEAM; K1, K2 are 1 unless given."""
+    own = card.block(3, 6, 0.0)[0]
+    k = 9 if card.word(0, 9) in STATION else 17  # behind the stress recovery points
+    rows, k = _stations(card, k, own, lambda word: 16 if word == "YES" else 8)
+    A, I1, I2, I12, J, nsm = own.tolist()
     K1, K2 = card.block(k, 2, 1.0)[0].tolist()
+    if np.any(card.block(k + 2, 2, 0.0)):
+        raise card.refuse(0, "shear relief (S1, S2) is not supported")
     made = _section(ctx, materials, card, (A, I1, I2, I12, J), (K1, K2), nsm, "beam")
-    L = ctx.scale.length
-    for j, n in ((4, 1), (8, 2), (12, 2)):  # NSI, (M1, M2), (N1, N2): end A, then end B
-        _refuse_unlike(card, card.block(k + j + n, n, np.nan)[0], card.block(k + j, n, 0.0)[0])
-    at, neutral = (tuple((card.block(k + j, 2, 0.0)[0] * L).tolist()) for j in (8, 12))
-    inertia = card.real(0, k + 4, 0.0) * ctx.scale.inertia * L
-    return replace(made, neutral=neutral, nonstructural_at=at, nonstructural_inertia=inertia)
+    L, unit = ctx.scale.length, ctx.scale.inertia * ctx.scale.length
+    places = [card.block(k + j, 2, 0.0)[0] * L for j in (12, 8)]  # N, M of end A
+    there = [card.block(k + j + 2, 2, np.nan)[0] * L for j in (12, 8)]
+    there = [np.where(np.isnan(b), a, b) for a, b in zip(places, there, strict=True)]
+    neutral, at, neutral_B, at_B = ((float(y), float(z)) for y, z in [*places, *there])
+    inertia = card.real(0, k + 4, 0.0)
+    end = (neutral_B, at_B, card.real(0, k + 5, inertia) * unit)
+    made = replace(made, neutral=neutral, nonstructural_at=at, nonstructural_inertia=inertia * unit)
+    return _tapered(ctx, card, made, rows, end)
 
 
 def _prod(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....model.properties import Material
+from ....model.properties import Anisotropic, Material, ShellSection
 
 
 @dataclass(frozen=True)
@@ -14,6 +14,28 @@ class Ply:
     material: Material
     thickness: float
     angle: float
+
+
+def laminate_section(plies: list[Ply], id: int = 0, lay: str = "") -> ShellSection:
+    """A stack smeared to equivalent membrane, bending, coupling and shear moduli.
+
+    Parameters
+    ----------
+    lay : LAM of PCOMP, one of "", SYM, MEM, BEND and SMEAR
+    """
+    t, membrane, bending, coupling, shear, rho = smear(plies)
+    bent = membrane if lay == "SMEAR" else bending
+    coupled = np.abs(coupling).max() > 1e-9 * np.abs(membrane).max()
+    keep = coupled and lay not in ("SMEAR", "MEM", "BEND")
+    return ShellSection(
+        t,
+        None if lay == "BEND" else Anisotropic(membrane, rho=rho, id=id),
+        None if lay == "MEM" else Anisotropic(bent, rho=rho, id=id),
+        Anisotropic(np.zeros((3, 3)), shear, id=id),
+        Anisotropic(coupling, id=id) if keep else None,
+        shear_ratio=1.0,
+        rigid_shear=not np.any(shear),
+    )
 
 
 def smear(

@@ -1,14 +1,15 @@
 """Properties to parts: PSHELL, PCOMP, PSOLID and, by way of :mod:`.bars`, beams and rods."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from ....model.properties import Anisotropic, BeamSection, Part, Section, ShellSection, SolidSection
+from ....model.properties import BeamSection, Part, Section, ShellSection, SolidSection
 from ..text.table import Cards
 from . import bar_sections
 from .context import Context
-from .laminate import Ply, smear
+from .laminate import Ply, laminate_section
 from .materials import Materials
 
 Reader = Callable[[Context, Materials, Cards, int], Section]
@@ -152,19 +153,9 @@ def _pcomp(ctx: Context, materials: Materials, card: Cards, pid: int) -> ShellSe
     lay = card.words(8)[0].decode("latin-1")
     if lay not in ("", "SYM", "MEM", "BEND", "SMEAR"):
         raise card.refuse(0, f"LAM {lay!r} is not understood; there are SYM, MEM, BEND, SMEAR")
-    t, membrane, bending, coupling, shear, rho = smear(_plies(ctx, materials, card))
-    bent = membrane if lay == "SMEAR" else bending
-    coupled = np.abs(coupling).max() > 1e-9 * np.abs(membrane).max()
-    keep = coupled and lay not in ("SMEAR", "MEM", "BEND")
-    return ShellSection(
-        t,
-        None if lay == "BEND" else Anisotropic(membrane, rho=rho, id=pid),
-        None if lay == "MEM" else Anisotropic(bent, rho=rho, id=pid),
-        Anisotropic(np.zeros((3, 3)), shear, id=pid),
-        Anisotropic(coupling, id=pid) if keep else None,
-        shear_ratio=1.0,
+    return replace(
+        laminate_section(_plies(ctx, materials, card), pid, lay),
         nonstructural=float(card.reals(3, 0.0)[0]) * ctx.scale.inertia / ctx.scale.length**2,
-        rigid_shear=not np.any(shear),
         damping=float(card.reals(7, 0.0)[0]),
     )
 

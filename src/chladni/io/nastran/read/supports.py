@@ -12,7 +12,7 @@ from .context import Context, digits, id_list
 
 
 def selected(deck: Deck, kind: str, subcase: int | None = None) -> tuple[int, ...]:
-    """Sets of SPC or MPC cards that hold, additions (SPCADD, MPCADD) resolved.
+    """Sets of SPC, MPC or NSM cards that hold, additions (SPCADD...) resolved.
 
     The subcase asked for selects, else the first that looks for modes, else the first that selects
     any; where there is no case control the only set of the deck is taken.
@@ -48,8 +48,10 @@ def _chosen(deck: Deck, kind: str, subcase: int | None) -> int:
 
 
 def _sets(deck: Deck, kind: str) -> set[int]:
-    names = ("SPC", "SPC1") if kind == "SPC" else ("MPC",)
-    return {int(s) for cards in deck.present(*names) for s in cards.integers(1)}
+    return {int(s) for cards in deck.present(*_CARDS[kind]) for s in cards.integers(1)}
+
+
+_CARDS = {"SPC": ("SPC", "SPC1"), "MPC": ("MPC",), "NSM": ("NSM", "NSM1", "NSML", "NSML1")}
 
 
 def _additions(deck: Deck, kind: str) -> dict[int, list[int]]:
@@ -94,7 +96,7 @@ def _resolved(deck: Deck, kind: str, chosen: int, there: set[int]) -> tuple[int,
 
 def selection_notes(deck: Deck) -> Iterator[str]:
     """Sets that are selected and of which there is no card; subcases that select others."""
-    for kind in ("SPC", "MPC"):
+    for kind in _CARDS:
         every = deck.case.subcases
         cases = [c for c in every if c.get("METHOD")] or [c for c in every if c.get(kind)]
         chosen = list(dict.fromkeys(c.get(kind) for c in cases))
@@ -111,8 +113,8 @@ def selection_notes(deck: Deck) -> Iterator[str]:
 
 
 def _missing_sets(deck: Deck) -> Iterator[str]:
-    """SPCADD and MPCADD that name a set the deck does not have, one sentence a card."""
-    for kind in ("SPC", "MPC"):
+    """SPCADD, MPCADD, NSMADD that name a set the deck does not have, one sentence a card."""
+    for kind in _CARDS:
         cards, added = deck[f"{kind}ADD"], _additions(deck, kind)
         there = _sets(deck, kind) | set(added)
         for i, (s, parts) in enumerate(added.items()):

@@ -7,8 +7,10 @@ from itertools import islice
 from pathlib import Path
 
 from ....arguments import checked
+from ....arrays import OneScreen
 from ....errors import FileError, named, nearest
 from .card_layout import tables
+from .cards import FIELDS
 from .case_control import CaseControl, case_control
 from .known_cards import FOLLOWS_TEMPERATURE, SELECTED, counted, known, refusal
 from .known_commands import MEANINGS, SELECTS, harmless, selects_one, sets_material_temperature
@@ -20,8 +22,8 @@ from .table import Cards, empty, joined
 SCALED = frozenset("CB1 CB2 CK1 CK2 CK3 CM1 CM2".split())  # PARAM that scale whole matrices
 
 
-@dataclass(frozen=True, eq=False)
-class Deck:
+@dataclass(frozen=True, eq=False, repr=False)
+class Deck(OneScreen):
     """A deck: its files as they stand, its cards by name, its case control, its part names."""
 
     path: Path
@@ -217,13 +219,16 @@ def _no_set(deck: Deck, name: str, text: str) -> str:
     cards = deck.present(*_SETS.get(name, ()))
     there = sorted({w for table in cards for w in table.words(1).tolist() if w.isdigit()}, key=int)
     known = f"; there are {b', '.join(there).decode()}" if there else ""
-    several = f", of which {name}ADD joins several" if name in ("SPC", "MPC") else ""
+    several = f", of which {name}ADD joins several" if f"{name}ADD" in FIELDS else ""
     return (
         f"{text.strip()!r} selects no set; write {name} = n, the number of one set{several}{known}"
     )
 
 
-_SETS = {"SPC": ("SPC", "SPC1", "SPCADD"), "MPC": ("MPC", "MPCADD"), "METHOD": ("EIGRL", "EIGR")}
+_SETS = {
+    "SPC": ("SPC", "SPC1", "SPCADD"), "MPC": ("MPC", "MPCADD"), "METHOD": ("EIGRL", "EIGR"),
+    "NSM": ("NSM", "NSM1", "NSML", "NSML1", "NSMADD"),
+}  # fmt: skip
 
 
 def _allowing(name: str) -> str:

@@ -66,7 +66,6 @@ FOLLOWS_TEMPERATURE: Final = (  # materials, where the case control chooses thei
     MATTVP""".split()
 )
 SELECTED: Final = _by_name({  # {card: meaning}; harmless where no command of that meaning stands
-    "nonstructural mass": "NSM NSM1 NSML NSML1 NSMADD",
     "contact or glue":
     """BCTABLE BCTABL1 BCTSET BCTADD BGSET BGADD BCBODY BCBODY1 BCPROP BCPROPS BCONPRG BCONPRP
     BCONECT""",

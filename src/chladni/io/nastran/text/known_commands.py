@@ -12,7 +12,7 @@ from typing import Final
 # Sets of cards that a command selects; {command: as a subcase keeps it}.
 SELECTS: Final = {
     "SPC": "SPC", "MPC": "MPC", "LOAD": "LOAD", "METHOD": "METHOD", "FREQUENCY": "FREQ",
-    "DLOAD": "DLOAD", "SDAMPING": "SDAMP", "SUPORT1": "SUPORT", "LOADSET": "LOADSET",
+    "NSM": "NSM", "DLOAD": "DLOAD", "SDAMPING": "SDAMP", "SUPORT1": "SUPORT", "LOADSET": "LOADSET",
     "K2GG": "K2GG", "M2GG": "M2GG", "B2GG": "B2GG", "K2PP": "K2PP", "M2PP": "M2PP", "B2PP": "B2PP",
 }  # fmt: skip
 SUBCASES: Final = ("SUBCASE", "SUBCOM", "SYM", "SYMCOM", "REPCASE")
@@ -55,7 +55,7 @@ _FIRST_FOUR: Final = frozenset(
     for name in names
 )  # fmt: skip
 MEANINGS: Final = {  # of commands that change the structure and are refused
-    "NSM": "nonstructural mass", "STATSUB": "stiffness of a loaded state",
+    "STATSUB": "stiffness of a loaded state",
     "MFLUID": "the mass of a fluid", "TFL": "transfer functions",
     "K42GG": "a matrix of structural damping", "A2GG": "a matrix that couples a fluid",
     "P2G": "loads given as a matrix", "BCONTACT": "contact or glue", "BCSET": "contact or glue",

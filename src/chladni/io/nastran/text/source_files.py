@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from pathlib import Path
 
+from ....arrays import OneScreen
 from ....errors import FileError
 from ...file_size import refuse_large, refuse_outside
+from ...mesh_format import refuse_foreign
 
 BOM = b"\xef\xbb\xbf"  # some editors begin a file with it
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
@@ -30,8 +32,8 @@ class Include:
     file: int  # position in DeckFiles.sources; -1: absent, as alters above CEND may be
 
 
-@dataclass(frozen=True, eq=False)
-class Source:
+@dataclass(frozen=True, eq=False, repr=False)
+class Source(OneScreen):
     """One file of a deck; ``bulk`` are its bulk-data lines [first, past) (0-based)."""
 
     path: Path
@@ -235,6 +237,7 @@ def _read(path: Path, prefix: str) -> bytes:
         raise FileError(f"{prefix}{path} is a device or a pipe, not a file")
     try:
         refuse_large(path)
+        refuse_foreign(path, prefix)
         data = path.read_bytes()
         if code := _UTF16.get(data[:2]) or _utf16_unmarked(data[:400]):
             data = data.decode(code, "replace").lstrip("\ufeff").encode("utf-8")
@@ -245,8 +248,6 @@ def _read(path: Path, prefix: str) -> bytes:
         raise FileError(f"{prefix}{path} cannot be read: {error.strerror}") from None
     if len(_NO_TEXT.findall(data, 0, 4096)) > 8:
         raise FileError(f"{prefix}{path} is binary, not a Nastran deck")
-    if re.match(rb"\s*-1\s*\n\s*\d+", data):
-        raise FileError(f"{prefix}{path} is a universal file, not a Nastran deck")
     return data
 
 

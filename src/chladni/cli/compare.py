@@ -1,0 +1,28 @@
+"""``chladni compare``: two runs next to each other."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import FileError
+from ..report.run_comparison import compared_runs
+from ..report.run_list import FinishedRun, finished_run
+from .run import Out, started
+
+Folder = Annotated[Path, typer.Argument(metavar="RUN_FOLDER", help="Folder of a run.")]
+
+
+def run(first: Folder, second: Folder, out: Out = None) -> None:
+    """Put two runs next to each other: results, values, charts of the same quantities."""
+    runs = [_opened(folder) for folder in (first, second)]
+    name = f"compare-{'-'.join(r.folder.resolve().name for r in runs)}"
+    with started("compare", first, out or Path("runs") / name) as job:
+        job.show(compared_runs(*runs))
+
+
+def _opened(folder: Path) -> FinishedRun:
+    found = finished_run(folder)
+    if found is None:
+        raise FileError(f"{folder} is no folder of a run: it has no run.json by chladni")
+    return found

@@ -1,0 +1,117 @@
+"""The runs below a folder: what each found, newest first, and the page that lists them."""
+
+import json
+import os
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileError
+from ..inference.result import Agreement
+from ..output import LIST
+from ..workflows.diagnosis_result import DiagnosisResult
+from .blocks import Items, PageParts, Section, Table
+from .diagnosis_json import read_diagnosis
+from .sentence import sentence
+from .words import number, percent
+
+_LONGEST = 300  # letters of a lead
+_LEAD = re.compile(r"<h1>(.*?)</h1>", re.DOTALL)
+_HEADS = ("written", "command", "case", "result", "Q before", "Q after", "change")
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A folder with the results of one command, as its ``run.json`` lists them."""
+
+    folder: Path
+    command: str
+    source: str  # name of the case or the deck
+    written: datetime
+
+    @cached_property
+    def diagnosis(self) -> DiagnosisResult | None:
+        """The result of ``diagnose`` or ``calibrate``; None of another command."""
+        with suppress(FileError):
+            return read_diagnosis(self.folder)
+        return None
+
+    @property
+    def lead(self) -> str:
+        """The result in one sentence, as its page begins."""
+        if self.diagnosis is not None:
+            return sentence(self.diagnosis)
+        with suppress(OSError):
+            found = _LEAD.search((self.folder / "report.html").read_text(encoding="utf-8"))
+            return unescape(found[1])[:_LONGEST] if found else ""
+        return ""
+
+    def q(self) -> tuple[float | None, float | None]:
+        """Q before and after, held out where data were; of a correlation Q alone."""
+        if self.diagnosis is not None:
+            scores, named = self.diagnosis.agreement or Agreement(), bool(self.diagnosis.effects)
+            sides = [tuple(s.last_step(named).values()) for s in (scores.held_out, scores.fitted)]
+            before, after = next((s for s in sides if None not in s), (None, None))
+            return before, after
+        held = contents(self, "correlation.json").get("Q")
+        return (held["mean"] if isinstance(held, dict) else None), None
+
+
+def contents(run: FinishedRun, name: str) -> dict[str, Any]:
+    """The data of a JSON file of a run; empty without one."""
+    with suppress(OSError, ValueError, RecursionError):
+        held = json.loads((run.folder / name).read_text(encoding="utf-8"))
+        return held if isinstance(held, dict) else {}
+    return {}
+
+
+def finished_run(folder: Path) -> FinishedRun | None:
+    """The run of a folder; None of one that chladni did not write."""
+    path = folder / LIST
+    try:
+        held = json.loads(path.read_text(encoding="utf-8")) if not path.is_symlink() else {}
+        command, files = held["command"], held["files"]
+        own = isinstance(command, str) and LIST in files and isinstance(held["version"], str)
+        when = path.stat().st_mtime
+    except (OSError, ValueError, RecursionError, LookupError, TypeError):
+        return None
+    if not own:
+        return None
+    with suppress(TypeError, ValueError):
+        when = datetime.fromisoformat(str(held.get("written"))).timestamp()
+    source = Path(str(held.get("source") or folder.name.removeprefix(f"{command}-")))
+    name = source.parent.name if source.name == "case.toml" else source.name
+    return FinishedRun(folder, command, name, datetime.fromtimestamp(when, UTC))
+
+
+def finished_runs(folder: Path) -> Iterator[FinishedRun]:
+    """Every run below a folder; links are not followed."""
+    for place, names, _ in os.walk(folder):
+        names[:] = sorted(n for n in names if not n.startswith("."))
+        if (run := finished_run(Path(place))) is not None and run.command != "index":
+            yield run
+
+
+def index_page(folder: Path, place: Path) -> PageParts:
+    """The runs below a folder, newest first, as a page in ``place``."""
+    runs = sorted(finished_runs(folder), key=lambda r: r.written, reverse=True)
+    if not runs:
+        raise FileError(f"{folder} holds no run of chladni: no folder with a {LIST}")
+    rows = []
+    for run in runs:
+        before, after = run.q()
+        date = f"{run.written:%Y-%m-%d %H:%M}"
+        cells = number(before, 3), number(after, 3), percent(after, before)
+        rows.append((date, run.command, run.source, run.lead, *cells))
+    pages = [Path(os.path.relpath(r.folder / "report.html", place)).as_posix() for r in runs]
+    table = Table(_HEADS, rows, _HEADS[:4], "Times are UTC. Q of held-out data, where there are "
+                  "any. A click on a head sorts.", links=pages)  # fmt: skip
+    more = "chladni compare A B puts two of these folders next to each other."
+    counted = f"{len(runs)} run{'s' * (len(runs) > 1)} in {folder.resolve().name}"
+    return PageParts(f"{counted}.", [Section("Runs", [table, Items([more])])])
