@@ -5,7 +5,7 @@ from typing import Any
 
 from chladni.inference.result import NextMeasurement
 from chladni.report.blocks import Block, Section, Table
-from chladni.report.verdict import next_measurements
+from chladni.report.measurement_table import next_measurements
 from chladni.report.words import odds_of
 from chladni.workflows.before_any_test import PlannedTests
 
