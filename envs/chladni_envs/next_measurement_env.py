@@ -50,6 +50,8 @@ class NextMeasurementEnv(gym.Env[np.ndarray, np.int64]):
     odds : that settle an explanation
     budget : in units of one more sensor
     price : bits that a unit of cost takes
+    without : kinds or dofs that are no candidates; with drive, mass, band and weighing, sensors
+        are placed so that they separate the explanations
     case : a deck or case; with ``effects`` it gives outlooks, as ``chladni next`` does before any
         test
     effects : names of effects, two and more
@@ -68,12 +70,14 @@ class NextMeasurementEnv(gym.Env[np.ndarray, np.int64]):
         odds: float = ODDS,
         budget: float = 6.0,
         price: float = 0.1,
+        without: Sequence[str] = (),
         case: "str | Path | Model | None" = None,
         effects: Sequence[str] = (),
         render_mode: str | None = None,
         **words: Any,
     ) -> None:
-        self.outlooks = _outlooks(outlook, case, effects, words)
+        every = _outlooks(outlook, case, effects, words)
+        self.outlooks = tuple(o.without(without) for o in every)
         first = self.outlooks[0]
         if len(first.names) < 2:
             raise ShapeError("nothing is tied in this outlook; the game needs two explanations")

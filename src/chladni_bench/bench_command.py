@@ -87,6 +87,12 @@ def run(
             "moves its supports; default: from the table of sensors or the plan."
         ),
     ] = "",
+    add: Annotated[
+        Path | None,
+        typer.Option(
+            help="plan.json of chladni next: test the same article again, in these places too."
+        ),
+    ] = None,
     units: Units = None,
     allow: Allow = None,
     pictures: Pictures = False,
@@ -123,11 +129,43 @@ def run(
         with tempfile.TemporaryDirectory() as scratch:
             stage = within(job.progress, 0.0, 0.2)
             case = _case(source, units, allow or [], sensors, input, Path(scratch), stage)
+            if add is not None:
+                case, added = _with_added(case, add)
+                settings = replace(settings, added=added)
             found = virtual_test(case, settings, progress=within(job.progress, 0.2, 0.95))
             job.progress("writing", 0.95)
             job.files += write_bench(job.folder, case, found)
         job.json("bench.json", to_json(found))
         job.show(bench_page(found))
+
+
+def _with_added(case: Case, path: Path) -> tuple[Case, int]:
+    """The case with the places of a plan of ``chladni next``, and how many sensors are new.
+
+    A known mass is a sensor of that mass; a drive takes the place of the earlier one.
+    """
+    try:
+        plan = json.loads(path.read_text(encoding="utf-8"))
+        rows = [(str(m["label"]), float(m.get("mass_kg", 0.0)))
+                for kind in ("sensors", "masses") for m in plan[kind]]  # fmt: skip
+        drives, band = [str(m["label"]) for m in plan["drives"]], plan["band_hz"]
+    except OSError as error:
+        raise FileError(f"--add {path} cannot be read: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise FileError(f"--add {path} is not a plan.json of chladni next ({error})") from error
+    if band:
+        raise FileError(
+            f"--add {path}: lines up to {band[0]:.4g} Hz belong to a test of its own; run chladni "
+            "next --without band"
+        )
+    where = f"--add {path.name}"
+    sensors = [replace(exciter(n, where), role="output", mass=kg) for n, kg in rows]
+    outputs = case.outputs.joined(placed(case.assembly, sensors, where))
+    inputs = case.inputs
+    if drives:
+        inputs = placed(case.assembly, [exciter(drives[0], where)], where)
+    added = len(outputs.labels) - len(case.outputs.labels)
+    return replace(case, outputs=outputs, inputs=inputs), added
 
 
 def _factors(text: str) -> tuple[float, ...]:

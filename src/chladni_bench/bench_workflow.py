@@ -72,6 +72,7 @@ class BenchSettings:
     room : m/s² rms by which sound and floor move the median accelerometer, in the band
     rubber : whether rubber is taped to the cords' ends, so that they hardly ring
     keep_time : whether time data are kept
+    added : number of the last sensors that an earlier test of the same article did not have
     """
 
     excitation: Kind = "burst-random"
@@ -91,6 +92,7 @@ class BenchSettings:
     rubber: bool = False
     room: float = 0.0
     keep_time: bool = False
+    added: int = 0
 
     def __post_init__(self) -> None:
         refuse_fields(self)
@@ -300,8 +302,9 @@ def _article(
     if settings.finer:
         made = refined(made)
     hangers = np.array(case.setup.hangers, dtype=np.int64)
-    gains, drive = np.ones(len(case.outputs.labels)), _driven(case)
-    held = Article(made, case.assembly, _grids(case, case.outputs), hangers, gains, drive=drive)
+    n = len(case.outputs.labels) - settings.added
+    first, drive = case.outputs.first(n), _driven(case)
+    held = Article(made, case.assembly, _grids(case, first), hangers, np.ones(n), drive=drive)
     for name in settings.hide:
         if name == "shaker-restraint" and drive is None:
             raise FileError(f"{case.path} moves its supports, so it has no stinger")
@@ -309,16 +312,20 @@ def _article(
             raise FileError(f"{case.path} names no hangers, so it has no cords")
         held = family(name).conceal(held, rng)
         truth["effects"][name] = held.truth  # type: ignore[index]
-    places = true_places(held.assembly, case.outputs, case.inputs, setup.accelerometer, rng)
+    kind, later = setup.accelerometer, np.random.default_rng([settings.seed, 9])
+    places = true_places(held.assembly, first, case.inputs, kind, rng)
+    if settings.added:  # the draws of the article follow those of its first sensors
+        whole = true_places(held.assembly, case.outputs, case.inputs, kind, later)
+        places = whole.beginning_with(places)
     article = benched(
         held.assembly, case.outputs, case.inputs, case.setup.hangers, places, band[1], scatter, rng
     )
-    off = float(held.off_scale)
+    off, gains = float(held.off_scale), np.append(held.gains, np.ones(settings.added))
     truth["sensors"] = {
         label: {"point_m": x, "direction": d}
         for label, x, d in zip(case.outputs.labels, places.points, places.directions, strict=True)
     }  # type: ignore[assignment]
-    return replace(article, weight=article.weight - off, gains=held.gains), truth
+    return replace(article, weight=article.weight - off, gains=gains), truth
 
 
 def _grids(case: Case, at: MeasuredDofs) -> np.ndarray:

@@ -38,6 +38,13 @@ class TruePlaces:
     directions: np.ndarray
     grids: np.ndarray  # (n,) int: 0 where the place is no grid
 
+    def beginning_with(self, first: "TruePlaces") -> "TruePlaces":
+        """The places with others for the first of them."""
+        return TruePlaces(*(
+            np.concatenate([first_own, own[len(first_own) :]])
+            for first_own, own in zip(vars(first).values(), vars(self).values(), strict=True)
+        ))  # fmt: skip
+
 
 def true_places(
     assembly: Assembly, outputs: MeasuredDofs, inputs: MeasuredDofs, kind: AccelerometerType,

@@ -8,6 +8,7 @@ import typer
 from chladni.cli.run import Allow, DeckOrCase, Out, Pictures, Units, started
 from chladni.progress import within
 from chladni.report.result_json import to_json
+from chladni.workflows.before_any_test import before_any_test
 from chladni.workflows.loaded_model import model_in_si
 
 from . import PlanSettings
@@ -56,6 +57,13 @@ def run(
             help="Predict the smallest mass, softening and thinning that the layout finds.",
         ),
     ] = False,
+    separate: Annotated[
+        str,
+        typer.Option(
+            help="Predict if the layout separates these effects, for example "
+            "weld-missing,adhesive-stiffness, and the sensors that would."
+        ),
+    ] = "",
     noise: Annotated[
         float, typer.Option(help="Expected noise relative to |H|, for --detect.", min=1e-5, max=0.5)
     ] = 0.01,
@@ -80,6 +88,7 @@ def run(
     )
     from .detectable_page import detectable_section
     from .plan_page import plan_page
+    from .separation_page import separation_json, separation_section
 
     with started("plan", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
@@ -97,4 +106,23 @@ def run(
             job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
             section = detectable_section(model, smallest, noise)
             parts = replace(parts, sections=[*parts.sections, section])
+        if separate:
+            names, stage = _names(separate), within(job.progress, 0.8, 1.0)
+            made = before_any_test(
+                model, names, job.folder / "plan.json", top=durations(found).band_hz[1],
+                progress=stage,
+            )  # fmt: skip
+            every = made.advised(without=("drive", "mass", "band", "weighing"))
+            job.json("separate.json", separation_json(made, every), "what it separates")
+            section = separation_section(made, every)
+            parts = replace(parts, sections=[*parts.sections, section])
         job.show(parts)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    """Names with commas between them.
+
+    >>> _names("crack, point-mass")
+    ('crack', 'point-mass')
+    """
+    return tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))

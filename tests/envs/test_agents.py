@@ -330,3 +330,10 @@ def test_a_run_is_played(tmp_path):
     end = agents.play(env, agents.at_random(0), seed=0)
     assert end["names"] == tied_plate().names
     assert len(end["labels"]) == len(end["kept"])
+
+
+def test_sensors_alone_are_placed_to_separate():
+    env = gym.make(NEXT, without=("mass",))
+    assert env.action_space.n == 49
+    end = agents.play(env, agents.most_informative(env), seed=0)
+    assert all(label.startswith("sensor") for label in end["labels"])

@@ -150,6 +150,27 @@ def test_calibration_stands_for_what_the_catalogue_lacks(one_of, due):
     assert_allclose(probability, 1 / len(due) if due else [])
 
 
+@pytest.mark.parametrize(
+    ("verdict", "one_of", "due"),
+    [
+        ("missing physics", (), ["crack"]),
+        ("calibration only", (), [""]),
+        ("measurement fault", (), []),
+        ("missing physics", ("crack",), []),
+    ],
+)
+def test_the_only_explanation_stands_alone(verdict, one_of, due):
+    """The named effect, or calibration; a fault or half of a tie is no explanation."""
+    crack, null = SimpleNamespace(name="crack"), SimpleNamespace(name="")
+    named = verdict == "missing physics"
+    found = SimpleNamespace(verdict=verdict, found=crack if named else None, null=null)
+    case, decision = SimpleNamespace(null=null), SimpleNamespace(one_of=one_of, order=[])
+    fits, names, probability = open_explanations(case, decision, found)
+    assert names == due
+    assert [f.name for f in fits] == due
+    assert len(probability) == len(due)
+
+
 def test_an_outlook_is_read_as_it_was_written(found, tmp_path):
     """The advice is that of the diagnosis; kinds and dofs that cannot be measured are left out."""
     write_npz(tmp_path / "outlook.npz", **arrays_of(found))

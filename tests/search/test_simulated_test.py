@@ -91,6 +91,15 @@ def test_the_command_advises_before_any_test(deck, tmp_path):
     assert set(plan) == {"sensors", "masses", "drives", "band_hz"}
 
 
+def test_a_plan_says_what_it_separates(deck, tmp_path):
+    words = ("--units", "SI", "--sensors", "2", "--modes", "1", "--drawn", "0", "--top", "200")
+    said = ran("plan", deck, *words, "--separate", ",".join(EFFECTS), "--out", tmp_path / "out")
+    assert "Explanations this layout separates" in said.stdout
+    found = json.loads((tmp_path / "out" / "separate.json").read_text())
+    assert [a["effect"] for a in found["articles"]] == list(EFFECTS)
+    assert all(abs(sum(a["probability"].values()) - 1) < 1e-6 for a in found["articles"])
+
+
 def test_settled_articles_need_no_advice(deck):
     layout = plan(deck, sensors=6, units="SI", draws=0)
     made = before_any_test(deck, EFFECTS, layout, units="SI", odds=1.0)

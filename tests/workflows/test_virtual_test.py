@@ -250,3 +250,43 @@ def test_a_deck_on_the_bench_is_named_as_the_user_names_it(demo, folder, tmp_pat
     deck.write_text(deck.read_text(encoding="latin-1").replace("\nPSHELL   ", "\nPSHELL  x", 1))
     words[words.index("--out") + 1] = tmp_path / "other"
     assert str(deck) in refused(*words)
+
+
+def advice(folder, **more):
+    plan = {"sensors": [], "masses": [], "drives": [], "band_hz": [], **more}
+    (folder / "plan.json").write_text(json.dumps(plan))
+    return folder / "plan.json"
+
+
+def test_what_was_advised_is_measured_on_the_same_article(demo, tmp_path):
+    """The same modes, damping, weight and concealed effect; new places after the old ones."""
+    words = ["bench", demo, "--band", "15:120", "--resolution", "0.5", "--averages", "4"]
+    words += ["--hide", "point-mass", "--seed", "3"]
+    free = [g for g in (2, 5, 9, 11) if f"{g}:n" not in chladni.load_case(demo).outputs.labels][:2]
+    sensors, masses = [{"label": f"{free[0]}:n"}], [{"label": f"{free[1]}:n", "mass_kg": 0.3}]
+    ran(*words, "--out", tmp_path / "one")
+    plan = advice(tmp_path, sensors=sensors, masses=masses)
+    ran(*words, "--add", plan, "--out", tmp_path / "two")
+    one, two = (
+        json.loads((tmp_path / n / "sealed/truth.json").read_text()) for n in ("one", "two")
+    )
+    for key in ("effects", "frequency_hz", "damping", "weight_kg"):
+        assert one[key] == two[key]
+    first, again = (chladni.load_case(tmp_path / n / "case") for n in ("one", "two"))
+    assert again.outputs.labels[: len(first.outputs.labels)] == first.outputs.labels
+    assert len(again.outputs.labels) == len(first.outputs.labels) + 2
+    heavier = sum(kg for _, kg in again.sensor_masses) - sum(kg for _, kg in first.sensor_masses)
+    assert heavier == pytest.approx(0.3 + 0.005)
+
+
+@pytest.mark.parametrize(
+    ("plan", "why"),
+    [
+        ({"band_hz": [300.0]}, "run chladni next --without band"),
+        ({"sensors": [{"label": "999999:n"}]}, "999999"),
+        ({"sensors": 3}, "is not a plan.json of chladni next"),
+    ],
+)
+def test_advice_that_the_bench_cannot_follow_is_one_sentence(demo, tmp_path, plan, why):
+    path = advice(tmp_path, **plan)
+    assert why in refused("bench", demo, "--add", path, "--out", tmp_path / "out")

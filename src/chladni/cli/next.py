@@ -11,7 +11,7 @@ from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..inference.result import NextMeasurement
 from ..output import run_folder, write_json, write_text
-from ..report.next_measurements import next_measurements
+from ..report.measurement_table import next_measurements
 from ..report.typed_fields import as_data
 from ..report.words import odds_of
 from ..search.next_measurement import ADVISED, FILE, ODDS, Outlook, advised, read_outlook
@@ -115,8 +115,7 @@ def _planned(made: PlannedTests) -> None:
         f"{', '.join(question.inputs.labels)}, {low:.4g} to {high:.4g} Hz"
     )
     for t in made.tests:
-        p = float(t.probability[t.names.index(t.name)])
-        say(f"an article with {t.name}: odds of the right name {odds_of(p)}")
+        say(f"an article with {t.name}: odds of the right name {odds_of(t.of_truth)}")
     n = len(made.tests) - len(made.open)
     say(f"the planned test settles {n} of {len(made.tests)} articles at {made.odds:g} : 1")
 

@@ -51,6 +51,20 @@ class MeasuredDofs(ShownBriefly):
         )
         return {int(node): x for node, x in named if node.isdecimal()}
 
+    def first(self, n: int) -> "MeasuredDofs":
+        """The first n of them; all but the last -n for a negative n."""
+        return MeasuredDofs(*(value[:n] for value in vars(self).values()))
+
+    def joined(self, other: "MeasuredDofs") -> "MeasuredDofs":
+        """These, and others whose labels are new."""
+        new = [k for k, name in enumerate(other.labels) if name not in self.labels]
+        own, added = vars(self), vars(other)
+        arrays = {
+            name: np.concatenate([value, added[name][new]])
+            for name, value in own.items() if name != "labels"
+        }  # fmt: skip
+        return MeasuredDofs((*self.labels, *(other.labels[k] for k in new)), **arrays)
+
     def rows(self, built: Structure, turning: bool = False) -> sp.csr_array:
         """Motion of each dof over the free dofs of the structure (k, n); zero for the base.
 

@@ -17,7 +17,7 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Drawing, Facts, Items, Links, Picture, Section, Table, Text
 from .calibration_blocks import study_sections
 from .level_blocks import level_section
-from .next_measurements import next_measurements
+from .measurement_table import next_measurements
 from .recording_scores import recording_scores
 from .screening_blocks import screening_section
 from .states_table import states_table

@@ -85,6 +85,12 @@ class Outlook:
             return -float(np.log(self.unknown.narrowed(made)))
         return self.rivals.forecast(made).information
 
+    def without(self, barred: Sequence[str]) -> "Outlook":
+        """The outlook without the candidates of some kinds or labels."""
+        kept = np.flatnonzero(~self.excluded(barred))
+        candidates = tuple(self.candidates[k] for k in kept)
+        return replace(self, candidates=candidates, seen=tuple(self.seen[k] for k in kept))
+
     def excluded(self, without: Sequence[str]) -> np.ndarray:
         """Mask over the candidates of some kinds or labels."""
         barred = set(without)

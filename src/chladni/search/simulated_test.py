@@ -74,6 +74,11 @@ class FirstTest:
         return bool(self.probability.max() >= odds / (1 + odds))
 
     @property
+    def of_truth(self) -> float:
+        """Probability of the concealed effect."""
+        return float(self.probability[self.names.index(self.name)])
+
+    @property
     def right(self) -> bool:
         """True if the concealed effect has the best odds."""
         return self.names[int(np.argmax(self.probability))] == self.name

@@ -1,4 +1,4 @@
-"""Tables of the measurements that would separate explanations, or narrow an interval."""
+"""Tables of the next measurements: what separates explanations, what narrows an interval."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ def next_measurements(every: Sequence[NextMeasurement], odds: float = ODDS) -> T
 
 def _narrowing(every: Sequence[NextMeasurement]) -> Table:
     """Tabulate the measurements that would narrow one interval."""
-    rows = [(m.what, number(m.bits, 2), f"{m.narrows:.0%}") for m in every]
+    rows = [(m.what, number(m.bits, 2), f"{100 * m.narrows:.0f} %") for m in every]
     what = (
         f"Each row counts the rows above it. The least known quantity is {every[0].about}. Bits: "
         "information expected about it; left: width of its interval afterwards, of that now."
