@@ -153,8 +153,8 @@ _FILES = """\
 - Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (shown,
   never fitted), `state` (the first is compared, or the one `use` names).
 - Modes with shapes (a modal model): dataset 55 of a universal file, OP2 and punch files (`.op2`,
-  `.pch`), or as `.csv`: columns `label`, `mode`, `frequency_hz`, `real`; optional `imag`, `real_sd`,
-  `imag_sd`, `damping`, `frequency_sd_hz`, as `identify` writes `shapes.csv`; or as `.npz` or `.mat`:
+  `.pch`). As `.csv`, as `identify` writes `shapes.csv`: columns `label`, `mode`, `frequency_hz`,
+  `real`; optional `imag`, `real_sd`, `imag_sd`, `damping`, `frequency_sd_hz`. As `.npz` or `.mat`:
   arrays `frequency_hz` (r,), `shapes` (n_out, r), `outputs`; optional `damping`, `shapes_sd`,
   `frequency_sd_hz`.
 - Time data, whose FRFs are estimated as `chladni test` does it. Hits, bursts, multisines, random
@@ -185,8 +185,8 @@ levels do not. The first is fitted, the others score the decks.
 Shapes may have any scale and sign, real or complex; a complex shape is turned to be as real as it
 can be. Files of one article, level and state are set-ups of one test, as are shapes of one file at
 different nodes. They need channels in common, and are merged by these. The scatter there is the
-standard deviation of the shapes, unless `shape_sd` or the file states one; else it is learned. Close
-modes may mix: between these the subspace counts, and no shape of its own.
+standard deviation of the shapes, unless `shape_sd` or the file states one; else it is learned.
+Close modes may mix: between these the subspace counts, and no shape of its own.
 
 From three levels on `identify` and `diagnose` fit elements of friction, play and stretching to each
 mode: cubic spring, gap, slider, micro-slip, drag. From four on they predict levels that are held

@@ -14,6 +14,7 @@ IDS = {
     "chladni/ActuatorPlacement-v0": "chladni_envs.actuator_placement:ActuatorPlacementEnv",
     "chladni/ParameterSelection-v0": "chladni_envs.parameter_selection:ParameterSelectionEnv",
     "chladni/Calibration-v0": "chladni_envs.calibration_env:CalibrationEnv",
+    "chladni/NextMeasurement-v0": "chladni_envs.next_measurement_env:NextMeasurementEnv",
 }
 for _id, _entry_point in IDS.items():
     if _id not in registry:

@@ -18,6 +18,7 @@ from chladni_planning import best_actuators as best_shakers
 
 from .actuator_placement import ActuatorPlacementEnv
 from .calibration_env import STRIDE, CalibrationEnv
+from .next_measurement_env import NextMeasurementEnv
 from .parameter_selection import ParameterSelectionEnv
 from .sensor_placement import SensorPlacementEnv
 
@@ -146,6 +147,58 @@ def gauss_newton(env: gym.Env[Any, Any], *, damping: float = 1e-3) -> Agent:
         return np.asarray(step / STRIDE, dtype=np.float32)
 
     return agent
+
+
+def most_informative(env: gym.Env[Any, Any], *, ahead: int = 1, best: int = 4) -> Agent:
+    """Measure what is expected to tell most about the name of the explanation for its cost.
+
+    With ``ahead`` = 2, the ``best`` few are judged by the pair that each makes with its best
+    follower.
+    """
+    inner = _measuring(env)
+
+    def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+        known, legal = inner.open, np.flatnonzero(info["action_mask"]).tolist()
+        worth = {k: known.information([k]) / inner.cost[k] for k in legal}
+        order = sorted(legal, key=lambda k: -worth[k])
+        if ahead < 2 or len(order) < 2:
+            return np.int64(order[0])
+        pairs = {
+            k: max(known.information([k, q]) / (inner.cost[k] + inner.cost[q])
+                   for q in order[: best + 1] if q != k)
+            for k in order[:best]
+        }  # fmt: skip
+        return np.int64(max(pairs, key=lambda k: (pairs[k], worth[k])))
+
+    return agent
+
+
+def most_determined(env: gym.Env[Any, Any]) -> Agent:
+    """Measure what determines the unknown of the explanations best, whichever is true.
+
+    That is effective independence on their unknowns: the largest growth of Σ_j p_j log det of the
+    information.
+    """
+    inner = _measuring(env)
+
+    def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+        known, growth = inner.open, np.full(len(info["action_mask"]), -np.inf)
+        for k in np.flatnonzero(info["action_mask"]):
+            F = known.seen[k].factors
+            growth[k] = sum(
+                p * np.linalg.slogdet(np.eye(len(f)) + f @ f.T)[1]
+                for p, f in zip(known.rivals.probability, F, strict=True)
+            )
+        return np.int64(first_max(growth / inner.cost))
+
+    return agent
+
+
+def _measuring(env: gym.Env[Any, Any]) -> NextMeasurementEnv:
+    inner = env.unwrapped
+    if not isinstance(inner, NextMeasurementEnv):
+        raise ShapeError("this agent measures; make it for NextMeasurement-v0")
+    return inner
 
 
 def play(env: gym.Env[Any, Any], agent: Agent, *, seed: int | None = None) -> dict[str, Any]:

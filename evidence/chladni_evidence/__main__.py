@@ -19,6 +19,7 @@ from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
 from .interval_evidence import interval_evidence
+from .next_evidence import next_evidence
 from .recovery import recovery
 from .screening_evidence import TIMES
 from .screening_faults import FAULTS, tally
@@ -93,9 +94,15 @@ def _covered(options: argparse.Namespace) -> int:
     return 0
 
 
+def _advised(options: argparse.Namespace) -> int:
+    """Follow tied articles through further measurements; print the shares that were settled."""
+    next_evidence(_seeds(options), _say)
+    return 0
+
+
 COMMANDS = {
     "run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
-    "recovery": _recovered, "intervals": _covered,
+    "recovery": _recovered, "intervals": _covered, "next": _advised,
 }  # fmt: skip
 
 
@@ -142,6 +149,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     covered.add_argument("--seeds", required=True, help="first and last, as 600-607")
     covered.add_argument("--out", type=Path, required=True)
+    ahead = commands.add_parser("next", help="further measurements of tied articles, by agent")
+    ahead.add_argument("--seeds", required=True, help="first and last, as 600-603")
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

@@ -1,5 +1,6 @@
 """The known methods in the environments are the known methods, and score what theory says."""
 
+from dataclasses import replace
 from itertools import product
 
 import gymnasium as gym
@@ -8,9 +9,12 @@ import pytest
 
 import chladni_envs  # noqa: F401
 from chladni.errors import LabelError, ShapeError
+from chladni.inference.expected_information import Predicted, Rivals
+from chladni.output import write_npz
+from chladni.search.next_measurement import arrays_of
 from chladni_envs import agents
 from chladni_envs.parameter_selection import drawn
-from chladni_envs.small_specimens import plate
+from chladni_envs.small_specimens import plate, tied_plate
 from chladni_planning import (
     Rules,
     Walk,
@@ -251,3 +255,78 @@ def test_exchange_is_what_the_core_finds():
     end = agents.play(env, agents.exchange(env))
     core = best_layout(random_shapes(), 9, starts=10)
     np.testing.assert_array_equal(np.flatnonzero(end["kept"]), core)
+
+
+NEXT = "chladni/NextMeasurement-v0"
+
+
+@pytest.mark.parametrize("of", [agents.most_informative, agents.most_determined])
+def test_measuring_what_tells_most_beats_chance(of):
+    """Over the same truths; and information about the name beats that about the unknowns."""
+    env = gym.make(NEXT)
+    mean = {
+        name: np.mean([agents.play(env, agent, seed=k)["score"] for k in range(10)])
+        for name, agent in (("of", of(env)), ("random", agents.at_random(0)))
+    }
+    assert mean["of"] > mean["random"]
+
+
+def test_odds_are_those_of_the_data_so_far():
+    """Odds are calibrated: over many episodes the true name has the probability it was given."""
+    env, given, true = gym.make(NEXT, odds=1e9, budget=2.0), [], []
+    for k in range(200):
+        end = agents.play(env, agents.at_random(k), seed=k)
+        given.append(end["probability"])
+        true.append(np.arange(4) == end["truth"])
+    given, true = np.concatenate(given), np.concatenate(true)
+    order = np.argsort(given)
+    for some in np.array_split(order, 4):
+        p = given[some].mean()
+        assert abs(true[some].mean() - p) < 4 * np.sqrt(p * (1 - p) / len(some)) + 0.01
+
+
+def test_data_after_others_are_the_conditional_gaussian():
+    """Odds from all data at once, and from the last after the first."""
+    env = gym.make(NEXT, odds=1e9).unwrapped
+    env.reset(seed=1)
+    env.step(16)
+    known, first = env.open, env.made
+    env.step(18)
+    y = env.data[first.mean.shape[1] :, None]
+    again = known.rivals.posterior(known.seen[18], y)[:, 0]
+    np.testing.assert_allclose(again, env.probability, rtol=1e-8)
+
+
+def test_looking_ahead_takes_the_best_pair():
+    env = gym.make(NEXT)
+    observation, info = env.reset(seed=0)
+    k = agents.most_informative(env, ahead=2)(observation, info)
+    assert info["action_mask"][k]
+    one = agents.most_informative(env)(observation, info)
+    known, cost = env.unwrapped.open, env.unwrapped.cost
+    others = np.flatnonzero(info["action_mask"])
+
+    def best(k):
+        return max(known.information([k, q]) / (cost[k] + cost[q]) for q in others[::6] if q != k)
+
+    assert best(k) >= best(one) - 0.05
+
+
+def test_nothing_tied_is_no_game(tmp_path):
+    single = replace(
+        tied_plate(), names=("alone",), rivals=Rivals(np.ones(1)),
+        seen=tuple(Predicted(s.mean[:1], s.factors[:1]) for s in tied_plate().seen),
+    )  # fmt: skip
+    with pytest.raises(ShapeError, match="nothing is tied"):
+        gym.make(NEXT, outlook=single)
+    with pytest.raises(ShapeError, match="give case="):
+        gym.make(NEXT, effects=("crack", "point-mass"))
+
+
+def test_a_run_is_played(tmp_path):
+    """An outlook as a diagnosis leaves it."""
+    write_npz(tmp_path / "outlook.npz", **arrays_of(tied_plate()))
+    env = gym.make(NEXT, outlook=tmp_path)
+    end = agents.play(env, agents.at_random(0), seed=0)
+    assert end["names"] == tied_plate().names
+    assert len(end["labels"]) == len(end["kept"])

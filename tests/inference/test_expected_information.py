@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
-from chladni.inference.expected_information import Predicted, Rivals, chosen, nothing
+from chladni.inference.expected_information import (
+    OpenQuantity,
+    Predicted,
+    Rivals,
+    chosen,
+    nothing,
+)
 
 RNG = np.random.default_rng(7)
 
@@ -114,10 +120,29 @@ def test_what_both_do_not_know_hides_what_sets_them_apart():
         assert (even(2).forecast(data).information > 0.4) == shows
 
 
+def picked(rivals, every, cost, count):
+    """Positions of the chosen measurements."""
+
+    def information(ks):
+        return rivals.forecast(sum((every[k] for k in ks), nothing(every[0]))).information
+
+    return chosen(information, cost, count, rivals.entropy)
+
+
 def test_choice_takes_what_tells_most_for_its_cost():
     two, quiet = even(2), np.zeros((1, 1))
     every = [seen([quiet, quiet], [np.zeros(1), np.array([d])]) for d in (0.0, 1.0, 2.0, 3.0)]
-    assert chosen(two, every, np.ones(4), 2) == [3, 2]
-    assert chosen(two, every, np.array([1.0, 1.0, 1.0, np.inf]), 1) == [2]
-    assert chosen(two, every, np.array([1.0, 0.01, 1.0, 1.0]), 1) == [1]
-    assert chosen(two, every[:1], np.ones(1), 1) == []
+    assert picked(two, every, np.ones(4), 2) == [3, 2]
+    assert picked(two, every, np.array([1.0, 1.0, 1.0, np.inf]), 1) == [2]
+    assert picked(two, every, np.array([1.0, 0.01, 1.0, 1.0]), 1) == [1]
+    assert picked(two, every[:1], np.ones(1), 1) == []
+
+
+def test_one_quantity_is_narrowed_as_its_posterior_is():
+    """x = a z + rest: Var[x | y] from the joint covariance of x and y."""
+    F, a, rest = RNG.normal(size=(4, 3)), RNG.normal(size=3), 0.4
+    joint = np.block([[np.eye(4) + F @ F.T, (F @ a)[:, None]], [(F @ a)[None], a @ a + rest]])
+    due = joint[-1, -1] - joint[-1, :4] @ np.linalg.solve(joint[:4, :4], joint[:4, -1])
+    one = OpenQuantity("x", a, rest)
+    assert_allclose(one.variance(seen([F], [np.zeros(4)])), due)
+    assert_allclose(one.narrowed(seen([F], [np.zeros(4)])), np.sqrt(due / (a @ a + rest)))

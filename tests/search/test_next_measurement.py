@@ -2,8 +2,6 @@
 
 import json
 from dataclasses import replace
-from functools import reduce
-from operator import add
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,19 +12,16 @@ from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
 
 from chladni.decision.reasons import ALONE, BEYOND
 from chladni.fem.energy import mass_properties
-from chladni.inference.expected_information import chosen
 from chladni.output import write_npz
 from chladni.reduced.reduced_model import evaluate
-from chladni.search import next_measurement
+from chladni.search import measurement_forecasts
 from chladni.search.deciding import open_explanations
+from chladni.search.measurement_forecasts import Rival, _new, _responses, outlook
 from chladni.search.next_measurement import (
-    Rival,
-    _new,
-    _responses,
     advised,
     arrays_of,
-    outlook,
     read_outlook,
+    with_common_candidates,
 )
 
 
@@ -35,7 +30,7 @@ def few():
     """A sample of places and lines."""
     with pytest.MonkeyPatch.context() as patch:
         for name, n in (("PLACES", 12), ("MASSES", 3), ("LINES", 16)):
-            patch.setattr(next_measurement, name, n)
+            patch.setattr(measurement_forecasts, name, n)
         yield
 
 
@@ -111,13 +106,11 @@ def test_a_sensor_sees_no_difference_between_twins(problem, tied):
 
 def test_the_best_measurements_settle_what_is_tied(found):
     """Two lumps far apart: what tells most is better than weighing, and enough to settle it."""
-    cost = np.array([c.cost for c in found.candidates])
-    best = chosen(found.rivals, found.seen, cost, 2)
-    every = [found.rivals.forecast(each).information for each in found.seen]
+    every = [found.information([k]) for k in range(len(found.candidates))]
     weighing = next(k for k, c in enumerate(found.candidates) if c.kind == "weighing")
-    assert every[best[0]] > 10 * max(every[weighing], 1e-6)
-    all_ = reduce(add, [found.seen[k] for k in best])
-    assert found.rivals.forecast(all_).settled(10.0) > 0.8
+    best = advised([found], 2)
+    assert best[0].bits * np.log(2) > 10 * max(every[weighing], 1e-6)
+    assert best[-1].settles > 0.8
 
 
 def test_a_mass_put_on_is_that_of_the_changed_structure(problem, tied):
@@ -150,7 +143,8 @@ def test_calibration_stands_for_what_the_catalogue_lacks(one_of, due):
 
     order = [named("crack"), named("point-mass")]
     case, decision = SimpleNamespace(null=named("")), SimpleNamespace(one_of=one_of, order=order)
-    fits, names, probability = open_explanations(case, decision)
+    found = SimpleNamespace(verdict="not in catalogue")
+    fits, names, probability = open_explanations(case, decision, found)
     assert names == due
     assert fits == ["" if ALONE in n or BEYOND in n else n for n in due]
     assert_allclose(probability, 1 / len(due) if due else [])
@@ -161,12 +155,12 @@ def test_an_outlook_is_read_as_it_was_written(found, tmp_path):
     write_npz(tmp_path / "outlook.npz", **arrays_of(found))
     again = read_outlook(tmp_path)
     assert again.names == found.names
-    assert [m.what for m in advised(again)] == [m.what for m in advised(found)]
-    assert_allclose(*([m.bits for m in advised(o)] for o in (again, found)), rtol=1e-4)
-    first, *_ = advised(again)
-    (other, *_) = advised(again, without=[first.kind])
+    assert [m.what for m in advised([again])] == [m.what for m in advised([found])]
+    assert_allclose(*([m.bits for m in advised([o])] for o in (again, found)), rtol=1e-4)
+    first, *_ = advised([again])
+    (other, *_) = advised([again], without=[first.kind])
     assert other.kind != first.kind
-    assert [m.bits for m in advised(again)] == sorted(m.bits for m in advised(again))
+    assert [m.bits for m in advised([again])] == sorted(m.bits for m in advised([again]))
 
 
 def test_the_command_prints_the_advice_and_writes_its_files(found, tmp_path):
@@ -175,9 +169,32 @@ def test_the_command_prints_the_advice_and_writes_its_files(found, tmp_path):
     out = tmp_path / "out"
     assert "here, there" in ran("next", tmp_path / "run", "--out", out).stdout
     best = json.loads((out / "next.json").read_text())["measurements"]
-    assert [m["what"] for m in best] == [m.what for m in advised(found)]
+    assert [m["what"] for m in best] == [m.what for m in advised([found])]
     sensors = [m["label"] for m in best if m["kind"] == "sensor"]
     assert (out / "sensors.csv").read_text().split() == ["label", *sensors]
+
+
+def test_of_one_explanation_the_least_known_quantity_is_narrowed(problem, tied, tmp_path):
+    """The list narrows its interval step by step, and is read as it was written."""
+    one = outlook(problem, tied[:1], ("here",), np.ones(1))
+    own = [p.name for p in tied[0].effect.parameters]
+    assert one.unknown.name.split()[0] in own
+    best = advised([one])
+    left = [m.narrows for m in best]
+    assert left == sorted(left, reverse=True)
+    assert 0 < left[-1] < left[0] < 1
+    assert_allclose(best[-1].bits, -np.log2(left[-1]))
+    write_npz(tmp_path / "outlook.npz", **arrays_of(one))
+    assert_allclose([m.narrows for m in advised([read_outlook(tmp_path)])], left, rtol=1e-4)
+    assert "nothing is tied" in ran("next", tmp_path, "--out", tmp_path / "out").stdout
+
+
+def test_a_mean_over_cases_is_advised(found):
+    """Two equal cases are as one; candidates that only one of them has are left out."""
+    less = replace(found, candidates=found.candidates[1:], seen=found.seen[1:])
+    both = with_common_candidates([found, less])
+    assert [o.candidates for o in both] == [less.candidates, less.candidates]
+    assert advised(both) == advised([less])
 
 
 @pytest.mark.parametrize(

@@ -677,7 +677,7 @@ EVERY = {  # command that shows results of a type: its words; the case has hosti
     "modes": "", "check": "", "test": "", "frf": "--input 2:+Z --output 30:+Z", "identify": "",
     "correlate": "", "plan": "--sensors 4", "study": "--vary t=90%:110% --samples 4",
     "calibrate": "", "bench": "--band 20:60 --excitation hammer --resolution 1 --averages 2",
-    "render": "--modes 7", "map": "--units SI", "init": "",
+    "render": "--modes 7", "map": "--units SI",
 }  # fmt: skip
 
 
@@ -700,10 +700,9 @@ def test_no_page_runs_a_hostile_name(window, hostile, tmp_path, command):
     if command == "map":
         given = [hostile / "plate.bdf", tmp_path / f"{HOSTILE}.k"]
         form(*given)
-    ran(command, *given, *EVERY[command].split(), "--out", tmp_path / HOSTILE)
+    code = 3 if command == "calibrate" else 0  # its values are not to be trusted
+    ran(command, *given, *EVERY[command].split(), "--out", tmp_path / HOSTILE, code=code)
     page = tmp_path / HOSTILE / "report.html"
-    if not page.exists():  # init drafts a case and writes no page
-        return
     window.size(1280, 900)
     window.open(page)
     for name in window.run(DRAWN):

@@ -26,7 +26,7 @@ def run(
 ) -> None:
     """List every run below a folder: command, case, date, verdict, Q before and after."""
     if not folder.is_dir():
-        raise FileError(f"{folder} is no folder; chladni writes its runs into ./runs")
+        raise FileError(f"{folder} is no folder; give the one that holds the results")
     place = out or folder
     parts = index_page(folder, place)
     say(parts.lead)

@@ -1,31 +1,66 @@
-"""``chladni next``: measurements that would separate what a diagnosis left open."""
+"""``chladni next``: measurements that would separate what is open, after a diagnosis or before."""
 
+from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ..case.files_of_source import files_of
 from ..errors import FileError
+from ..inference.result import NextMeasurement
 from ..output import run_folder, write_json, write_text
 from ..report.typed_fields import as_data
 from ..report.verdict import next_measurements
-from ..search.next_measurement import ADVISED, ODDS, advised, read_outlook
-from .console import say, say_results, say_table
-from .run import folder_named
+from ..report.words import odds_of
+from ..search.next_measurement import ADVISED, FILE, ODDS, Outlook, advised, read_outlook
+from ..workflows.before_any_test import PlannedTests, before_any_test
+from ..workflows.loaded_model import model_in_si
+from .console import say, say_results, say_table, watched
+from .run import Allow, Units, folder_named
 
 
 def run(
-    folder: Annotated[Path, typer.Argument(metavar="RUN_FOLDER", help="Folder of a diagnosis.")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN_DECK_or_CASE", help="Folder of a diagnosis; with --effects a deck or case."
+        ),
+    ],
     count: Annotated[int, typer.Option(help="Number of measurements.", min=1)] = ADVISED,
     odds: Annotated[float, typer.Option(help="Odds that settle an explanation.", min=1.0)] = ODDS,
     without: Annotated[
         str, typer.Option(help="Kinds or dofs that cannot be measured, for example drive,614:n.")
     ] = "",
+    effects: Annotated[
+        str,
+        typer.Option(
+            help="Before any test: effects that must not be tied, for example "
+            "weld-missing,adhesive-stiffness."
+        ),
+    ] = "",
+    sensors: Annotated[
+        str,
+        typer.Option(
+            help="With --effects: number of planned sensors, a table of sensors or a plan.json; "
+            "default: those of the case."
+        ),
+    ] = "",
+    top: Annotated[
+        float | None, typer.Option(help="With --effects: highest frequency [Hz].", min=1e-3)
+    ] = None,
+    articles: Annotated[
+        int, typer.Option(help="With --effects: articles drawn with each effect.", min=1)
+    ] = 1,
+    seed: Annotated[int, typer.Option(help="With --effects: of the articles.", min=0)] = 0,
+    units: Units = None,
+    allow: Allow = None,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
-            help="Folder for next.json and sensors.csv.",
+            help="Folder for next.json, sensors.csv and plan.json (chladni bench --add).",
             metavar="DIR",
             parser=folder_named,
         ),
@@ -33,24 +68,94 @@ def run(
 ) -> None:
     """Say which further measurements would probably tell the open explanations apart.
 
-    The forecasts come from the diagnosis: each explanation predicts the data of every candidate,
-    with all that is not known under it.
+    After a diagnosis each explanation predicts the data of every candidate, with all that is not
+    known under it. With nothing tied, the list narrows the interval of the least known quantity.
+    Before any test, articles are drawn with each of the effects, and the planned test of each is
+    diagnosed.
     """
-    known = read_outlook(folder)
     barred = [word.strip() for word in without.split(",") if word.strip()]
-    names = {c.kind for c in known.candidates} | {c.label for c in known.candidates}
-    if unknown := [word for word in barred if word not in names]:
-        kinds = ", ".join(sorted({c.kind for c in known.candidates}))
-        raise FileError(f"--without {unknown[0]}: this is no candidate; kinds are {kinds}")
-    say(f"open: {', '.join(known.names)}")
-    every = advised(known, count, odds, barred)
-    if not every:
-        say("none of the candidates tells these explanations apart")
+    if not effects:
+        if not source.is_dir() or (source / "case.toml").is_file():
+            raise FileError(
+                f"{source} is no folder of a diagnosis; before any test give --effects, for "
+                "example --effects weld-missing,adhesive-stiffness"
+            )
+        known = read_outlook(source)
+        say(f"open: {', '.join(known.names)}" if known.unknown is None else "nothing is tied")
+        _known([known], barred)
+        every = advised([known], count, odds, barred)
+        _tell(known.names, every, odds)
+        _write(out, source / FILE, known.names, every)
         return
-    say_table(next_measurements(every, odds))
-    if out is not None:
-        with run_folder(out, "next", [folder / "outlook.npz"]) as part:
-            write_json(part / "next.json", {"open": known.names, "measurements": as_data(every)})
-            labels = [m.label for m in every if m.kind == "sensor"]
-            write_text(part / "sensors.csv", "label\n" + "".join(f"{n}\n" for n in labels))
-        say_results(out)
+    names = tuple(dict.fromkeys(word.strip() for word in effects.split(",") if word.strip()))
+    with watched() as progress:
+        layout = Path(sensors) if sensors else None
+        if sensors.isdecimal():
+            words = {"sensors": int(sensors), "modes": max(1, 4 * int(sensors) // 5), "draws": 0}
+            model = model_in_si(source, "next", units, allow or ())[0]
+            layout = import_module("chladni").plan(model, **words)
+        made = before_any_test(
+            source, names, layout, top=top, articles=articles, seed=seed, odds=odds, units=units,
+            allow=allow or (), progress=progress,
+        )  # fmt: skip
+        _known([t.outlook for t in made.open], barred)
+        every = made.advised(count, barred)
+    _planned(made)
+    if made.open:
+        _tell(names, every, odds)
+    _write(out, source, names, every)
+
+
+def _planned(made: PlannedTests) -> None:
+    """Say what the planned test alone would tell of each article."""
+    question = made.question
+    low, high = question.band
+    say(
+        f"planned: {len(question.outputs.labels)} sensors, driven at "
+        f"{', '.join(question.inputs.labels)}, {low:.4g} to {high:.4g} Hz"
+    )
+    for t in made.tests:
+        p = float(t.probability[t.names.index(t.name)])
+        say(f"an article with {t.name}: odds of the right name {odds_of(p)}")
+    n = len(made.tests) - len(made.open)
+    say(f"the planned test settles {n} of {len(made.tests)} articles at {made.odds:g} : 1")
+
+
+def _known(every: Sequence[Outlook], barred: Sequence[str]) -> None:
+    """Refuse words that are neither kinds nor dofs of the candidates."""
+    candidates = [c for known in every for c in known.candidates]
+    kinds, labels = {c.kind for c in candidates}, {c.label for c in candidates}
+    if every and (unknown := [word for word in barred if word not in kinds | labels]):
+        raise FileError(
+            f"--without {unknown[0]}: this is no candidate; kinds are {', '.join(sorted(kinds))}"
+        )
+
+
+def _tell(names: Sequence[str], every: Sequence[NextMeasurement], odds: float) -> None:
+    """Tabulate the advice."""
+    if every:
+        say_table(next_measurements(every, odds))
+    else:
+        say(f"none of the candidates tells {' and '.join(names)} apart")
+
+
+def _write(
+    out: Path | None, source: Path, names: Sequence[str], every: Sequence[NextMeasurement]
+) -> None:
+    """Write the advice, and the places for a test or the bench."""
+    if out is None:
+        return
+    by_kind = {kind: [m for m in every if m.kind == kind] for kind in ("sensor", "mass", "drive")}
+    read = files_of(source) if source.name != FILE else [source]
+    with run_folder(out, "next", read) as part:
+        write_json(part / "next.json", {"open": names, "measurements": as_data(every)})
+        labels = [m.label for m in by_kind["sensor"]]
+        write_text(part / "sensors.csv", "label\n" + "".join(f"{n}\n" for n in labels))
+        plan = {
+            "sensors": [{"label": n} for n in labels],
+            "masses": [{"label": m.label, "mass_kg": m.amount} for m in by_kind["mass"]],
+            "drives": [{"label": m.label} for m in by_kind["drive"]],
+            "band_hz": [m.amount for m in every if m.kind == "band"],
+        }
+        write_json(part / "plan.json", plan)
+    say_results(out)

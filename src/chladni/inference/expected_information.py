@@ -9,7 +9,7 @@ models Box and Hill 1967, Technometrics 9, 57-71):
 I = Σ_j p_j E[ln p(j | y) - ln p_j | j]   [nat].
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +54,16 @@ class Predicted:
         B = U[:, np.cumsum(np.maximum(lam, 0.0)) > UNSEEN].T @ B
         *factors, apart = np.split(B, np.cumsum([F.shape[1] for F in self.factors]), axis=1)
         return Predicted(np.vstack([np.zeros(len(B)), apart.T]), tuple(factors))
+
+    def after(self, made: "Predicted", y: np.ndarray) -> "Predicted":
+        """The same data after others that share their unknowns have shown y (n,)."""
+        means, factors = [], []
+        for mean, F, known, G in zip(self.mean, self.factors, made.mean, made.factors, strict=True):
+            lam, U = np.linalg.eigh(G.T @ G)
+            L = U / np.sqrt(1 + np.maximum(lam, 0.0))  # L Lᵀ = (I + GᵀG)⁻¹
+            means.append(mean + F @ (L @ (L.T @ (G.T @ (y - known)))))
+            factors.append(F @ L)
+        return Predicted(np.array(means).reshape(self.mean.shape), tuple(factors))
 
 
 def nothing(like: Predicted) -> Predicted:
@@ -133,31 +143,51 @@ class Forecast:
         return float(self.probability @ wrong.any(axis=1).mean(axis=1))
 
 
+@dataclass(frozen=True, eq=False)
+class OpenQuantity:
+    """A quantity x = x_0 + a z + rest of one explanation, z ~ N(0, I) as its data left it.
+
+    Attributes
+    ----------
+    name : in words
+    along : (k,) a
+    rest : variance that no measurement sees
+    """
+
+    name: str
+    along: np.ndarray
+    rest: float
+
+    def variance(self, seen: Predicted) -> float:
+        """Var x after data of factor F: rest + a (I + FᵀF)⁻¹ aᵀ."""
+        (F,) = seen.factors
+        return self.rest + float(
+            self.along @ np.linalg.solve(np.eye(F.shape[1]) + F.T @ F, self.along)
+        )
+
+    def narrowed(self, seen: Predicted) -> float:
+        """Standard deviation after the data over that before."""
+        return float(np.sqrt(self.variance(seen) / (self.rest + self.along @ self.along)))
+
+
 def chosen(
-    rivals: Rivals, measurements: Sequence[Predicted], cost: np.ndarray, count: int,
-    made: Predicted | None = None,
-) -> list[int]:  # fmt: skip
+    information: Callable[[Sequence[int]], float], cost: np.ndarray, count: int, most: float
+) -> list[int]:
     """Choose measurements one after the other, each with the most information for its cost.
 
     Parameters
     ----------
+    information : [nat] of some measurements together, by their positions
     cost : (c,) of each; inf excludes it
-    made : what is measured in any case
+    most : the most information that there is
     """
     out: list[int] = []
-    total = nothing(measurements[0]) if made is None else made
-    for _ in range(min(count, int(np.isfinite(cost).sum()))):
-        now = rivals.forecast(total).information
-        if now > (1 - SETTLED) * rivals.entropy:
+    now, left = 0.0, [int(k) for k in np.flatnonzero(np.isfinite(cost))]
+    while len(out) < count and left and now <= (1 - SETTLED) * most:
+        after = np.array([information([*out, k]) for k in left])
+        best = int(np.argmax((after - now) / cost[left]))
+        if not after[best] > now:
             break
-        gain = np.array([
-            -np.inf if k in out or not np.isfinite(c)
-            else (rivals.forecast(total + seen).information - now) / c
-            for k, (seen, c) in enumerate(zip(measurements, cost, strict=True))
-        ])  # fmt: skip
-        best = int(np.argmax(gain))
-        if not gain[best] > 0:
-            break
-        out.append(best)
-        total = total + measurements[best]
+        now = float(after[best])
+        out.append(left.pop(best))
     return out

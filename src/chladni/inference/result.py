@@ -124,7 +124,9 @@ class Agreement:
 
 @dataclass(frozen=True)
 class NextMeasurement:
-    """A measurement that would tell tied explanations apart, made after those listed before it.
+    """A further measurement, made after those listed before it.
+
+    It would tell tied explanations apart, or narrow the interval of a quantity of the only one.
 
     Attributes
     ----------
@@ -132,18 +134,24 @@ class NextMeasurement:
     what : in words
     label : dof; "" where it has no place
     point_m : its place [m]
+    amount : [kg] of a mass, [Hz] of the top of a band
     bits : information that all of them are expected to bring together
     settles : probability that the true explanation then has odds of 10 : 1 or better
     misleads : probability that a wrong one has
+    about : the quantity; "" where explanations are tied
+    narrows : width of its interval after them, of that before
     """
 
     kind: str
     what: str
     label: str = ""
     point_m: tuple[float, float, float] | None = None
+    amount: float = 0.0
     bits: float = 0.0
     settles: float = 0.0
     misleads: float = 0.0
+    about: str = ""
+    narrows: float = 1.0
 
 
 @dataclass(frozen=True)

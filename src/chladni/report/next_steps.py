@@ -34,9 +34,11 @@ def _steps(result: DiagnosisResult) -> list[str]:
         "calibration only": _check_values,
         "nothing missing": _keep,
     }
-    first = [*_advised(result), *_settle(result)] if result.one_of else []
+    first, last = [*_advised(result), *_settle(result)], list[str]()
+    if not result.one_of:
+        first, last = [], _advised(result)
     of_verdict = by_verdict.get(result.verdict, _keep)(result)
-    steps = [*_mend(result), *first, *of_verdict, *_weigh(result)]
+    steps = [*_mend(result), *first, *of_verdict, *_weigh(result), *last]
     return list(dict.fromkeys(steps))
 
 
@@ -52,10 +54,15 @@ def _mend(result: DiagnosisResult) -> list[str]:
 
 
 def _advised(result: DiagnosisResult) -> list[str]:
-    """Name the measurements that tell tied explanations apart, and what they will probably do."""
+    """Name the measurements that tell most, and what they will probably do."""
     if not (every := result.next_measurements):
         return []
     what = "; ".join(m.what for m in every)
+    if about := every[-1].about:
+        return [
+            f"Measure with {what}: the interval of {about}, the least known quantity, then has "
+            f"{every[-1].narrows:.0%} of its width."
+        ]
     return [
         f"Measure with {what}: one explanation then has odds of {ODDS:.0f} : 1 or better in "
         f"{100 * every[-1].settles:.0f} % of cases, and a wrong one in "

@@ -156,6 +156,8 @@ def _advised(result: DiagnosisResult) -> list[Block]:
 
 def next_measurements(every: Sequence[NextMeasurement], odds: float = ODDS) -> Table:
     """Tabulate the measurements that would separate what the data cannot."""
+    if every and every[0].about:
+        return _narrowing(every)
     rows = [
         (m.what, number(m.bits, 2), f"{100 * m.settles:.0f} %", f"{100 * m.misleads:.0f} %")
         for m in every
@@ -167,6 +169,16 @@ def next_measurements(every: Sequence[NextMeasurement], odds: float = ODDS) -> T
         "which a wrong one does."
     )
     return Table(heads, rows, ("measure",), what)
+
+
+def _narrowing(every: Sequence[NextMeasurement]) -> Table:
+    """Tabulate the measurements that would narrow one interval."""
+    rows = [(m.what, number(m.bits, 2), f"{m.narrows:.0%}") for m in every]
+    what = (
+        f"Each row counts the rows above it. The least known quantity is {every[0].about}. Bits: "
+        "information expected about it; left: width of its interval afterwards, of that now."
+    )
+    return Table(("measure", "bits", "left"), rows, ("measure",), what)
 
 
 def _mode(name: str) -> int:

@@ -74,6 +74,16 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
     return f"{text} ({number(low / scale)} to {number(high / scale)})"
 
 
+def odds_of(p: float) -> str:
+    """Odds of a probability, at most a million.
+
+    >>> odds_of(0.75), odds_of(0.2)
+    ('3 : 1', '1 : 4')
+    """
+    p = min(max(p, 1e-6), 1 - 1e-6)
+    return f"{number(p / (1 - p), 2)} : 1" if p >= 0.5 else f"1 : {number((1 - p) / p, 2)}"
+
+
 def percent(new: float | None, old: float | None) -> str:
     """Format a change in per cent, to a hundredth if it is small.
 

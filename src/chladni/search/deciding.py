@@ -27,6 +27,7 @@ from .search_round import on_common_basis, taken
 from .several import Several
 from .verdict_models import scores_of
 
+NAMED = ("missing physics", "calibration only", "nothing missing")  # by one explanation
 MOST_OPEN = 3  # effects whose further measurements are forecast
 
 Refine = Callable[[HypothesisFit], Refinement]
@@ -176,10 +177,11 @@ def _effect_set(trial: Trial, s: Several, own: Evaluated) -> EffectSet:
 
 
 def open_explanations(
-    case: Hypotheses, decision: Decision
+    case: Hypotheses, decision: Decision, found: Diagnosis
 ) -> tuple[list[HypothesisFit], list[str], np.ndarray]:
-    """Explanations that the data cannot separate: fits, names and even probabilities.
+    """Explanations that the data cannot separate, or the only one: fits, names, probabilities.
 
+    The probabilities are even.  Without an explanation that stands there is none.
     Calibration with its errors of form stands for what the catalogue lacks as well.
     """
     listed = [h for h in decision.order if h.name in decision.one_of][:MOST_OPEN]
@@ -187,6 +189,9 @@ def open_explanations(
     if other := [name for name in (ALONE, BEYOND) if name in decision.one_of]:
         listed, names = [*listed, case.null], [*names, " or ".join(other)]
     if len(listed) < 2:
-        return [], [], np.zeros(0)
+        if found.verdict not in NAMED or decision.one_of:
+            return [], [], np.zeros(0)
+        one = found.found or found.null
+        return [one], [one.name], np.ones(1)
     fits = [cast(Evaluated, h.numbers).whole for h in listed]
     return fits, names, np.full(len(listed), 1 / len(listed))

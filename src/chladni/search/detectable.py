@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..fem.modelled import modelled
+from ..inference.hypothesis_fit import UpdatingProblem
 from ..inference.likelihood import LN10, Responses
 from ..inference.residual_localisation import bumps
 from ..inference.scan import baseline, field_slopes, point_scores
@@ -60,8 +61,8 @@ class Detectable:
     weight: float
 
 
-def detectable(question: Question, noise: float = NOISE) -> Detectable:
-    """Smallest changes of the structure that a test with these sensors and shakers would find.
+def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
+    """The updating problem of a planned test; its responses are the deck's own.
 
     Parameters
     ----------
@@ -83,13 +84,23 @@ def detectable(question: Question, noise: float = NOISE) -> Detectable:
         direct=question.outputs.moved_with_base(question.inputs),
         sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
     ).rebased(reduced.model)  # fmt: skip
-    nuisance = nuisances(reduced, nominal, mesh)
-    problem = updating_problem(question, reduced, unit, nuisance, f_max)
-    x = problem.mean()
-    state = evaluate(reduced.model, problem.base, x)
-    data = replace(unit, values=unit.model(state)).allowing_errors(state)
-    weighed = problem.mass_measurement
-    base = baseline(reduced.model, problem.base, data, weighed, x)
+    problem = updating_problem(question, reduced, unit, nuisances(reduced, nominal, mesh), f_max)
+    state = evaluate(reduced.model, problem.base, problem.mean())
+    return replace(problem, data=replace(unit, values=unit.model(state)))
+
+
+def detectable(question: Question, noise: float = NOISE) -> Detectable:
+    """Smallest changes of the structure that a test with these sensors and shakers would find.
+
+    Parameters
+    ----------
+    question, noise : as in :func:`unmeasured`
+    """
+    problem = unmeasured(question, noise)
+    reduced, x, data = problem.reduced, problem.mean(), problem.data
+    assert isinstance(data, Responses)
+    data = data.allowing_errors(evaluate(reduced.model, problem.base, x))
+    base = baseline(reduced.model, problem.base, data, problem.mass_measurement, x)
     places, weight = problem.where.places, problem.setup.weight
     due = threshold(data) + 2 * float(np.log(len(places)))
     score = point_scores(
@@ -102,9 +113,10 @@ def detectable(question: Question, noise: float = NOISE) -> Detectable:
         share = 1 - np.exp(-np.sqrt(due / np.maximum(base.score(columns), 1e-12)))
         shares.append(np.where(share < MOST_CHANGE, share, np.nan))
     gained = score - base.score(base.residual[:, None])[0]
+    shells = len(reduced.structure.assembly.shells)
     return Detectable(
         places.grids, places.point, weight * _smallest(gained, due), shares[0], shares[1],
-        reduced.groups.group[: len(built.assembly.shells)], due, len(f), weight,
+        reduced.groups.group[:shells], due, len(data.s), weight,
     )  # fmt: skip
 
 

@@ -7,37 +7,26 @@ and a weighing (:mod:`..inference.expected_information`).
 """
 
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..effects.effect_context import ElementGrids
-from ..errors import FileError, ModelError
-from ..inference.discrepancy import Form, columns, form
-from ..inference.expected_information import Predicted, Rivals, chosen, nothing
-from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
-from ..inference.likelihood import LN10, Responses
-from ..inference.map_fit import prior_residuals
+from ..errors import FileError
+from ..inference.expected_information import (
+    Forecast,
+    OpenQuantity,
+    Predicted,
+    Rivals,
+    chosen,
+    nothing,
+)
 from ..inference.result import NextMeasurement
-from ..reduced.reduced_model import Reduced, State, evaluate
 
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
 ODDS = 10.0
-LINES = 24  # of a recording at which a new channel is forecast
-FEW = 4  # every so many of them, where all channels are forecast
-PLACES = 40  # grids at which sensors are tried
-MASSES = 8  # grids at which a known mass and a drive are tried
-SHARE = 0.02  # of the mass of the structure: the mass that is put on
-WEIGHED = 1e-3  # [kg] standard deviation of a good weighing
-GAIN = 0.01  # relative standard deviation of the gain of a sensor or gauge
-UNSEEN = 0.01  # of the noise: mean variance of the predictions that may be left out
-MOST_FORMS = 1000  # entries of the errors of form
-ABOVE = 1.25  # times the highest line: reach of a wider band
 
 
 @dataclass(frozen=True)
@@ -51,6 +40,7 @@ class FurtherTest:
     label : dof or grid; "" where it has no place
     point_m : (3,) [m], where it has a place
     cost : in units of one more sensor
+    amount : [kg] of a mass, [Hz] of the top of a band
     """
 
     kind: str
@@ -58,9 +48,7 @@ class FurtherTest:
     label: str = ""
     point_m: tuple[float, float, float] | None = None
     cost: float = 1.0
-
-
-COSTS = {"sensor": 1.0, "drive": 2.0, "mass": 2.0, "band": 1.5, "weighing": 0.5}
+    amount: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,37 +61,84 @@ class Outlook:
     rivals : their probabilities
     candidates : measurements
     seen : data of each candidate, as the rivals predict them
+    unknown : the quantity to be measured, where there is one explanation
     """
 
     names: tuple[str, ...]
     rivals: Rivals
     candidates: tuple[FurtherTest, ...]
     seen: tuple[Predicted, ...]
+    unknown: OpenQuantity | None = None
+
+    def made(self, measurements: Sequence[int]) -> Predicted:
+        """The data of some candidates together."""
+        return sum((self.seen[k] for k in measurements), nothing(self.seen[0]))
+
+    def information(self, measurements: Sequence[int]) -> float:
+        """Expected information [nat] of some candidates together.
+
+        It is about the name of the true explanation; of one explanation about its unknown
+        quantity, ½ ln of the ratio of variances.
+        """
+        made = self.made(measurements)
+        if self.unknown is not None:
+            return -float(np.log(self.unknown.narrowed(made)))
+        return self.rivals.forecast(made).information
+
+    def excluded(self, without: Sequence[str]) -> np.ndarray:
+        """Mask over the candidates of some kinds or labels."""
+        barred = set(without)
+        return np.array([bool(barred & {c.kind, c.label}) for c in self.candidates])
 
 
 def advised(
-    known: Outlook, count: int = ADVISED, odds: float = ODDS, without: Sequence[str] = ()
-) -> tuple[NextMeasurement, ...]:
+    every: Sequence[Outlook], count: int = ADVISED, odds: float = ODDS,
+    without: Sequence[str] = (),
+) -> tuple[NextMeasurement, ...]:  # fmt: skip
     """Choose the best few measurements, each with the most information for its cost.
 
     Parameters
     ----------
+    every : cases that are equally likely, with the same candidates
     odds : that settle an explanation
     without : kinds or labels that cannot be measured
     """
-    barred = set(without)
-    cost = np.array([np.inf if barred & {c.kind, c.label} else c.cost for c in known.candidates])
-    total, out = nothing(known.seen[0]), []
-    for k in chosen(known.rivals, known.seen, cost, count):
-        total, c = total + known.seen[k], known.candidates[k]
-        after = known.rivals.forecast(total)
-        out.append(
-            NextMeasurement(
-                c.kind, c.what, c.label, c.point_m, after.information / np.log(2),
-                after.settled(odds), after.misled(odds),
-            )
-        )  # fmt: skip
+    first, n = every[0], len(every)
+    costs = np.array([c.cost for c in first.candidates])
+    most = np.inf if first.unknown else sum(o.rivals.entropy for o in every) / n
+
+    def information(measurements: Sequence[int]) -> float:
+        return sum(o.information(measurements) for o in every) / n
+
+    ks = chosen(information, np.where(first.excluded(without), np.inf, costs), count, most)
+    out = []
+    for end in range(1, len(ks) + 1):
+        c, made = first.candidates[ks[end - 1]], ks[:end]
+        bits = information(made) / np.log(2)
+        found = NextMeasurement(c.kind, c.what, c.label, c.point_m, c.amount, bits)
+        if first.unknown is not None:
+            narrows = first.unknown.narrowed(first.made(made))
+            out.append(replace(found, about=first.unknown.name, narrows=narrows))
+            continue
+        after = [o.rivals.forecast(o.made(made)) for o in every]
+        settles, misleads = (
+            sum(share(f, odds) for f in after) / n for share in (Forecast.settled, Forecast.misled)
+        )
+        out.append(replace(found, settles=settles, misleads=misleads))
     return tuple(out)
+
+
+def with_common_candidates(every: Sequence[Outlook]) -> tuple[Outlook, ...]:
+    """The outlooks with the candidates that all of them have, in the order of the first."""
+    places = [{(c.kind, c.label): k for k, c in enumerate(o.candidates)} for o in every]
+    keys = [key for key in places[0] if all(key in other for other in places)]
+    return tuple(
+        replace(
+            o, candidates=tuple(o.candidates[at[key]] for key in keys),
+            seen=tuple(o.seen[at[key]] for key in keys),
+        )
+        for o, at in zip(every, places, strict=True)
+    )  # fmt: skip
 
 
 def arrays_of(known: Outlook) -> dict[str, np.ndarray]:
@@ -120,6 +155,9 @@ def arrays_of(known: Outlook) -> dict[str, np.ndarray]:
         "label": np.array([c.label for c in known.candidates]),
         "point_m": np.array([c.point_m or nowhere for c in known.candidates]),
         "cost": np.array([c.cost for c in known.candidates]),
+        "amount": np.array([c.amount for c in known.candidates]),
+        **({} if (x := known.unknown) is None else
+           {"unknown": np.array(x.name), "along": np.append(x.along, x.rest)}),
     }  # fmt: skip
 
 
@@ -140,257 +178,23 @@ def read_outlook(folder: Path) -> Outlook:
     try:
         with np.load(path, allow_pickle=False) as file:
             held = {name: file[name] for name in file.files}
+        held.setdefault("amount", np.zeros(len(held["cost"])))  # of runs before there was one
         where = [None if np.isnan(p).any() else tuple(p.tolist()) for p in held["point_m"]]
         each = zip(*(held[k].tolist() for k in ("kind", "what", "label")), where,
-                   held["cost"].tolist(), strict=True)  # fmt: skip
+                   held["cost"].tolist(), held["amount"].tolist(), strict=True)  # fmt: skip
         names, rows = tuple(held["names"].tolist()), len(held["ends"])
         columns_ = [held["mean"].T, *(held[f"factor_{j}"] for j in range(len(names)))]
         parts = zip(*(np.split(c.astype(float), held["ends"][:-1]) for c in columns_), strict=True)
         seen = tuple(Predicted(mean.T, tuple(factors)) for mean, *factors in parts)
         candidates = tuple(FurtherTest(*row) for row in each)
-        found = Outlook(names, Rivals(held["probability"]), candidates, seen)
+        unknown = None
+        if "unknown" in held:
+            *along, rest = held["along"].tolist()
+            unknown = OpenQuantity(str(held["unknown"]), np.array(along), rest)
+        found = Outlook(names, Rivals(held["probability"]), candidates, seen, unknown)
         shapes = {(len(s.mean), *(F.shape[0] - s.mean.shape[1] for F in s.factors)) for s in seen}
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise FileError(f"{path} is no outlook of a diagnosis: {error}") from error
     if shapes != {(len(names), *len(names) * (0,))} or rows != len(candidates):
         raise FileError(f"{path} is no outlook of a diagnosis: its matrices have another size")
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """An explanation with its own model, and what the recording left unknown of it.
-
-    The unknowns u are the parameters, in the order of the fit, and the entries of the errors of
-    form of size 1.
-    """
-
-    problem: UpdatingProblem
-    hypothesis: HypothesisFit
-
-    @property
-    def data(self) -> Responses:
-        """The fitted responses."""
-        assert isinstance(self.hypothesis.data, Responses)
-        return self.hypothesis.data
-
-    @property
-    def model(self) -> Reduced:
-        """The reduced model of the fit."""
-        return self.hypothesis.model
-
-    @cached_property
-    def state(self) -> State:
-        """The state of the fit, with slopes."""
-        return evaluate(self.model, self.hypothesis.fit.effects, self.hypothesis.fit.x)
-
-    @cached_property
-    def form(self) -> Form:
-        """Errors of form in the modes of the state."""
-        return form(self.state, float(self.data.s.imag.max()))
-
-    @cached_property
-    def strong(self) -> np.ndarray:
-        """The ``MOST_FORMS`` entries of the errors of form that move the recording most."""
-        moved = (columns(self.data, self.state, self.form) ** 2).sum(axis=0)
-        return np.argsort(-moved)[:MOST_FORMS]
-
-    def slopes(self, data: Responses, state: State) -> np.ndarray:
-        """∂r/∂u of the residuals of some data (n, n_u), in units of their noise."""
-        error = self.data.error
-        size = 0.0 if error is None else error.delta
-        J = data.scaled(state, True)[1]
-        return np.hstack([J, size * columns(data, state, self.form)[:, self.strong]])
-
-    @cached_property
-    def posterior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean of u about the fit (n_u,), and a root L of its covariance L Lᵀ (n_u, n_u)."""
-        fit, plain = self.hypothesis.fit, replace(self.data, error=None)
-        A = self.slopes(plain, self.state)
-        r = plain.scaled(self.state, False)[0]
-        r0, J0 = prior_residuals(fit.effects, self.problem.mass_measurement, fit.x, self.state)
-        P = A.T @ A
-        n = len(fit.x)
-        P[:n, :n] += J0.T @ J0
-        P[n:, n:] += np.eye(len(P) - n)
-        g = A.T @ r
-        g[:n] += J0.T @ r0
-        lam, U = np.linalg.eigh(P)
-        L = U / np.sqrt(np.maximum(lam, 1e-12 * lam[-1]))
-        return -(L @ (L.T @ g)), L
-
-    def predicted(self, data: Responses, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (n,) and factor F (n, n_u) of the residuals of data that are not yet measured."""
-        mean, L = self.posterior
-        A = self.slopes(data, state)
-        return data.scaled(state, False)[0] + A @ mean, A @ L
-
-    def weight(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (1,) and factor (1, n_u) of the mass, in units of a good weighing."""
-        mean, L = self.posterior
-        dm = np.zeros(len(mean))
-        dm[: len(self.state.dweight)] = self.state.dweight / WEIGHED
-        return np.array([self.state.weight / WEIGHED + dm @ mean]), dm[None] @ L
-
-    def with_mass(self, places: ElementGrids, k: int, kilogram: float) -> State | None:
-        """The state with a mass on the k-th grid, with slopes; None where it is no structure."""
-        b = self.model.rows(places.rows[[k]], keep=False)
-        loaded = replace(self.model, M0=self.model.M0 + kilogram * b.T @ b)
-        try:
-            return evaluate(loaded, self.hypothesis.fit.effects, self.hypothesis.fit.x)
-        except ModelError:
-            return None
-
-
-def outlook(
-    problem: UpdatingProblem, hypotheses: Sequence[HypothesisFit], names: Sequence[str],
-    probability: np.ndarray,
-) -> Outlook | None:  # fmt: skip
-    """Forecast every candidate measurement under each hypothesis; None without responses.
-
-    Parameters
-    ----------
-    hypotheses : two and more, each with its own model
-    names, probability : of each
-    """
-    if len(hypotheses) < 2 or not isinstance(problem.data, Responses):
-        return None
-    rivals = [Rival(problem, h) for h in hypotheses]
-    found = list(_measurements(problem, rivals))
-    kept = _kept([seen for _, seen in found])
-    seen = tuple(
-        Predicted(
-            np.stack([mean for mean, _ in each]),
-            tuple(F @ V for (_, F), V in zip(each, kept, strict=True)),
-        ).short
-        for _, each in found
-    )
-    known = Rivals(np.asarray(probability) / np.sum(probability))
-    return Outlook(tuple(names), known, tuple(c for c, _ in found), seen)
-
-
-Seen = list[tuple[np.ndarray, np.ndarray]]  # of each rival: mean and factor
-
-
-def _measurements(
-    problem: UpdatingProblem, rivals: Sequence[Rival]
-) -> Iterator[tuple[FurtherTest, Seen]]:
-    """Every candidate, with its prediction under each rival."""
-    data, places = rivals[0].data, problem.reduced.candidates
-    places = places.only(places.spread(PLACES))
-    few = places.only(places.spread(MASSES))
-    lines = data.s[np.unique(np.linspace(0, len(data.s) - 1, LINES).astype(int))]
-    sensors = [_new(r, rivals[0], lines, places.rows, data.inputs) for r in rivals]
-    for k in range(len(places)):
-        yield _placed("sensor", "a sensor at", places, k), [each.of_output(k) for each in sensors]
-    if not np.any(data.direct):
-        drives = [_new(r, rivals[0], lines[::FEW], data.outputs, few.rows) for r in rivals]
-        for k in range(len(few)):
-            yield _placed("drive", "a drive at", few, k), [each.of_input(k) for each in drives]
-    heavy = SHARE * problem.setup.weight
-    for k in range(len(few)):
-        states = [r.with_mass(few, k, heavy) for r in rivals]
-        if None not in states:
-            yield (
-                _placed("mass", f"{1e3 * heavy:.3g} g put on at", few, k),
-                [_new(r, rivals[0], lines[::FEW], data.outputs, data.inputs, s, states[0]).seen
-                 for r, s in zip(rivals, states, strict=True)],
-            )  # fmt: skip
-    top = float(data.s.imag.max())
-    ratio = data.s[-1].real / data.s[-1].imag
-    wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
-    yield (
-        FurtherTest("band", f"lines up to {ABOVE * top / (2 * np.pi):.4g} Hz", cost=COSTS["band"]),
-        [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals],
-    )
-    yield (
-        FurtherTest("weighing", f"a weighing to {1e3 * WEIGHED:.2g} g", cost=COSTS["weighing"]),
-        [r.weight() for r in rivals],
-    )
-
-
-def _placed(kind: str, what: str, places: ElementGrids, k: int) -> FurtherTest:
-    """A candidate at the k-th grid, along the normal of its surface."""
-    x, y, z = places.point[k].tolist()
-    label = f"{places.grids[k]}:n"
-    return FurtherTest(kind, f"{what} {label}", label, (x, y, z), COSTS[kind])
-
-
-@dataclass(frozen=True, eq=False)
-class Channels:
-    """Responses of several channels under one rival, in units of their noise.
-
-    Attributes
-    ----------
-    mean : (2, n_f, n_out, n_in)       real and imaginary part
-    factor : (2, n_f, n_out, n_in, n_u)
-    gain : (n_f, n_out, n_in)          an error of gain of one standard deviation, real part
-    """
-
-    mean: np.ndarray
-    factor: np.ndarray
-    gain: np.ndarray
-
-    @property
-    def seen(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (n,) and factor (n, n_u) of channels of known gain."""
-        return self.mean.ravel(), self.factor.reshape(self.mean.size, -1)
-
-    def of_output(self, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and factor of one output with a gain of its own."""
-        return self._with_gain(np.s_[:, :, k : k + 1])
-
-    def of_input(self, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and factor of one input with a gain of its own."""
-        return self._with_gain(np.s_[:, :, :, k : k + 1])
-
-    def _with_gain(self, at: tuple[slice, ...]) -> tuple[np.ndarray, np.ndarray]:
-        mean, F, gain = self.mean[at], self.factor[at], self.gain[at[1:]]
-        v = np.stack([gain, np.zeros_like(gain)]).ravel()
-        size = np.sqrt(v @ v)
-        v, less = v / size, 1 - 1 / np.sqrt(1 + size**2)  # C^-½ of C = I + v vᵀ
-        mean, F = mean.ravel(), F.reshape(mean.size, -1)
-        return mean - less * (v @ mean) * v, F - less * np.outer(v, v @ F)
-
-
-def _new(
-    rival: Rival, first: Rival, lines: np.ndarray, outputs: Any, inputs: Any,
-    state: State | None = None, about: State | None = None,
-) -> Channels:  # fmt: skip
-    """Responses on some lines under a rival, compared with those of the first rival."""
-    given = _responses(first, lines, outputs, inputs)
-    values = given.model(elsewhere(first.state if about is None else about))
-    given = replace(given, values=values, level=np.abs(values).max(axis=0))
-    rows = replace(given, a=rival.model.rows(outputs, keep=False),
-                   b=rival.model.rows(inputs, keep=False))  # fmt: skip
-    mean, F = rival.predicted(rows, elsewhere(rival.state if state is None else state))
-    shape = (2, *values.shape)
-    return Channels(mean.reshape(shape), F.reshape(*shape, -1), GAIN / LN10 / given.std())
-
-
-def elsewhere(state: State) -> State:
-    """The state without what effects do to the shapes and gains of the measured places alone."""
-    return replace(state, moved=None, dmoved={}, offset=None, doffset=None)
-
-
-def _responses(rival: Rival, lines: np.ndarray, outputs: Any, inputs: Any) -> Responses:
-    """Responses of a rival at some dofs on some lines, of which no value is known yet."""
-    data = rival.data
-    n = (len(lines), outputs.shape[0], inputs.shape[0])
-    noise = None if data.noise is None else np.full(n, float(np.median(data.noise)))
-    return replace(
-        data, values=np.ones(n, complex), s=lines, outputs=outputs, inputs=inputs,
-        use=np.ones(n[:2], bool), a=rival.model.rows(outputs, keep=False),
-        b=rival.model.rows(inputs, keep=False), noise=noise, spread=None,
-        level=None, bent=None, error=None, about=None, direct=0.0, sensors=None, known=None,
-    )  # fmt: skip
-
-
-def _kept(every: Sequence[Seen]) -> list[np.ndarray]:
-    """Directions (n_u, k) of each rival's unknowns that the measurements can see."""
-    out = []
-    for j in range(len(every[0])):
-        G = sum(F.T @ F / len(F) for F in (seen[j][1] for seen in every)) / len(every)
-        lam, U = np.linalg.eigh(G)
-        out.append(U[:, np.cumsum(np.maximum(lam, 0.0)) > UNSEEN])
-    return out

@@ -83,6 +83,7 @@ class Note:
     x: float
     y: float
     text: str
+    above: bool = False  # True: a little above the place; False: over it
 
 
 @dataclass(frozen=True, eq=False)

@@ -164,8 +164,8 @@ def _add_panel(
     for n in panel.notes:
         high = float(np.log10(n.y)) if panel.y.log else n.y  # Plotly's annotations are in decades
         words = escape(n.text, False)
-        layout["annotations"].append({**note, "x": n.x, "y": high, "xref": x, "yref": y,
-                                      "text": words})  # fmt: skip
+        place = {"x": n.x, "y": high, "xref": x, "yref": y, "yshift": 12 * n.above}
+        layout["annotations"].append({**note, **place, "text": words})
     if panel.title:
         layout["annotations"].append(_title(panel.title, x, y))
     if panel.equal:

@@ -174,7 +174,7 @@ def steps(
         said = [f"{v:.4g}" + (f" ({round(100 * (v / first - 1)):+d} %)" if j and first else "")
                 for j, v in enumerate(value)]  # fmt: skip
         points.append(Series(side, at, drawn, "both", tints[side], size=7, tips=said))
-        notes += [Note(x, 1.25 * y, text) for x, y, text in zip(at, drawn, said, strict=True)]
+        notes += [Note(x, y, text, True) for x, y, text in zip(at, drawn, said, strict=True)]
     lines = [Mark(v, "x", tints[side], "dash", f"{of}, {side}")
              for side, v in (floors or {}).items() if v > 0 and side in sides]  # fmt: skip
     axis = ChartAxis("Q", log=True, limits=(low, high))

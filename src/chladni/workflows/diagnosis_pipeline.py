@@ -43,7 +43,8 @@ from ..search.diagnosis import diagnose as compared
 from ..search.frequency_table import frequency_error, frequency_rows
 from ..search.left_frequencies import left_frequencies
 from ..search.measured_modes import MeasuredModes, measured_modes
-from ..search.next_measurement import Outlook, advised, outlook
+from ..search.measurement_forecasts import outlook
+from ..search.next_measurement import Outlook, advised
 from ..search.other_recordings import scored_others
 from ..search.preparation import NOT_WEIGHED
 from ..search.question import Prepared, Question
@@ -190,7 +191,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     ahead = known.outlook
     return replace(
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
-        outlook=ahead, next_measurements=() if ahead is None else advised(ahead),
+        outlook=ahead, next_measurements=() if ahead is None else advised([ahead]),
     )  # fmt: skip
 
 
@@ -216,7 +217,9 @@ def _apply_held_out(
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
     case, decision = decided(prepared, made.found, made.refine)
     found, distrust = concluded(prepared, made.found, case, decision)
-    ahead = outlook(prepared.problem, *open_explanations(case, decision)) if diagnosing else None
+    ahead = None
+    if diagnosing:
+        ahead = outlook(prepared.problem, *open_explanations(case, decision, found))
     plain = refined(made.question, prepared, found.plain, written=True)
     found = replace(found, plain=plain.hypothesis)
     if found.found is not None:

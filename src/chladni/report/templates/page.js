@@ -93,12 +93,14 @@ const VIEWS = { X: [[1, 0, 0], [0, 0, 1]], Y: [[0, -1, 0], [0, 0, 1]], Z: [[0, 0
 const FOOT = 66, FLAT = { l: 0, r: 0, t: 0, b: FOOT };  // [px] for the axes, a legend, a colour bar
 
 // ``bar`` pixels of the width are left to a colour bar.
-function stage(at, mesh, box, from, bar = 0) {
-  const xyz = places(mesh), room = 0.22 * mesh.size;  // of pins, and of shapes that move
+function stage(at, mesh, box, from, bar = 0, balls = []) {
+  const xyz = places(mesh), room = Math.max(0.22 * mesh.size, ...balls.map((b) => b.radius));  // of pins, and of shapes that move
   const least = (axis) => axis.reduce((a, b) => Math.min(a, b), Infinity), most = (axis) => axis.reduce((a, b) => Math.max(a, b), -Infinity);
   const range = xyz.map((axis) => [least(axis) - room, most(axis) + room]), long = range.map(([a, b]) => b - a), centre = range.map(([a, b]) => (a + b) / 2);
   const first = !at.view, view = (at.view ??= { eye: mesh.eye, up: mesh.up, ...from, zoom: 1 });
-  const share = ([a, b] = [0, 1]) => b - a, reach = (d) => most(xyz[0].map((_, n) => Math.abs(d[0] * (xyz[0][n] - centre[0]) + d[1] * (xyz[1][n] - centre[1]) + d[2] * (xyz[2][n] - centre[2])))) + 0.06 * mesh.size;
+  const share = ([a, b] = [0, 1]) => b - a, [u, v, w] = xyz.map((axis, k) => axis.map((value) => value - centre[k]));
+  const far = (d, b) => Math.abs(dot(d, b.at) - dot(d, centre)) + b.radius;
+  const reach = (d) => Math.max(most(u.map((_, n) => Math.abs(d[0] * u[n] + d[1] * v[n] + d[2] * w[n]))) + 0.06 * mesh.size, ...balls.map((b) => far(d, b)));
   const frame = () => { const toward = unit(view.eye), right = unit(cross(view.up, toward)); return [right, cross(toward, right), toward]; };
   function fitted(domain) {  // a structure that turns stays within its picture
     const [right, above, toward] = frame(), high = (at.clientHeight - FOOT) * share(domain.y), wide = ((at.clientWidth - bar) * share(domain.x)) / high;
@@ -183,7 +185,7 @@ const SYMBOLS = { sensors: ["neutral", "circle"], "held-out sensors": ["neutral"
 
 function structure(at, data, shared, box) {
   const mesh = shared.mesh, xyz = places(mesh), traces = [], tints = ["found", "warn"];
-  const meant = new Map(data.spots.toReversed().flatMap((s) => s.parts.map((part) => [part, s]))), seen = stage(at, mesh, box, data.from);
+  const meant = new Map(data.spots.toReversed().flatMap((s) => s.parts.map((part) => [part, s]))), balls = data.spots.flatMap((s) => s.at.slice(0, 3).map((at) => ({ at, radius: s.radius }))), seen = stage(at, mesh, box, data.from, 0, balls);
   if (mesh.i.length) {
     traces.push(sheet(mesh, xyz, {}, meant.size ? (f) => !meant.has(mesh.part[f]) : null));
     for (const [part, s] of meant) traces.push(sheet(mesh, xyz, { color: colour(tints[s.rank]), hovertext: mesh.ids.map((id) => `grid ${id}, ${wrapped(s.text)}`) }, (f) => mesh.part[f] === part));

@@ -1,0 +1,185 @@
+"""First tests of articles in which an effect is concealed, and what their recordings leave open.
+
+Before any test, each effect of interest is put into the deck at random, in size and place, as the
+virtual bench conceals it.  The planned sensors record the responses of that article.  All effects
+of interest are then fitted to the recording, as in a diagnosis.  What it leaves open is the
+question of further measurements (:mod:`.next_measurement`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..effects.effect import Effect
+from ..effects.family import Article
+from ..effects.registry import family
+from ..errors import FileError, ModelError
+from ..fem.energy import mass_properties
+from ..fem.modelled import modelled
+from ..geometry.sampling import nearest_points
+from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
+from ..inference.likelihood import Responses
+from ..inference.map_fit import Fit, MassMeasurement, Status
+from ..model.assembly import Assembly
+from ..progress import Progress, silent, within
+from ..reduced.reduced_model import evaluate
+from ..reduced.reduced_problem import ReducedProblem, reduced_problem
+from .candidates import candidates
+from .detectable import NOISE, unmeasured
+from .diagnosis import without_effects
+from .measurement_forecasts import outlook
+from .next_measurement import Outlook
+from .preparation import SOLVED
+from .question import Question
+from .search_round import search_round
+
+WEIGHED_SD = 0.002  # of the mass
+LEAST = 1e-9  # probability of a rival, so that its logarithm exists
+
+
+@dataclass(frozen=True, eq=False)
+class FirstTest:
+    """The first test of an article with a concealed effect, and fits of the rival explanations.
+
+    Attributes
+    ----------
+    name : of the concealed effect
+    truth : as the article states it
+    problem : with the recording
+    reduced : of the article itself
+    hypotheses, names : of the rivals
+    probability : of each after the recording
+    """
+
+    name: str
+    truth: dict
+    problem: UpdatingProblem
+    reduced: ReducedProblem
+    hypotheses: tuple[HypothesisFit, ...]
+    names: tuple[str, ...]
+    probability: np.ndarray
+
+    @cached_property
+    def outlook(self) -> Outlook:
+        """Forecasts of further measurements."""
+        found = outlook(self.problem, self.hypotheses, self.names, self.probability)
+        assert found is not None
+        return found
+
+    def settled(self, odds: float) -> bool:
+        """True if one explanation has these odds already."""
+        return bool(self.probability.max() >= odds / (1 + odds))
+
+    @property
+    def right(self) -> bool:
+        """True if the concealed effect has the best odds."""
+        return self.names[int(np.argmax(self.probability))] == self.name
+
+    @property
+    def itself(self) -> HypothesisFit:
+        """The article as an explanation without unknowns."""
+        data, model = self.problem.data, self.reduced.model
+        assert isinstance(data, Responses)
+        state, none = evaluate(model, (), np.zeros(0)), np.zeros((0, 0))
+        own = replace(data, sensors=None, known=None, error=None).rebased(model)
+        fit = Fit((), np.zeros(0), none, 0.0, 0.0, state, own, Status.CONVERGED)
+        return HypothesisFit(Effect(), fit, model)
+
+
+def first_tests(
+    question: Question, names: Sequence[str], each: int = 1, noise: float = NOISE, seed: int = 0,
+    scatter: float = 0.0, progress: Progress = silent,
+) -> Iterator[FirstTest]:  # fmt: skip
+    """Test articles with each of the effects concealed in turn, and fit all of the effects.
+
+    Parameters
+    ----------
+    question : without a recording; its band and sensors are the planned ones
+    names : of the effects, two and more
+    each : articles with each effect
+    noise : of |H|, at every line that is compared
+    scatter : of the articles' E, rho and t, in units of their prior standard deviation
+
+    Raises
+    ------
+    FileError
+        If an effect has nothing to act on in this deck.
+    """
+    question = replace(question, effects=tuple(names))
+    if question.mass_measurement is None:
+        mass = mass_properties(question.assembly)[0]
+        question = replace(question, mass_measurement=MassMeasurement(mass, WEIGHED_SD * mass))
+    progress("the planned test", 0.0)
+    problem = unmeasured(question, noise)
+    jobs = [name for _ in range(each) for name in names]
+    for n, name in enumerate(jobs):
+        stage = within(progress, 0.2 + 0.8 * n / len(jobs), 0.2 + 0.8 * (n + 1) / len(jobs))
+        stage(f"an article with {name}", 0.0)
+        rng = np.random.default_rng([seed, n])
+        yield _tested(question, problem, name, rng, noise, scatter)
+
+
+def _tested(
+    question: Question, problem: UpdatingProblem, name: str, rng: np.random.Generator,
+    noise: float, scatter: float,
+) -> FirstTest:  # fmt: skip
+    """Conceal an effect, record the article, and fit all families of the problem."""
+    made = _scattered(problem, question.assembly, rng, scatter)
+    article = _article(question, made)
+    try:
+        article = family(name).conceal(article, rng)
+    except (ModelError, ValueError, IndexError) as error:
+        raise FileError(f"{name}: this deck has nothing that it acts on ({error})") from error
+    f_max = problem.reduced.f_max
+    solved = modelled(question.searched(article.assembly), SOLVED * f_max)
+    rows = question.outputs.rows(solved.structure), question.inputs.rows(solved.structure)
+    reduced = reduced_problem(solved, f_max, sp.csr_array(sp.vstack(rows)))
+    data = problem.data
+    assert isinstance(data, Responses)
+    own = replace(data, outputs=rows[0], inputs=rows[1], sensors=None).rebased(reduced.model)
+    values = own.model(evaluate(reduced.model, (), np.zeros(0), False))
+    off = rng.standard_normal((2, *values.shape)) * noise
+    values = values * article.gains[:, None] * np.exp(off[0] + 1j * off[1])
+    weighed = problem.mass_measurement
+    assert weighed is not None
+    mass = article.weight - article.off_scale + weighed.sd * rng.standard_normal()
+    weighed = replace(weighed, mass=mass + sum(m for _, m in question.sensor_masses))
+    measured = replace(problem, data=replace(data, values=values), mass_measurement=weighed)
+    measured, null = without_effects(measured)
+    found = search_round(measured, null, candidates(measured, null), silent)
+    by_name = {h.effect.name: h for h in found}
+    names = tuple(f.name for f in problem.families)
+    if lost := [n for n in names if n not in by_name]:
+        raise FileError(f"{lost[0]}: this deck has nothing that it acts on")
+    fits = tuple(by_name[n] for n in names)
+    S = np.array([h.neg2_log_evidence for h in fits])
+    p = np.maximum(np.exp(-(S - S.min()) / 2), LEAST)
+    return FirstTest(name, article.truth, measured, reduced, fits, names, p / p.sum())
+
+
+def _article(question: Question, made: Assembly) -> Article:
+    """The article before an effect is concealed in it, with the deck's mesh."""
+    deck, places = question.assembly, (question.outputs, question.inputs)
+    grids, driven = (
+        np.where(at.grids > 0, at.grids, deck.ids[nearest_points(deck.points, at.points)])
+        for at in places
+    )
+    x, y, z = question.inputs.directions[0].tolist()
+    return Article(
+        made, deck, grids, np.array(question.hangers, dtype=np.int64), np.ones(len(grids)),
+        drive=(int(driven[0]), (x, y, z)),
+    )  # fmt: skip
+
+
+def _scattered(
+    problem: UpdatingProblem, made: Assembly, rng: np.random.Generator, scatter: float
+) -> Assembly:
+    """The deck with E, rho and t drawn from their priors."""
+    for effect in problem.base:
+        if effect.kind == "calibration":
+            sd = np.array([p.sd for p in effect.parameters])
+            made = effect.apply(made, scatter * sd * rng.standard_normal(len(sd)))
+    return made
