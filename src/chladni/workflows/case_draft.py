@@ -284,6 +284,8 @@ def _of_recordings(made: CaseDraft, name: object) -> list[str]:
 
 def said_of(r: Recording) -> str:
     """A recording in one sentence."""
+    if (modal := r.modal) is not None:
+        return f"{r.name}: {len(modal.frequency)} modes with shapes at {len(modal.dofs)} dofs"
     if r.poles is not None and r.frf is None:
         return f"{r.name}: {len(r.poles.frequency)} poles"
     if r.frf is None and (used := responses(r.functions)):

@@ -10,6 +10,7 @@ from tests.builders.refusals import says
 
 from chladni.io.nastran import read_op2_modes, read_op4, read_punch_modes, read_punch_responses
 from chladni.io.package_files import mesh_path
+from chladni.io.tables.read_tables import read_recordings
 
 rng = np.random.default_rng(5)
 
@@ -48,6 +49,11 @@ def test_eigenvectors(tmp_path):
     np.testing.assert_allclose(found.frequency, hertz, rtol=1e-6)
     assert found.ids.tolist() == [7, 11, 20, 90001]
     np.testing.assert_allclose(found.shapes, shapes, rtol=1e-5)
+    (one,) = read_recordings(path)
+    assert one.modal is not None
+    np.testing.assert_allclose(one.modal.frequency, hertz[1:], rtol=1e-6)
+    assert one.modal.dofs[2:5] == ("7:+Z", "11:+X", "11:+Y")
+    np.testing.assert_allclose(one.modal.values, shapes[:, :3, 1:].reshape(12, 3), rtol=1e-5)
 
 
 @pytest.mark.parametrize("polar", [False, True])
