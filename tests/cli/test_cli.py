@@ -24,7 +24,7 @@ from chladni.io.formed_files import read_formed
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS
 from chladni.view import scene
-from chladni.workflows.diagnosis_pipeline import _deck
+from chladni.workflows.decks_of_diagnosis import _deck
 from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import box, folded_panel, plate
 from chladni_specimens.tailgate.design import TailgateDesign

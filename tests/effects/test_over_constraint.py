@@ -19,7 +19,7 @@ from chladni.model.assembly import RigidBody
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni.search.fastener_scan import loosened_rows, singles
-from chladni.workflows.diagnosis_pipeline import as_it_is
+from chladni.workflows.decks_of_diagnosis import as_it_is
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
 from chladni_specimens.joints.bolts import screw
 from chladni_specimens.plates import STEEL

@@ -7,6 +7,7 @@ import pytest
 from tests.builders.tube_frames import frame_deck, recorded_shapes
 
 import chladni
+from chladni.ema.setup import Recording, Shapes
 from chladni.errors import FileError
 from chladni.io.tables.read_tables import read_recordings
 from chladni.workflows.case_draft import draft, sensors_text
@@ -165,3 +166,16 @@ def test_states_of_modal_models(frame: Path, tmp_path: Path) -> None:
     assert other.recordings[0].modal is not None
     assert other.recordings[0].modal.dofs == one.recordings[0].modal.dofs == read.outputs.labels
     assert not [note for note in read.notes if "not used" in note]
+
+
+def test_of_many_nodes_an_even_sample_is_compared(frame: Path, tmp_path: Path) -> None:
+    """A file of results moves every grid; of 400 nodes a quarter is enough, from end to end."""
+    shapes = read_recordings(frame / "shapes.unv")[0].shapes
+    r = len(shapes.frequency)
+    values = np.random.default_rng(0).normal(size=(800, r))
+    dofs = tuple(f"{k}:{c}" for k in range(1, 401) for c in ("+X", "+Z"))
+    one = Shapes(shapes.frequency, shapes.damping, values, dofs)
+    found = Recording("many", poles=one.poles(), shapes=one).modal
+    assert found is not None
+    assert len(found.dofs) == 200
+    assert (found.dofs[0], found.dofs[-1]) == ("1:+X", "400:+Z")

@@ -20,8 +20,8 @@ from chladni.reduced.accuracy import LIMIT
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.search.preparation import ZETA_Q, prepare
 from chladni.search.written_scores import noise_Q, seen, written_Q
-from chladni.workflows import diagnosis_pipeline
-from chladni.workflows.diagnosis_pipeline import _article_mass
+from chladni.workflows import decks_of_diagnosis
+from chladni.workflows.decks_of_diagnosis import article_mass
 from chladni.workflows.question_of_case import question_of
 from chladni_specimens.plates import plate
 
@@ -64,13 +64,13 @@ def test_a_mesh_too_coarse_for_the_change_is_halved(tmp_path, monkeypatch):
     write_case(tmp_path / "case", 6, SENSORS, np.linspace(15, 330, 450), 300.0, 0.003, halved=2)
     case = replace(chladni.load_case(tmp_path / "case"), effects=("point-mass",))
     own = chladni.diagnose(case).agreement.held_out
-    said, calls = diagnosis_pipeline.last_step_in_words, []
+    said, calls = decks_of_diagnosis.last_step_in_words, []
 
     def once(agreement, named):
         calls.append(agreement)
         return "it is worse" if len(calls) == 1 else said(agreement, named)
 
-    monkeypatch.setattr(diagnosis_pipeline, "last_step_in_words", once)
+    monkeypatch.setattr(decks_of_diagnosis, "last_step_in_words", once)
     result = chladni.diagnose(case)
     held, mesh = result.agreement.held_out, result.models.final.model.assembly
     assert len(mesh.shells) == 4 * len(case.assembly.shells)
@@ -149,4 +149,4 @@ def test_an_updated_deck_is_weighed_without_the_sensors_that_were_found():
     asked, kg = SimpleNamespace(sensor_masses=()), mass_properties(deck)[0]
     for final in (given, made):
         stages = SimpleNamespace(nominal=given, final=SimpleNamespace(model=final))
-        assert _article_mass(asked, stages, found) == pytest.approx(kg)
+        assert article_mass(asked, stages, found) == pytest.approx(kg)

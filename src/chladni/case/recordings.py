@@ -177,4 +177,8 @@ def _idle(r: Recording) -> list[str]:
         )
     if r.shapes is not None and r.poles is None:
         out.append(f"{r.name}: its {len(r.shapes.frequency)} mode shapes are not used")
+    if (modal := r.modal) is not None and r.shapes is not None:
+        few, every = (len({d.partition(":")[0] for d in s.dofs}) for s in (modal, r.shapes))
+        if few < every:
+            out.append(f"{r.name}: shapes are compared at {few} of its {every} nodes")
     return out

@@ -11,8 +11,8 @@ from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..inference.result import NextMeasurement
 from ..output import run_folder, write_json, write_text
+from ..report.next_measurements import next_measurements
 from ..report.typed_fields import as_data
-from ..report.verdict import next_measurements
 from ..report.words import odds_of
 from ..search.next_measurement import ADVISED, FILE, ODDS, Outlook, advised, read_outlook
 from ..workflows.before_any_test import PlannedTests, before_any_test

@@ -76,6 +76,7 @@ class Function:
     unit: str = ""
 
 
+MOST_NODES = 100  # of a modal model: shapes of a model's modes need no more
 RIGID = 1e-3  # of the highest frequency: modes below are rigid motions
 
 
@@ -187,12 +188,18 @@ class Recording(OneScreen):
     def modal(self) -> Shapes | None:
         """Elastic modes with shapes, one for each of ``poles``; None where shapes are not known.
 
-        Test systems fill in zeros for the directions that they did not measure.
+        Test systems fill in zeros for the directions that they did not measure. Of more than
+        ``MOST_NODES`` nodes an even sample is taken.
         """
         if self.frf is not None or self.poles is None or self.shapes is None:
             return None
         found = self.shapes.elastic
         measured = np.flatnonzero(found.values.any(axis=1))
+        of_node = np.array([found.dofs[k].partition(":")[0] for k in measured])
+        nodes = list(dict.fromkeys(of_node.tolist()))
+        if len(nodes) > MOST_NODES:
+            some = np.linspace(0, len(nodes) - 1, MOST_NODES).astype(int)
+            measured = measured[np.isin(of_node, [nodes[k] for k in some])]
         if len(found.frequency) != len(self.poles.frequency) or not len(measured):
             return None
         return found.sel(np.arange(len(found.frequency)), measured)

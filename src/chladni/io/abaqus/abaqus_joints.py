@@ -275,26 +275,19 @@ class AbaqusJoints:
 
     def _read_equation(self, key: Keyword) -> None:
         """A number of terms, then node or set, component and factor of each."""
-        k = 0
-        while k < len(key.rows):
-            count, cells = int(key.real(k, 0)), list[tuple[int, int]]()
-            begin = k
-            while len(cells) < 3 * count:
-                k += 1
-                if k >= len(key.rows):
-                    raise key.fault(f"an equation of {count} terms ends early", begin)
-                cells += [(k, j) for j, cell in enumerate(key.rows[k]) if cell]
-            sets = [self._rows(key, key.cell(*cells[3 * t]), k) for t in range(count)]
-            longest = max(map(len, sets))
-            for i in range(longest):
+        cells = [(k, j) for k, row in enumerate(key.rows) for j, cell in enumerate(row) if cell]
+        while cells:
+            count = int(key.real(*cells[0]))
+            own, cells = cells[1 : 3 * count + 1], cells[3 * count + 1 :]
+            if count < 1 or len(own) < 3 * count:
+                raise key.fault(f"an equation of {count} terms ends early")
+            sets = [self._rows(key, key.cell(*at), at[0]) for at in own[::3]]
+            components = [int(key.real(*at)) for at in own[1::3]]
+            factors = [key.real(*at) for at in own[2::3]]
+            for i in range(max(map(len, sets))):
                 rows = [s[min(i, len(s) - 1)] for s in sets]
-                terms = [
-                    (row, int(key.real(*cells[3 * t + 1])), key.real(*cells[3 * t + 2]))
-                    for t, row in enumerate(rows)
-                ]
-                if self._free(terms[0][0], (terms[0][1],), key.name):
-                    self._equation(terms)
-            k += 1
+                if self._free(rows[0], components[:1], key.name):
+                    self._equation(list(zip(rows, components, factors, strict=True)))
 
     def _read_tie(self, key: Keyword) -> None:
         for k, cells in enumerate(key.rows):
@@ -323,13 +316,11 @@ class AbaqusJoints:
         size = np.linalg.norm(np.ptp(self.points[table], axis=1), axis=1)
         limit = float(key.words.get("POSITION TOLERANCE") or 0) or _NEAR * size[near.shell]
         turning = {r in self.turning for r in masters} == {True}
-        for i in np.flatnonzero(near.distance > limit):
-            self.left_out["slave nodes of *TIE beyond the tolerance"] += int(i >= 0)
-        for i in np.flatnonzero(near.distance <= limit):
-            row, w = (
-                rows[i],
-                dict(zip(near.nodes[i].tolist(), near.weight[i].tolist(), strict=True)),
-            )
+        far = near.distance > limit
+        self.left_out["slave nodes of *TIE beyond the tolerance"] += int(far.sum())
+        for i in np.flatnonzero(~far):
+            row, nodes, weights = rows[i], near.nodes[i].tolist(), near.weight[i].tolist()
+            w = dict(zip(nodes, weights, strict=True))
             if not turning and key.words.get("ADJUST", "YES").upper() == "YES":
                 self.points[row] = near.place[i]
             d = self.points[row] - near.place[i]

@@ -1,5 +1,6 @@
 """Modal models in: shapes in CSV, NPZ and MAT, and in OP2 and punch files (SI)."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,6 @@ _COLUMNS = ("label", "mode", "frequency_hz", "real")
 _OPTIONAL = ("imag", "real_sd", "imag_sd", "damping", "frequency_sd_hz")
 MODAL = ("frequency_hz", "shapes", "outputs")
 MODAL_OPTIONAL = ("damping", "frequency_sd_hz", "shapes_sd")
-_GRIDS = 100  # of a file of results: an even sample of more is compared
 
 
 def read_shape_table(path: str | Path) -> Recording:
@@ -76,24 +76,20 @@ def read_result_modes(path: Path) -> Recording:
     from ..nastran import read_op2_modes, read_punch_modes
 
     read = (read_op2_modes if path.suffix.lower() == ".op2" else read_punch_modes)(path)
-    notes, some = [], np.arange(len(read.ids))
-    if len(some) > _GRIDS:
-        some = np.linspace(0, len(some) - 1, _GRIDS).astype(int)
-        notes.append(f"{path.name}: shapes are compared at {_GRIDS} of its {len(read.ids)} grids")
-    values = read.shapes[some, :3].reshape(-1, len(read.frequency))
+    values = read.shapes[:, :3].reshape(-1, len(read.frequency))
     moves = np.isfinite(values).all(axis=1) & values.any(axis=1)
-    dofs = [label(int(n), c) for n in read.ids[some] for c in (1, 2, 3)]
+    dofs = [label(int(n), c) for n in read.ids for c in (1, 2, 3)]
     unknown = np.full(len(read.frequency), np.nan)
     kept = tuple(d for d, m in zip(dofs, moves, strict=True) if m)
-    return _modal(path, Shapes(read.frequency, unknown, values[moves], kept), tuple(notes))
+    return _modal(path, Shapes(read.frequency, unknown, values[moves], kept))
 
 
-def _modal(path: Path, shapes: Shapes, notes: tuple[str, ...] = ()) -> Recording:
+def _modal(path: Path, shapes: Shapes) -> Recording:
     """A modal model as a recording; its complaints name the file."""
-    if twice := [d for d in dict.fromkeys(shapes.dofs) if shapes.dofs.count(d) > 1]:
+    if twice := [d for d, n in Counter(shapes.dofs).items() if n > 1]:
         raise FileError(f"{path.name}: label {twice[0]} occurs twice")
     if not (np.isfinite(shapes.frequency).all() and (shapes.frequency > 0).any()):
         raise FileError(f"{path.name}: its frequencies are no natural frequencies in Hz")
     if not (measurable(shapes.values).all() and shapes.values.any(axis=0).all()):
         raise FileError(f"{path.name}: a shape is zero or not a number")
-    return Recording(path.name, poles=shapes.poles(), shapes=shapes, notes=notes)
+    return Recording(path.name, poles=shapes.poles(), shapes=shapes)
