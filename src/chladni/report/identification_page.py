@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from ..errors import LabelError
 from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_levels, write_poles
 from ..view import charts
-from ..view.annotations import Marker
 from ..view.chart import Chart, ChartAxis, Mark, Panel, Series
 from ..view.surface import Surface, surface
 from ..workflows.case_model import markers
@@ -38,6 +37,9 @@ from .screening_blocks import SEVERAL, screening_json, screening_section
 from .shown import Shown
 from .typed_fields import as_data
 from .words import hertz, number
+
+if TYPE_CHECKING:
+    from ..view.annotations import Marker
 
 _SHOWN = 6  # channels in the picture of the fit
 _CIRCLES = 30  # modes drawn
@@ -150,8 +152,10 @@ def _paths(found: Identification) -> list[str]:
     return [str(case.path.parent if isinstance(case, Case) else found.recordings[0].recording.name)]
 
 
-def _places(found: Identification) -> tuple[Shown | None, dict[str, Marker]]:
+def _places(found: Identification) -> tuple[Shown | None, dict[str, "Marker"]]:
     """The ground of the shapes, and sensors by label: of the case, else of the recordings."""
+    from ..view.annotations import Marker
+
     if isinstance(case := found.origin, Case):
         return mesh_of(surface(case.assembly), case.assembly), {
             m.label: m for m in markers(case.outputs)
@@ -179,7 +183,7 @@ def _places(found: Identification) -> tuple[Shown | None, dict[str, Marker]]:
 
 
 def _shapes(
-    name: str, r: RecordingModes, shown: Shown | None, sensors: Mapping[str, Marker]
+    name: str, r: RecordingModes, shown: Shown | None, sensors: Mapping[str, "Marker"]
 ) -> list[Drawing]:
     """The identified modes, which move at their sensors."""
     m = r.modes.sel(r.firm)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..view.annotations import Marker
 from . import live_mesh
 from .blocks import Drawing, Spatial
 from .shown import Shown
@@ -82,6 +81,8 @@ def shape_pairs(
         return []
 
     def moving() -> Mapping[str, Any]:
+        from ..view.annotations import Marker
+
         at = zip(found.points.tolist(), found.directions.tolist(), sensors, strict=True)
         used = shown.seen.without_joints().used
         partner = dict(found.pairs)

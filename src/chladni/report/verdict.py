@@ -149,8 +149,7 @@ def sections(
 
 def _advised(result: DiagnosisResult) -> list[Block]:
     """Tabulate the next measurements, where explanations are open."""
-    every = result.next_measurements
-    return [next_measurements(every)] if every else []
+    return [next_measurements(every)] if (every := result.next_measurements) else []
 
 
 def _mode(name: str) -> int:
@@ -163,9 +162,8 @@ def _glance(result: DiagnosisResult) -> list[Block]:
     facts, fit = [], (result.agreement or Agreement()).fitted
     if fit.nominal is not None and fit.after is not None:
         change = percent(fit.after, fit.nominal)
-        facts.append(
-            ("Q, fitted data", f"{number(fit.nominal, 3)} → {number(fit.after, 3)}  ({change})")
-        )
+        text = f"{number(fit.nominal, 3)} → {number(fit.after, 3)} ({change})"
+        facts.append(("Q, fitted data", text))
     rows = [r for r in result.frequencies if r.test_hz]
     for name, key in (("before", "before_hz"), ("after", "after_hz")):
         off = [abs(f / r.test_hz - 1) for r in rows if (f := getattr(r, key))]
@@ -210,9 +208,8 @@ def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
         blocks.append(Table(heads, gains, ("effect",)))
     for effect in effects:
         blocks.append(Text([": ".join(t for t in (effect.name, effect.claim) if t)]))
-        rows = _estimates(effect)
         place = [(name, text) for name, text in _place(effect.where) if text]
-        if rows:
+        if rows := _estimates(effect):
             columns = ("parameter", "found (95 % interval)", "updated deck")[: len(rows[0])]
             blocks.append(Table(columns, rows, ("parameter",)))
         if place:
@@ -319,9 +316,8 @@ def _scores(result: DiagnosisResult) -> list[Block]:
         values = [getattr(q, key) for q in (fit, held)]
         if values == [None, None]:
             continue
-        changes = ["–", "–"]
-        if changed:
-            changes = [percent(v, q.nominal) for v, q in zip(values, (fit, held), strict=True)]
+        sides = zip(values, (fit, held), strict=True)
+        changes = [percent(v, q.nominal) if changed else "–" for v, q in sides]
         rows.append((name, number(values[0]), changes[0], number(values[1]), changes[1]))
     if not rows:
         return []

@@ -184,7 +184,7 @@ function markers(list, name, tint, symbol, long) {
 const SYMBOLS = { sensors: ["neutral", "circle"], "held-out sensors": ["neutral", "circle-open"], "drive point": ["before", "diamond"], cords: ["calm", "square"] };
 
 function structure(at, data, shared, box) {
-  const mesh = shared.mesh, xyz = places(mesh), traces = [], tints = ["found", "warn"];
+  const mesh = shared.mesh, xyz = places(mesh), traces = [], tints = ["found", "warn"], eye = unit(data.from?.eye ?? mesh.eye);
   const meant = new Map(data.spots.toReversed().flatMap((s) => s.parts.map((part) => [part, s]))), balls = data.spots.flatMap((s) => s.at.slice(0, 3).map((at) => ({ at, radius: s.radius }))), seen = stage(at, mesh, box, data.from, 0, balls);
   if (mesh.i.length) {
     traces.push(sheet(mesh, xyz, {}, meant.size ? (f) => !meant.has(mesh.part[f]) : null));
@@ -195,8 +195,11 @@ function structure(at, data, shared, box) {
   for (const spot of data.spots) {
     const text = wrapped(spot.text), tint = tints[spot.rank], name = said(spot.name);
     if (spot.radius) for (const p of spot.at.slice(0, 3)) traces.push(ball(p, spot.radius, text, tint));
-    if (spot.at.length) traces.push({ type: "scatter3d", mode: "markers+text", name, x: spot.at.map((p) => p[0]), y: spot.at.map((p) => p[1]), z: spot.at.map((p) => p[2]),
-      text: [name], textposition: "top center", textfont: { color: colour(tint), size: 13 }, hoverinfo: "text", hovertext: text, marker: { size: 9, color: colour(tint), symbol: "cross" } });
+    for (const [mode, by] of spot.at.length ? [["markers+text", 0.03], ["markers", -0.03]] : []) {  // clear of the sheet, on either side
+      const [x, y, z] = [0, 1, 2].map((k) => spot.at.map((p) => p[k] + by * mesh.size * eye[k]));
+      traces.push({ type: "scatter3d", mode, name, x, y, z, text: [name], textposition: "top center", textfont: { color: colour(tint), size: 13 }, legendgroup: name, showlegend: by > 0,
+        hoverinfo: "text", hovertext: text, marker: { size: 9, color: colour(tint), symbol: "cross" } });
+    }
   }
   return seen.drawn(draw(at, traces, { scene: seen.scene(), margin: FLAT, legend: { orientation: "h", x: 1, xanchor: "right", y: 0, yanchor: "top" } }));
 }
