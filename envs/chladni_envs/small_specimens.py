@@ -60,8 +60,8 @@ def plate(
 def tied_plate(noise: float = 0.15) -> "Outlook":
     """The plate with a lump at one of four places that a sensor and a drive in its middle tie.
 
-    Two mirror planes make the four places alike for what is driven and seen in the middle.  Not
-    known are ln E, ln rho, the ln of the lump's mass, and errors of every modal stiffness.  Each
+    Two mirror planes make the four places equal for what is driven and seen in the middle.  Unknown
+    are ln E, ln rho, the ln of the lump's mass, and errors of every modal stiffness.  Each
     candidate is predicted linear about the first test.
 
     Parameters

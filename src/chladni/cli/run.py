@@ -65,7 +65,7 @@ Units = Annotated[
 ]
 Recordings = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="RECORDING", help="Files of FRFs or time data, beside a bare deck."),
+    typer.Argument(metavar="RECORDING", help="Files of FRFs or time data, after a bare deck."),
 ]
 SensorTable = Annotated[
     Path | None, typer.Option(help="Table of sensors, in the form of chladni plan.")

@@ -189,8 +189,8 @@ class Recording(ShownBriefly):
     def modal(self) -> Shapes | None:
         """Elastic modes with shapes, one for each of ``poles``; None where shapes are not known.
 
-        Test systems fill in zeros for the directions that they did not measure. Of more than
-        ``MOST_NODES`` nodes an even sample is taken.
+        Test systems fill in zeros for the directions that they did not measure. An even
+        sample of ``MOST_NODES`` nodes stands for more.
         """
         if self.frf is not None or self.poles is None or self.shapes is None:
             return None

@@ -131,7 +131,7 @@ class SolidSection:
 
 @dataclass(frozen=True)
 class BeamStation:
-    """What a tapered beam has at x times its length, relative to end A; linear between stations.
+    """Section of a tapered beam at x times its length, relative to end A; linear between stations.
 
     A change of the section at end A so changes the whole beam in proportion.
     """

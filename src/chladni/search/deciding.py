@@ -181,7 +181,7 @@ def open_explanations(
 ) -> tuple[list[HypothesisFit], list[str], np.ndarray]:
     """Explanations that the data cannot separate, or the only one: fits, names, probabilities.
 
-    The probabilities are even.  Without an explanation that stands there is none.
+    The probabilities are even.  Empty where no explanation stands.
     Calibration with its errors of form stands for what the catalogue lacks as well.
     """
     listed = [h for h in decision.order if h.name in decision.one_of][:MOST_OPEN]

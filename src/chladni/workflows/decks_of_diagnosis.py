@@ -66,7 +66,7 @@ def on_preferred_mesh(
     case: Case, question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
     result: DiagnosisResult,
 ) -> tuple[UpdatedModels, DiagnosisResult]:  # fmt: skip
-    """Return decks with every shell halved, if the data prefer that mesh and they foretell better.
+    """Return decks with every shell halved, if the data prefer that mesh and they predict better.
 
     The decks on the given mesh stay where the last one is better than the one before it.
     """
