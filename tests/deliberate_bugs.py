@@ -46,7 +46,7 @@ BUGS = (
         "tests/formats/test_uff.py",
     ),
     DeliberateBug(  # the arm of a bush turns the wrong way
-        "src/chladni/fem/spring.py", "= -joined * (bushes.frame", "= joined * (bushes.frame",
+        "src/chladni/fem/spring.py", "= -joined * turned", "= joined * turned",
         "tests/fem/test_spring.py",
     ),
     DeliberateBug(  # bars of a lossy material have no losses

@@ -27,7 +27,7 @@ MOST = {  # modules of ours and of SciPy that a command loads for its --help, a 
     "identify": (315, 207),
     "init": (430, 207),  # it asks what check asks, and check what diagnose asks
     "map": (265, 180),
-    "modes": (130, 180),
+    "modes": (145, 180),
     "render": (140, 180),
     "next": (270, 207),
     "report": (270, 207),

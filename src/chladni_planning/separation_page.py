@@ -10,8 +10,8 @@ from chladni.report.words import odds_of
 from chladni.workflows.before_any_test import PlannedTests
 
 _CAPTION = (
-    "Predicted from the model alone. Each effect is concealed in an article in a size and place "
-    "of its family, the planned sensors record it, and all of these effects are fitted."
+    "Predicted from the model alone. Each effect is concealed in an article, in a size and place "
+    "of its family. The planned sensors record that article. All of these effects are then fitted."
 )
 
 

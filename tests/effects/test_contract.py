@@ -16,7 +16,13 @@ from chladni.effects.calibration_parameters import calibration_parameter, random
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.element_groups import element_groups
 from chladni.effects.joint_stiffness import model_families
-from chladni.effects.model_errors import FoldBending, JointFootprint, mesh_errors, modal_discrepancy
+from chladni.effects.model_errors import (
+    FoldBending,
+    HalvedMesh,
+    JointFootprint,
+    mesh_errors,
+    modal_discrepancy,
+)
 from chladni.effects.orthotropy import material_axes
 from chladni.effects.sheets import MassPatch, StiffnessPatch, ThicknessDistribution
 from chladni.effects.user_parameters import user_parameter
@@ -199,7 +205,7 @@ def test_every_kind_is_held_to_the_contract(others):
         return {c for c in below if c.__module__.startswith("chladni.") and "name" in vars(c)}
 
     held = {type(one.effect) for one in others.values()} | {f.effect for f in registry.BUILT_IN}
-    assert kinds(Effect) == held | {WeldPatch, RigidPatch}
+    assert kinds(Effect) == held | {WeldPatch, RigidPatch, HalvedMesh}
 
 
 def test_scatter_and_mesh_error_agree_with_the_full_structure(others, on_plate):

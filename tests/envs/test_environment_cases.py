@@ -20,6 +20,7 @@ from chladni_envs import environment_cases as cases
 from chladni_envs.parameter_selection import ParameterSelectionEnv
 from chladni_specimens.plates import folded_panel
 
+OF_A_CASE = tuple(i for i in IDS if i != "chladni/NextMeasurement-v0")  # it needs effects as well
 SOFT = 0.98  # of the panel's modulus in the article: its peaks move by half a half-bandwidth
 SENSORS = ("34:+Z", "100:+Z", "187:+Z", "239:+Z", "313:+Z", "402:+Z", "470:+Z", "555:+Z")
 CASE = """
@@ -78,7 +79,7 @@ def ready(recorded, monkeypatch):
     return recorded
 
 
-@pytest.mark.parametrize("id", IDS)
+@pytest.mark.parametrize("id", OF_A_CASE)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
 def test_contracts_with_a_case(ready, case, id):
     env = gym.make(f"chladni_envs:{id}", case=case, render_mode="rgb_array")
@@ -173,7 +174,7 @@ def test_a_bare_deck_shows_its_units(tmp_path, id):
     assert structure.action_space.n > 0
 
 
-@pytest.mark.parametrize("id", [i for i in IDS if "Placement" not in i])
+@pytest.mark.parametrize("id", [i for i in OF_A_CASE if "Placement" not in i])
 @pytest.mark.parametrize("form", ["deck", "model", "nowhere"])
 def test_an_environment_of_recordings_refuses_what_has_none(tmp_path, id, form):
     deck = write_assembly(folded_panel(), tmp_path / "panel.bdf", "mm-t-s")
@@ -187,7 +188,9 @@ def choosing(recorded):
     """The same with the effects of the catalogue as choices."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cases, "Recorded", lambda path: recorded)
-        return ParameterSelectionEnv(case="recorded", effects=True)
+        env = ParameterSelectionEnv(case="recorded", effects=True)
+        env.reset(seed=0)
+        return env
 
 
 def test_effects_of_the_catalogue_are_choices(choosing, recorded):
@@ -241,7 +244,7 @@ WITH_MODEL = 'chladni.load(mesh, "SI", parts=["steel"])'
 WITH_CASE = f"chladni.make_case({WITH_MODEL}.deck, recording, words=dict(units='SI'))"
 
 
-@pytest.mark.parametrize("id", IDS)
+@pytest.mark.parametrize("id", OF_A_CASE)
 def test_a_converted_mesh_is_in_every_environment_in_two_lines(id):
     """A mesh with thickness alone, with a recording of it where the environment needs one."""
     import meshio

@@ -58,7 +58,7 @@ def test_frequencies_of_a_thin_plate_tell_e_times_t_squared_and_no_more(bare):
     assert found.frozen == (E,)
     assert 170e9 < rows(found)[E].low < 210e9 < rows(found)[E].high < 260e9
     assert "alloy" in rows(found)[E].reason
-    assert "% of t of plate" in rows(found)[E].why
+    assert "E of plate changes by +1 % and t of plate by -0.50 %" in rows(found)[E].why
     assert "weighing the article would settle it" in rows(found)[E].why
     assert found.collinearity > 100
 

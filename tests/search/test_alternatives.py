@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.decision.decision_rules import TIED
-from chladni.effects.effect import Parameter
+from chladni.effects.effect import Parameter, Traits
 from chladni.effects.estimate import Remarks
 from chladni.effects.joint_stiffness import ModelFamily
 from chladni.effects.masses import LocalResonator
@@ -20,7 +20,9 @@ ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
 
 def tried(name, S, becomes="", implausible="", ln_k=0.0, nearly=""):
     said = Remarks(becomes, nearly, implausible)
-    effect = SimpleNamespace(name=name, remarks=lambda x, sd=None: said, expected=False)
+    effect = SimpleNamespace(
+        name=name, remarks=lambda x, sd=None: said, expected=False, traits=Traits()
+    )
     at = np.array([ln_k])
     fit = SimpleNamespace(effects=(ADHESIVE,), of=lambda e: at, sd=lambda e: 0.1 + 0 * at)
     return SimpleNamespace(

@@ -36,6 +36,7 @@ WORKFLOW = {  # command: the function it calls
     "index": "chladni.report.run_list.index_page",
     "compare": "chladni.report.run_comparison.compared_runs",
     "next": "chladni.search.next_measurement.advised",
+    "convert": "chladni.workflows.loaded_model.load_model",
 }
 
 
@@ -115,6 +116,7 @@ def test_json_of_a_diagnosis_is_the_result_of_its_function(
         "calibrated": "calibrated.bdf",
         "report": "report.html",
         "diagnosis": "diagnosis.json",
+        "outlook": "outlook.npz",
     }
     due = plain(to_json(diagnosed))
     assert due.pop("files") == {}

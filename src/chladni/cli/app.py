@@ -28,6 +28,7 @@ from ..extensions import installed
 from .console import console, opened_console, say
 
 GROUP = "chladni.commands"
+OF_A_CASE = ("correlate", "check")  # commands that compare, and take no deck with a recording
 BUILT_IN = (  # each a module here with a function ``run``, or ``STEPS`` of a command with several
     "diagnose",
     "init",
@@ -105,7 +106,7 @@ def _misused(error: Any, given: list[str]) -> int:
 def _case_of(at: Any, words: list[str]) -> str:
     """The command that drafts a case of the files and units of a command line; "" without files."""
     files = [w for w in words if Path(w).is_file() and Path(w).suffix != ".toml"]
-    if not files or not any(p.metavar == "CASE" for p in at.command.params):
+    if len(files) < 2 or at.info_name not in OF_A_CASE:
         return ""
     units = words[words.index("--units") :][:2] if "--units" in words else []
     return shlex.join(["chladni", "init", *files, *units, "--out", Path(files[0]).stem])

@@ -16,14 +16,16 @@ import numpy as np
 import scipy.linalg as sl
 from scipy.special import entr, logsumexp
 
+from ..results import ShownBriefly
+
 DRAWS = 256  # of the data of a measurement, under each hypothesis
 SEED = 20261127
 UNSEEN = 1e-3  # of the noise: variance of predictions that tells nothing
 SETTLED = 0.01  # of the entropy: no further measurement is chosen below it
 
 
-@dataclass(frozen=True, eq=False)
-class Predicted:
+@dataclass(frozen=True, eq=False, repr=False)
+class Predicted(ShownBriefly):
     """Data of a measurement as each hypothesis predicts them, in units of the noise.
 
     Attributes

@@ -23,6 +23,7 @@ from ..inference.expected_information import (
     nothing,
 )
 from ..inference.result import NextMeasurement
+from ..results import ShownBriefly
 
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
@@ -51,8 +52,8 @@ class FurtherTest:
     amount: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Outlook:
+@dataclass(frozen=True, eq=False, repr=False)
+class Outlook(ShownBriefly):
     """Rival explanations, and what each candidate measurement would show of them.
 
     Attributes

@@ -9,7 +9,7 @@ from tests.builders.refusals import says
 import chladni
 from chladni.errors import ChladniError
 from chladni.io.nastran.edit.unwritten import refuse_unwritten
-from chladni.model.assembly import Assembly, RigidBody
+from chladni.model.assembly import Assembly, RigidBody, Rotors
 
 DECK = """SOL 103
 CEND
@@ -146,6 +146,8 @@ def variants(made: Assembly):
                     (replace(value[0], **{column: moved(getattr(value[0], column))}),),
                 )
             yield "solids without", ()
+        elif f.name == "rotors":
+            yield f.name, Rotors(np.array([1]), np.array([0]), np.array([[0.0, 0.0, 0.02]]))
         elif hasattr(value, "ids"):
             for column, table in other_table(value):
                 yield f"{f.name} {column}", table
