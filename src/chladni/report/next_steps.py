@@ -61,7 +61,7 @@ def _advised(result: DiagnosisResult) -> list[str]:
     if about := every[-1].about:
         return [
             f"Measure with {what}: the interval of {about}, the least known quantity, then has "
-            f"{every[-1].narrows:.0%} of its width."
+            f"{100 * every[-1].narrows:.0f} % of its width."
         ]
     return [
         f"Measure with {what}: one explanation then has odds of {ODDS:.0f} : 1 or better in "
