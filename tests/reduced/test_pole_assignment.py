@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from chladni.reduced.pole_assignment import (
     FAINTEST,
     SPURIOUS,
+    assigned,
     paired,
     price_missed,
     price_spurious,
@@ -106,3 +107,11 @@ def test_a_spurious_pole_never_earns_anything():
     """A price below nothing at the widest spread of a fit would have no square root."""
     widest = 0.2
     assert np.all(price_spurious(share_spurious(np.array([FAINTEST, 1.0]))) > 2 * np.log(widest))
+
+
+def test_no_rounding_makes_the_price_of_unpaired_modes_negative():
+    """All are paired: 0, whatever the order of the sum."""
+    prices = np.array([0.1, 0.2, 0.3])
+    assert prices.sum() != prices[::-1].sum()  # as sums differ by their order
+    cost = np.where(np.eye(3)[::-1] > 0, 0.0, 100.0)
+    assert assigned(cost, np.full(3, 50.0), prices)[2] == 0.0

@@ -112,7 +112,7 @@ def assigned(
     test, at = linear_sum_assignment(np.hstack([cost - missed, unpaired]))
     kept = at < len(missed)
     test, model = test[kept], at[kept]
-    return test, model, float(missed.sum() - missed[model].sum())
+    return test, model, float(np.delete(missed, model).sum())  # never below 0
 
 
 def _backtrack(matched: np.ndarray, skipped: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
