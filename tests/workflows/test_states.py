@@ -1,6 +1,7 @@
 """Several recordings and several states of one object in one case."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,9 @@ from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_poles
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.report.diagnosis_json import diagnosis_json, from_json, read_diagnosis
+from chladni.search.diagnosis import Diagnosis
+from chladni.workflows.diagnosis_pipeline import Explained
+from chladni.workflows.states import _with
 from chladni_specimens.plates import plate
 
 TRIED = ("point-mass", "mass-patch", "stiffness-patch", "extra-support")
@@ -135,3 +139,15 @@ def test_two_shakers_an_article_and_a_level(tmp_path):
     assert "nonlinear: natural frequencies change with level: " in notes
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "no deck can be expected to come closer" in page
+
+
+@pytest.mark.parametrize("verdict", ["missing physics", "calibration only", "nothing missing"])
+def test_decks_of_several_states_have_the_shared_values_alone(verdict):
+    """Halved decks were fitted to one state: none stays, whatever the verdict."""
+    fit = SimpleNamespace(neg2_log_evidence=0.0)
+    found = Diagnosis(fit, fit, fit, (fit,), verdict, halved=(fit, fit))
+    joint = SimpleNamespace()
+    one = _with(Explained(None, None, None, found), joint, changed=True).found
+    assert one.shared
+    assert one.halved == ()
+    assert joint in (one.written, one.plain)

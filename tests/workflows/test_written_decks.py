@@ -80,11 +80,20 @@ def test_a_mesh_too_coarse_for_the_change_is_halved(tmp_path, monkeypatch):
     assert "on it it is worse; the decks that are written have every shell halved" in (
         " ".join(result.notes)
     )
-    written = write_diagnosis(tmp_path / "run", case, result)
-    assert {"updated.bdf", "calibrated.bdf"} <= set(written.files.values())
+    files = write_diagnosis(tmp_path / "run", case, result).files
+    assert {"updated.bdf", "calibrated.bdf"} <= set(files.values())
     read = chladni.load(tmp_path / "run" / "updated.bdf", "SI").assembly
     f = [normal_modes(structure(a).system, 12).frequency[6:] for a in (read, mesh)]
     np.testing.assert_allclose(*f, rtol=1e-6)
+    for what, score in (("deck", "with_effect"), ("calibrated", "calibrated")):
+        shutil.copy(tmp_path / "run" / files[what], tmp_path / "case" / "plate.bdf")
+        asked = question_of(chladni.load_case(tmp_path / "case"))
+        prepared = prepare(asked)
+        sets = prepared.score.use, prepared.held.reporting
+        then = [getattr(q, score) for q in (result.agreement.fitted, held)]
+        np.testing.assert_allclose(
+            written_Q(asked, prepared, prepared.nominal, sets), then, rtol=1e-6
+        )
 
 
 def test_Q_is_that_of_the_full_matrices(case):

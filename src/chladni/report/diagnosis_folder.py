@@ -6,7 +6,6 @@ from pathlib import Path
 
 from ..case import Case
 from ..io.nastran import changed_lines, write_deck
-from ..io.nastran.export.whole_deck import write_assembly
 from ..output import write_json, write_npz
 from ..progress import Progress, silent
 from ..search.next_measurement import FILE, arrays_of
@@ -93,13 +92,11 @@ def _decks(folder: Path, case: Case, result: DiagnosisResult, home: Path) -> dic
     def written(stem: str, deck: ChangedDeck) -> str:
         names = (f"{stem}{k or ''}.bdf" for k in count())
         name = next(n for n in names if (home / n).resolve() not in read)
-        if deck.whole is not None:
-            return write_assembly(deck.whole, folder / name, case.units).name
-        return write_deck(case.deck, folder / name, deck.changes or (), home).name
+        return write_deck(deck.source or case.deck, folder / name, deck.changes or (), home).name
 
-    if models.final.writable:
+    if models.final.changes is not None:
         found["deck"] = written("updated" if result.searched else "calibrated", models.final)
-    if models.calibrated is not models.final and models.calibrated.writable:
+    if models.calibrated is not models.final and models.calibrated.changes is not None:
         found["calibrated"] = written("calibrated", models.calibrated)
     return found
 
@@ -108,7 +105,7 @@ def _changed(case: Case, result: DiagnosisResult) -> list[Section]:
     """Cards before and after."""
     if result.models is None or not (changes := result.models.final.changes):
         return []
-    lines = changed_lines(case.deck, changes)
+    lines = changed_lines(result.models.final.source or case.deck, changes)
     more = len(lines) - _CHANGED
     text = f"Changed lines: the given deck (-) and {result.files['deck']} (+)."
     if more > 0:

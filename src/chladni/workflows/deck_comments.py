@@ -19,7 +19,7 @@ def with_remarks(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
 
 def with_mended(deck: ChangedDeck, mended: Sequence[str]) -> ChangedDeck:
     """Add to a changed deck, as comments, the faults of the recording that were undone."""
-    if not deck.changes:
+    if deck.changes is None or not (deck.changes or deck.source):
         return deck
     comments = tuple(Add((), f"Recording mended: {text}") for text in mended)
     return replace(deck, changes=(*deck.changes, *comments))

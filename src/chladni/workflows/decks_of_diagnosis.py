@@ -16,6 +16,7 @@ from ..inference.implausible_values import implausible_values, strained
 from ..inference.likelihood import Responses
 from ..inference.residual_localisation import ResidualLocalisation, residual_localisation
 from ..inference.result import Adequacy, LeftPlace, MassComparison, Scores
+from ..io.nastran import assembly
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -41,6 +42,7 @@ from ..search.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
 from .deck_comments import with_mended, with_remarks
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
+from .loaded_model import exported_deck
 
 
 def updated_models(
@@ -64,7 +66,7 @@ def updated_models(
 
 def on_preferred_mesh(
     case: Case, question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
-    result: DiagnosisResult,
+    result: DiagnosisResult, mended: tuple[str, ...],
 ) -> tuple[UpdatedModels, DiagnosisResult]:  # fmt: skip
     """Return decks with every shell halved, if the data prefer that mesh and they predict better.
 
@@ -77,12 +79,19 @@ def on_preferred_mesh(
     found = replace(found, plain=plain, written=named[0] if named else None)
     made = models(question, found)
 
-    def deck(assembly: Assembly) -> ChangedDeck:
-        finer = halved(assembly)
-        return ChangedDeck(modelled(question.tested(finer), stages.nominal.band), None, finer)
+    def deck(changed: Assembly) -> ChangedDeck:
+        source = exported_deck(halved(changed), case.units)
+        finer = question.tested(assembly(source, case.units))
+        return ChangedDeck(modelled(finer, stages.nominal.band), (), source)
 
-    calibrated = deck(made.calibrated)
-    final = calibrated if made.final is made.calibrated else deck(made.final)
+    try:
+        calibrated = deck(made.calibrated)
+        final = calibrated
+        if made.final is not made.calibrated:
+            final = with_remarks(deck(made.final), found.as_deck)
+    except (FileError, ModelError):  # no card holds what changed
+        return stages, result
+    final = with_mended(final, mended)
     better = replace(stages, calibrated=calibrated, final=final)
     better = replace(better, curves=_curves(case, better, better.test))
     again = result_of(question, prepared, found, better)

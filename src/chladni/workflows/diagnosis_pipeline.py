@@ -133,7 +133,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     stages, lost = updated_models(case, question, prepared, found, mended)
     progress("scores", 0.95)
     result = result_of(question, prepared, found, stages)
-    stages, result = on_preferred_mesh(case, question, prepared, found, stages, result)
+    stages, result = on_preferred_mesh(case, question, prepared, found, stages, result, mended)
     result = over_levels(question, prepared, stages, result, diagnosing)
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):

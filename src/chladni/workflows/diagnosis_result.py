@@ -30,7 +30,7 @@ from ..inference.result import (
     Remainder,
 )
 from ..io.nastran.edit.changes import Change
-from ..model.assembly import Assembly
+from ..io.nastran.text.deck import Deck
 from ..results import Result, ShownBriefly
 from ..search.measured_modes import MeasuredModes
 from ..search.next_measurement import Outlook
@@ -42,18 +42,13 @@ Compared = Literal["responses", "frequencies", "modes"]
 class ChangedDeck:
     """A deck with changes, and the structure that it then describes.
 
-    ``changes`` are edits of its cards; None if no card can hold them.  ``whole`` is an assembly
-    that is written anew, on another mesh.
+    ``changes`` are edits of its cards; None if no card can hold them.  ``source`` is the deck that
+    is changed, if it is not the given one.
     """
 
     model: Modelled
     changes: tuple[Change, ...] | None
-    whole: Assembly | None = None
-
-    @property
-    def writable(self) -> bool:
-        """True if a file can hold it."""
-        return self.changes is not None or self.whole is not None
+    source: Deck | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

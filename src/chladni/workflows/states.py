@@ -121,8 +121,9 @@ def _with(one: Explained, fit: HypothesisFit, changed: bool) -> Explained:
     """Put the shared values of all states into the deck of an explanation.
 
     A state that needs no other values than the deck's gets them too if another state needs them.
+    Decks with halved shells were fitted to one state alone.
     """
-    found = replace(one.found, shared=True)
+    found = replace(one.found, shared=True, halved=())
     if found.found is not None:
         return replace(one, found=replace(found, written=fit))
     if changed and found.verdict == "nothing missing":
