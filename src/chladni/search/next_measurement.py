@@ -178,10 +178,7 @@ def read_outlook(folder: Path) -> Outlook:
     """
     path = folder / FILE
     if not path.is_file():
-        raise FileError(
-            f"{folder}: there is no {FILE}; a diagnosis of responses writes it where it leaves "
-            "explanations that the data cannot distinguish"
-        )
+        raise FileError(f"{folder}: there is no {FILE}; a diagnosis of responses writes it")
     try:
         with np.load(path, allow_pickle=False) as file:
             held = {name: file[name] for name in file.files}
