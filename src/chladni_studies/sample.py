@@ -8,12 +8,13 @@ import numpy as np
 from chladni.case import Case
 from chladni.dynamics.frf import FRF
 from chladni.dynamics.modes import ModalModel
+from chladni.ema.correlation import deviation, quality
 from chladni.errors import ChladniError
 from chladni.fem.energy import mass_properties
 from chladni.fem.modelled import Modelled
 from chladni.model.assembly import Assembly
 from chladni.parallel import one_blas_thread
-from chladni.workflows.correlate import scored
+from chladni.workflows.correlate import on_lines_in_use
 from chladni.workflows.frf import superposed
 from chladni.workflows.loaded_model import Model
 
@@ -86,11 +87,23 @@ def _computed(study: StudyModel, values: np.ndarray) -> tuple[dict[str, float], 
     columns["mass_kg" if model.unit else "mass"] = float(mass_properties(assembly)[0])
     frf = None
     if study.case is not None and study.test is not None:
-        frf, q = scored(study.case, made, study.test)
-        columns["Q"] = np.nan if q is None else q.Q
+        frf, test = on_lines_in_use(study.case, made, study.test)
+        columns["Q"] = _deviation(study.case, frf, test)
     if study.settings.inputs:
         frf = wished(study.settings, model, made)
     return columns | (summary(frf) if frf is not None else {}), frf
+
+
+def _deviation(case: Case, responses: FRF, test: FRF) -> float:
+    """Q over the lines in use, with the damping of the sample; nan where it has no logarithm."""
+    try:
+        delta = deviation(responses, test)
+    except ChladniError:
+        return np.nan
+    if not case.gain_known:
+        delta = delta - np.median(delta.real)
+    weight = case.lines(test.frequency)[:, None, None].astype(float)
+    return quality(delta, test.frequency, weight=weight).Q
 
 
 def solved(model: Model, count: int, reach: float) -> Modelled:

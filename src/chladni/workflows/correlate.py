@@ -11,7 +11,7 @@ from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..dynamics.frf import FRF
 from ..dynamics.modes import ModalModel, rigid_modes
-from ..ema.correlation import Quality, comac, deviation, mac, quality
+from ..ema.correlation import Quality, comac, mac, quality
 from ..ema.finding import Screening
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
@@ -144,7 +144,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     alike = _Alike.of(phi, psi, near.frequency, found.frequency)
     pairs = alike.pairs
     progress("responses", 0.6)
-    responses, _ = scored(case, model, test)
+    responses, _ = on_lines_in_use(case, model, test)
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
         case.outputs.labels, found, found.frequency, near.frequency, alike.mac, pairs, alike.comac,
@@ -311,19 +311,11 @@ def pairs_of(at: np.ndarray, by_test: np.ndarray, modes: int) -> ModePairs:
     )  # fmt: skip
 
 
-def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None]:
-    """Return responses of the model with its own damping, and Q over the lines in use."""
+def on_lines_in_use(case: Case, model: Modelled, test: FRF) -> tuple[FRF, FRF]:
+    """Return responses of the model with its own damping, and the test, on the lines in use."""
     low, high = _band(case, test)
     seen = test.sel(band=(max(low, 1e-9), high))
-    responses = model_frf(case, model, case.damping or DAMPING, seen)
-    weight = case.lines(seen.frequency)[:, None, None].astype(float)
-    try:
-        delta = deviation(responses, seen)
-    except ChladniError:
-        return responses, None
-    if not case.gain_known:
-        delta = delta - np.median(delta.real)
-    return responses, quality(delta, seen.frequency, weight=weight)
+    return model_frf(case, model, case.damping or DAMPING, seen), seen
 
 
 def _band(case: Case, test: FRF) -> tuple[float, float]:
@@ -345,7 +337,9 @@ def _quality(
         delta = equalised_deviation(question_of(case), found, model, s)
     except ChladniError as error:
         return None, (f"Q could not be calculated: {error}.",)
-    note = f"Q compares responses with {ZETA_Q:.0%} damping on both sides, as in a diagnosis."
+    note = (
+        f"Q compares responses with {100 * ZETA_Q:.0f} % damping on both sides, as in a diagnosis."
+    )
     if case.gain_known:
         return quality(delta, f, bands), (note,)
     more = "The gain is unknown, so Q was calculated after one common factor was removed."
