@@ -1,8 +1,8 @@
 """Clamps that give along their line or over their face: each held grid is on springs of its own.
 
-A grid takes the share of the springs that its length of the line, or its area of the face, has of
-the whole: one stiffness per length or area (Winkler 1867, Die Lehre von der Elasticitaet und
-Festigkeit). A line moves in all directions that it holds and turns about itself. A face moves.
+The stiffness per length or area is one (Winkler 1867, Die Lehre von der Elasticitaet und
+Festigkeit). Each grid takes the share of its length of the line, or of its area of the face. A line
+moves in all directions that it holds and turns about itself. A face moves.
 """
 
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class Springs:
     turning: bool
 
     def pulled(self, force: np.ndarray) -> Self | None:
-        """Those along the directions in which modes pull; None if there are too few.
+        """Springs along the directions in which modes pull; None if there are too few.
 
         A direction that no measured mode loads would take a stiffness that nothing determines.
         """
@@ -67,7 +67,7 @@ class Springs:
         """Motions (k, p) with Σ share u² = 1 that follow forces of modes, and the pull (r,).
 
         Stiff springs let each mode move the grids by its forces over their shares. Soft springs let
-        all grids move alike.
+        all grids move equally.
 
         Parameters
         ----------

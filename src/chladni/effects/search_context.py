@@ -21,7 +21,7 @@ NEIGHBOURS = 6  # places round a place of a sheet
 class Candidate:
     """An effect worth a fit, its start (n_p,), and the start of the base effects (n_base,).
 
-    That of the base is for poles; with responses it follows from the own optimum of the effect.
+    Poles need a start of the base. With responses it follows from the own optimum of the effect.
     """
 
     effect: Effect

@@ -58,7 +58,7 @@ class Predicted(ShownBriefly):
         return Predicted(np.vstack([np.zeros(len(B)), apart.T]), tuple(factors))
 
     def after(self, made: "Predicted", y: np.ndarray) -> "Predicted":
-        """The same data after others that share their unknowns have shown y (n,)."""
+        """Predict these data after others, which share their unknowns, have shown y (n,)."""
         means, factors = [], []
         for mean, F, known, G in zip(self.mean, self.factors, made.mean, made.factors, strict=True):
             lam, U = np.linalg.eigh(G.T @ G)

@@ -140,7 +140,7 @@ def _tapered(
     rows: _Rows,
     end: tuple[tuple[float, ...], tuple[float, ...], float] | None = None,
 ) -> BeamSection:
-    """The section with stations of (x, (A, I1, I2, I12, J, NSM)), unless all of them are alike.
+    """The section with stations of (x, (A, I1, I2, I12, J, NSM)), unless all of them are equal.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ from .context import Context, digits, id_list
 def selected(deck: Deck, kind: str, subcase: int | None = None) -> tuple[int, ...]:
     """Sets of SPC, MPC or NSM cards that hold, additions (SPCADD...) resolved.
 
-    The subcase asked for selects, else the first that looks for modes, else the first that selects
-    any; where there is no case control the only set of the deck is taken.
+    The subcase asked for selects. Without it the first that looks for modes does, or else the first
+    that selects any. Without a case control the only set of the deck is taken.
     """
     chosen = _chosen(deck, kind, subcase)
     there = _sets(deck, kind)
