@@ -3,12 +3,15 @@
 from functools import partial
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
+from tests.fem.test_curved_shell import sheet
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import iterated
 from chladni.effects import model_errors
 from chladni.effects.model_errors import LIMIT, mesh_errors
+from chladni.errors import ModelError
 from chladni.fem.assemble import Structure, structure
 from chladni.fem.modelled import modelled
 from chladni.geometry.refine import refined
@@ -33,6 +36,19 @@ def test_no_mode_loses_all_its_stiffness():
         root = error.omega[:, None] * V
         due = np.linalg.eigvalsh((root * np.exp(x * w)) @ root.T)
         assert_allclose(np.sort(lam[6:])[: len(due) // 2], due[: len(due) // 2], rtol=1e-6)
+
+
+def test_shells_with_nodes_on_their_edges_are_not_halved():
+    """Halves without these nodes are another element: their difference is no error of the mesh."""
+    made = sheet(4, 3)
+    assert mesh_errors(modelled(made, 100.0), 40.0) == []
+    with pytest.raises(ModelError, match="shell 1 has nodes on its edges"):
+        refined(made)
+
+
+def test_sheets_of_shells_with_nodes_on_their_edges_are_one():
+    """Parts that share grids are connected, whatever the nodes of their shells."""
+    assert set(reduced_problem(sheet(4, 3), 60.0).groups.connected) == {0}
 
 
 def test_the_halved_mesh_is_the_mesh_error_at_one():

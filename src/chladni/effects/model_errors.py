@@ -124,7 +124,10 @@ Places = Callable[[Structure], sp.csr_array]  # rows of the measured dofs, on an
 
 
 def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> list[MeshError]:
-    """Mesh errors of a structure up to somewhat above ``f_max``; none for a large structure.
+    """Mesh errors of a structure up to somewhat above ``f_max``.
+
+    A large structure has none, nor one of shells with nodes on their edges, whose errors fall as
+    h⁴.
 
     The list holds the error of the elements. Joints on whole shells add the error of their
     footprints: one common to all, and one for each region, because two meshers attach one joint to
@@ -141,6 +144,8 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     built = model.structure
     made = built.assembly
     if len(built.system.dofs) > MOST_DOFS or not len(made.shells) + len(made.beams):
+        return []
+    if made.shells.curved.any():
         return []
     above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
     band = above[1] * f_max

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import ModelError
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Shells, concatenated, picked
 from .beam_lines import member_beams
@@ -22,7 +23,15 @@ def refined(assembly: Assembly) -> Assembly:
     Everything else is unchanged. A component held at both ends of a side is held between them. Old
     points keep their rows and ids; new ones follow with new ids. A beam along a side of a shell
     uses the new point of that side.
+
+    Raises
+    ------
+    ModelError
+        If a shell has nodes on its edges, which its halves would lack.
     """
+    if assembly.shells.curved.any():
+        shell = assembly.shells.ids[np.argmax(assembly.shells.curved)]
+        raise ModelError(f"shell {shell} has nodes on its edges; only shells without are halved")
     halved, middle = _finer_shells(assembly)
     return _finer_beams(halved, middle)
 
