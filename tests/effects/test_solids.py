@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from chladni.effects.effect_context import EffectContext, Setup, surface
 from chladni.effects.masses import PointMass
 from chladni.effects.springs import ExtraSupport
+from chladni.reduced.accuracy import accuracy
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
@@ -60,3 +61,10 @@ def test_where_there_are_shells_solids_are_no_surface():
     """Beads of adhesive between sheets are no places of a mass."""
     sheet = plate(0.1, 0.1, 2, 2, 1e-3)
     assert surface(replace(sheet, solids=block().solids)) is sheet.shells.nodes
+
+
+def test_the_error_of_a_reduced_model_needs_no_shell(problem):
+    """At the parameters of its own basis nothing is missing."""
+    found = accuracy(problem, problem.model, [], np.zeros(0), TOP)
+    assert found.frequency.size
+    assert found.worst < 1e-6

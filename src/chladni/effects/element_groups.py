@@ -115,6 +115,12 @@ class ElementGroups:
         return len(self.area)
 
     @cached_property
+    def dofs(self) -> np.ndarray:
+        """Rows (m, 6 nodes) of the motion of all points that each element moves with."""
+        m, n = self.nodes.shape
+        return (6 * self.nodes[:, :, None] + np.arange(6)).reshape(m, 6 * n)
+
+    @cached_property
     def sheet(self) -> np.ndarray:
         """Mask (g,) of the groups of shells, which come first."""
         n = self.group[: len(self.structure.assembly.shells)].max(initial=-1) + 1
@@ -127,7 +133,7 @@ class ElementGroups:
         nodes = self.nodes.copy()
         nodes[len(assembly.shells) :] += len(assembly.points)  # beams do not connect sheets
         touch = sp.coo_array(
-            (np.ones(4 * len(parts)), (np.repeat(parts, 4), nodes.ravel())),
+            (np.ones(nodes.size), (np.repeat(parts, nodes.shape[1]), nodes.ravel())),
             shape=(len(assembly.parts), 2 * len(assembly.points)),
         ).tocsr()
         return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
@@ -180,9 +186,7 @@ class ElementGroups:
     @cached_property
     def _places(self) -> list["_Place"]:
         """The elements and dofs of every group."""
-        m, n = self.nodes.shape
-        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(m, 6 * n)
-        return [_Place.of(on, dofs[on], self.structure.T) for on in alike(self.group)]
+        return [_Place.of(on, self.dofs[on], self.structure.T) for on in alike(self.group)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -204,8 +204,7 @@ def bending_slopes(
     base: Baseline, model: Reduced, data: Data, sets: Sequence[np.ndarray]
 ) -> np.ndarray:
     """∂r/∂a of a·B added to K, with B the bending stiffness of each set of shells (n, n_sets)."""
-    groups, r = model.groups, model.vectors.shape[1]
-    dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), -1)
+    groups, dofs, r = model.groups, model.groups.dofs, model.vectors.shape[1]
     # stiffness changes no load of a base, and no shapes except those of the modes
     still = replace(base.state.without_slopes(), doffset=None, ddrive=None, dmoved={})
     out = [np.zeros((len(base.residual), 0))]

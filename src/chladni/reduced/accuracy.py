@@ -188,8 +188,7 @@ def _without_rise(model: Reduced, effects: Sequence[Effect], x: np.ndarray) -> U
 
 def _spread(model: Reduced, matrices: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Σ_e Tᵀ A_e T q of the shells' matrices (m, 24, 24)."""
-    T, nodes = model.groups.structure.T, model.groups.nodes
-    dofs = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), -1)
+    T, dofs = model.groups.structure.T, model.groups.dofs
     force = matrices @ (T @ q)[dofs]
     gather = sp.csr_array(
         (np.ones(dofs.size), (dofs.ravel(), np.arange(dofs.size))), shape=(T.shape[0], dofs.size)
