@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..decision.decision_rules import TIED
 from ..errors import FileError
 from ..inference.expected_information import (
     Forecast,
@@ -27,7 +28,7 @@ from ..results import ShownBriefly
 
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
-ODDS = 10.0
+ODDS = float(round(np.exp(TIED / 2)))  # that settle: beyond them a diagnosis ties nothing
 
 
 @dataclass(frozen=True)
