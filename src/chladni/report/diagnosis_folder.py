@@ -8,6 +8,7 @@ from ..case import Case
 from ..io.nastran import changed_lines, write_deck
 from ..output import write_json, write_npz
 from ..progress import Progress, silent
+from ..search import earlier_answer
 from ..search.next_measurement import FILE, arrays_of
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
@@ -50,6 +51,9 @@ def write_diagnosis(
         write_json(folder / "calibration.json", calibration_json(result))
     if result.outlook is not None:
         files["outlook"] = write_npz(folder / FILE, **arrays_of(result.outlook)).name
+    if result.posterior is not None:
+        left = earlier_answer.posterior_json(result.posterior)
+        files["posterior"] = write_json(folder / earlier_answer.FILE, left).name
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)
