@@ -76,7 +76,7 @@ class NextMeasurementEnv(gym.Env[np.ndarray, np.int64]):
         render_mode: str | None = None,
         **words: Any,
     ) -> None:
-        every = _outlooks(outlook, case, effects, words)
+        every = _outlooks(outlook, case, effects, words, odds)
         self.outlooks = tuple(o.without(without) for o in every)
         first = self.outlooks[0]
         if len(first.names) < 2:
@@ -165,13 +165,13 @@ class NextMeasurementEnv(gym.Env[np.ndarray, np.int64]):
 
 def _outlooks(
     outlook: "Outlook | Sequence[Outlook] | str | Path | None", case: Any, effects: Sequence[str],
-    words: dict[str, Any],
+    words: dict[str, Any], odds: float,
 ) -> tuple[Outlook, ...]:  # fmt: skip
     """The outlooks of an environment, with the same candidates."""
     if case is not None:
         from chladni.workflows.before_any_test import before_any_test
 
-        tests = before_any_test(case, tuple(effects), **words).open
+        tests = before_any_test(case, tuple(effects), odds=odds, **words).open
         if not tests:
             raise ShapeError("the planned test leaves nothing open; give fewer sensors")
         return with_common_candidates([t.outlook for t in tests])

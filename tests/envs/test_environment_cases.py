@@ -14,11 +14,12 @@ from chladni.errors import ChladniError, ShapeError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.search import measurement_forecasts
 from chladni.workflows.working_model import load
 from chladni_envs import IDS, agents
 from chladni_envs import environment_cases as cases
 from chladni_envs.parameter_selection import ParameterSelectionEnv
-from chladni_specimens.plates import folded_panel
+from chladni_specimens.plates import folded_panel, plate
 
 OF_A_CASE = tuple(i for i in IDS if i != "chladni/NextMeasurement-v0")  # it needs effects as well
 SOFT = 0.98  # of the panel's modulus in the article: its peaks move by half a half-bandwidth
@@ -258,3 +259,40 @@ def test_a_converted_mesh_is_in_every_environment_in_two_lines(id):
     env = names["env"]
     env.reset(seed=0)
     assert env.step(env.action_space.sample())[1] is not None
+
+
+@pytest.fixture(scope="module")
+def deck(tmp_path_factory):
+    """A plate, and two sensors and a drive on it."""
+    folder = tmp_path_factory.mktemp("next")
+    write_assembly(plate(0.4, 0.3, 6, 5, 2e-3), folder / "plate.bdf")
+    table = "label,role\n1:+Z,output\n24:+Z,output\n12:+Z,input\n"
+    (folder / "sensors.csv").write_text(table)
+    return folder
+
+
+def test_the_next_measurement_is_played_on_a_deck(deck):
+    """Articles with each effect are drawn; odds that none has keep all of them open."""
+    words = {"case": deck / "plate.bdf", "effects": ("point-mass", "mass-patch"), "units": "SI",
+             "sensors": deck / "sensors.csv", "top": 150.0}  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        for name, n in (("PLACES", 6), ("MASSES", 2), ("LINES", 8)):
+            patch.setattr(measurement_forecasts, name, n)
+        env = gym.make("chladni/NextMeasurement-v0", odds=1e12, **words)
+        with pytest.raises(ShapeError, match="leaves nothing open"):
+            gym.make("chladni/NextMeasurement-v0", odds=1.0, **words)
+    base = env.unwrapped
+    assert len(base.outlooks) == 2
+    assert all(o.names == ("point-mass", "mass-patch") for o in base.outlooks)
+    _, info = env.reset(seed=1)
+    assert any(label.startswith("sensor") for label in info["labels"])
+    assert {"drive", "mass", "band", "weighing"} <= {n.split()[0] for n in info["labels"]}
+    end = agents.play(env, agents.most_informative(env), seed=1)
+    assert end["kept"].any()
+    assert np.isclose(end["probability"].sum(), 1)
+    check_env(base, skip_render_check=True)
+
+
+def test_words_of_a_case_need_a_case():
+    with pytest.raises(ShapeError, match="top, crack: only a case takes these; give case="):
+        gym.make("chladni/NextMeasurement-v0", top=150.0, effects=("crack",))

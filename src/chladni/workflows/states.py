@@ -100,6 +100,7 @@ def _in_states(
         known = _joint(every, [_lead(e.found) for e in every]).posterior() if every else None
         state = _one_state(case, names, name)
         every.append(explained(state, diagnosing, stage, known, settings))
+    every = _with_data_of_all(every)
     joint = _joint(every, [_as_deck(e) for e in every])
     changed = any(e.found.verdict != "nothing missing" for e in every)
     every = [_with(e, fit, changed) for e, fit in zip(every, joint.fits, strict=True)]
@@ -119,6 +120,19 @@ def _in_states(
     distrust = tuple(f"state {s.name!r}: {why}" for s in results for why in s.result.distrust)
     notes = (*first.notes, *by_state(results))
     return replace(first, states=tuple(results), shared=shared, distrust=distrust, notes=notes)
+
+
+def _with_data_of_all(every: list[Explained]) -> list[Explained]:
+    """The explanations with the data of all states in what each leaves: a state knows the others.
+
+    The weighing of the first state counts in all of them.
+    """
+    known = [e.posterior for e in every if e.posterior is not None]
+    if not known:
+        return every
+    data, mass = {d: label for k in known for d, label in k.data.items()}, known[0].mass
+    left = (e.posterior and replace(e.posterior, data=data, mass=mass) for e in every)
+    return [replace(e, posterior=p) for e, p in zip(every, left, strict=True)]
 
 
 def _one_state(case: Case, names: tuple[str, ...], name: str) -> Case:
