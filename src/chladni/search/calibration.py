@@ -33,7 +33,6 @@ from ..reduced.reduced_model import evaluate
 from .diagnosis import (
     Diagnosis,
     best_base_fit,
-    named_by_fits,
     nominal_starts,
     without_effects,
 )
@@ -118,7 +117,7 @@ def calibration(
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
         profiled, predicted, sample=sample,
     )  # fmt: skip
-    return Calibrated(problem, named_by_fits(problem, found), study)
+    return Calibrated(problem, found, study)
 
 
 def about_nominal(problem: UpdatingProblem, delta: float | None = None) -> UpdatingProblem:

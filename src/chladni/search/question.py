@@ -151,7 +151,6 @@ class Prepared:
     numbers: float = (
         NUMBERS  # of the fitted modes and channels, beyond those that calibration takes
     )
-    kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     others: tuple[OtherTest, ...] = ()
     levels: LevelStudy = field(default_factory=LevelStudy)
     damping: np.ndarray | None = None  # of listed poles that are compared, nan where unknown
