@@ -26,7 +26,7 @@ from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.written_hypothesis import as_written
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import diagnosis as diagnosing
-from chladni.search.candidates import candidates, proposals, repeats
+from chladni.search.candidates import UpdatingContext, candidates, proposals, repeats
 from chladni.search.diagnosis import Diagnosis, FitChances, could_not_be_evaluated, threshold
 from chladni.search.hypotheses import Hypotheses
 from chladni.search.search_round import _of_the_same_lump, on_common_basis, search_round
@@ -347,10 +347,10 @@ def test_what_fails_numerically_is_one_hypothesis_lost(reduced):
     problem = problem_of(reduced, [lump(reduced, HERE, 1.0)], weight)
     problem = replace(problem, families=(broken, sinking, own))
     null = null_of(problem)
-    tried = proposals(problem, null)
-    singles = search_round(problem, null, tried.candidates, lambda text, share: None)
+    tried, lost = proposals(UpdatingContext(problem, null))
+    singles = search_round(problem, null, tried, lambda text, share: None)
     assert [t.effect.name for t in singles] == ["point-mass"]
-    assert sorted(could_not_be_evaluated(tried, singles)) == [
+    assert sorted(could_not_be_evaluated(tried, lost, singles)) == [
         "the hypothesis broken could not be evaluated: singular matrix",
         "the hypothesis sinking could not be evaluated: no start of its fit is a structure",
     ]

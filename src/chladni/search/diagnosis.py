@@ -16,6 +16,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.registry import families
+from ..effects.search_context import Candidate
 from ..errors import ModelError
 from ..inference.adequacy import FitTest, adequacy
 from ..inference.discrepancy import MEDIAN
@@ -34,7 +35,7 @@ from ..reduced.accuracy import accuracy
 from ..reduced.reduced_model import evaluate
 from ..sparse.freed_memory import give_back_freed_memory
 from .basis_refinement import TRIES
-from .candidates import Proposals, proposals, unasked
+from .candidates import UpdatingContext, proposals, unasked
 from .decision_rules import fits, required_gain
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
@@ -149,10 +150,10 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     problem, null = without_effects(problem)
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
     progress("scan of the catalogue", 0.2)
-    tried = proposals(problem, null)
+    tried, lost = proposals(UpdatingContext(problem, null))
     give_back_freed_memory()
-    hypotheses = search_round(problem, null, tried.candidates, within(progress, 0.3, 0.8))
-    notes = (*unasked(problem), *could_not_be_evaluated(tried, hypotheses))
+    hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
+    notes = (*unasked(problem), *could_not_be_evaluated(tried, lost, hypotheses))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     plain = as_written(null, problem.mass_measurement)
@@ -168,12 +169,14 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     return _names_alone(problem, found, 1)
 
 
-def could_not_be_evaluated(found: Proposals, hypotheses: Sequence[HypothesisFit]) -> Iterator[str]:
+def could_not_be_evaluated(
+    tried: Sequence[Candidate], lost: Mapping[str, str], hypotheses: Sequence[HypothesisFit]
+) -> Iterator[str]:
     """Sentences on families that failed numerically, where they were scanned or fitted."""
     fitted_ones = {t.effect.name for t in hypotheses}
-    proposed = dict.fromkeys(c.effect.name for c in found.candidates)
+    proposed = dict.fromkeys(c.effect.name for c in tried)
     unfit = {name: "no start of its fit is a structure" for name in proposed}
-    for name, why in {**unfit, **found.lost}.items():
+    for name, why in {**unfit, **lost}.items():
         if name not in fitted_ones:
             yield f"the hypothesis {name} could not be evaluated: {why}"
 
