@@ -60,20 +60,12 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class CalibrationSettings:
-    """Extent of a calibration.
+    """Extent of a calibration."""
 
-    Attributes
-    ----------
-    freeze : False keeps parameters free that the data do not know; they are named all the same
-    quick : fit from the prior mean alone, without further starts, profiles and bands
-    sample : draw from the posterior
-    starts : number of starts of a Latin hypercube
-    """
-
-    freeze: bool = True
-    quick: bool = False
-    sample: bool = False
-    starts: int = STARTS
+    freeze: bool = True  # False keeps parameters free that the data do not know, and names them
+    quick: bool = False  # fit from the prior mean alone, without starts, profiles and bands
+    sample: bool = False  # draw from the posterior
+    starts: int = STARTS  # of a Latin hypercube
 
 
 FULL = CalibrationSettings()

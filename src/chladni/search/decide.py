@@ -27,32 +27,18 @@ Step = str | Callable[[], str]
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """The outcome of a diagnosis, with its reasons.
+    """The outcome of a diagnosis, with its reasons."""
 
-    Attributes
-    ----------
-    verdict : one of the public verdicts
-    order : the named hypothesis, or the best candidate, is first
-    reason : why the decision ended
-    due : gain required to name the first
-    named : whether the first is named
-    one_of : explanations that the data cannot separate
-    tested : the hypothesis whose test of fit is the absolute one
-    news : gain of the first on the held-out data
-    passed_over : hypotheses that were tested before the first, and the refusal of each
-    steps : sentences on the steps that led to the decision; one that costs a fit is made when read
-    """
-
-    verdict: str
-    order: tuple[Explanation, ...] = ()
-    reason: Reason = Reason.NOTHING_DUE
-    due: float = 0.0
-    named: bool = False
-    one_of: tuple[str, ...] = ()
-    tested: Explanation | None = None
-    news: float | None = None
-    passed_over: Passed = ()
-    steps: tuple[Step, ...] = ()
+    verdict: str  # one of the public verdicts
+    order: tuple[Explanation, ...] = ()  # the named one, or the best candidate, is first
+    reason: Reason = Reason.NOTHING_DUE  # why the decision ended
+    due: float = 0.0  # gain required to name the first
+    named: bool = False  # whether the first is named
+    one_of: tuple[str, ...] = ()  # names that the data cannot separate
+    tested: Explanation | None = None  # whose test of fit is the absolute one
+    news: float | None = None  # gain of the first on the held-out data
+    passed_over: Passed = ()  # tested before the first, and the refusal of each
+    steps: tuple[Step, ...] = ()  # sentences; one that costs a fit is made when it is read
 
     @property
     def refused(self) -> bool:

@@ -67,43 +67,26 @@ class FitChances:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found.
+    """Fits of a diagnosis, and the answer that a decision gave."""
 
-    Attributes
-    ----------
-    nominal, null : fits without, and with calibration parameters free, scatter allowed in both
-    plain : the null in the form of a deck: what a named effect is compared with
-    hypotheses : best hypothesis of every family, best first
-    verdict : one of the public verdicts
-    notes : what was done and why, one sentence each
-    sets : several effects together, each of which pays, in the order in which the sets grew
-    chances : of the tests of fit that were made, by name
-    written : the named effect in the form of a deck
-    halved : ``plain`` and ``written`` with every shell halved, where the data prefer that mesh
-    adequacy : whether the explanation fits at all, where that was tested
-    one_of : what the data cannot tell apart, and what would settle it
-    gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
-    refused : why the leader is not named although it gains what is due
-    shared : whether the deck's numbers are those of several states of one object
-    passed_over : names of explanations that were asked before the leader, and what refused each
-    """
-
+    # without, and with calibration parameters free; scatter is allowed in both
     nominal: HypothesisFit
     null: HypothesisFit
-    plain: HypothesisFit
-    hypotheses: tuple[HypothesisFit, ...]
-    verdict: str = ""
-    notes: tuple[str, ...] = ()
-    sets: tuple[Several, ...] = ()
-    chances: Mapping[str, FitChances] = field(default_factory=dict)
-    written: HypothesisFit | None = None
+    plain: HypothesisFit  # the null in the form of a deck, with which a named effect is compared
+    hypotheses: tuple[HypothesisFit, ...]  # the best of every family, best first
+    verdict: str = ""  # one of the public verdicts
+    notes: tuple[str, ...] = ()  # what was done and why, one sentence each
+    sets: tuple[Several, ...] = ()  # of several effects, in the order in which they grew
+    chances: Mapping[str, FitChances] = field(default_factory=dict)  # tests that were made, by name
+    written: HypothesisFit | None = None  # the named effect in the form of a deck
+    # ``plain`` and ``written`` with every shell halved, where the data prefer that mesh
     halved: tuple[HypothesisFit, ...] = ()
-    adequacy: FitTest | None = None
-    one_of: tuple[str, ...] = ()
-    gains: tuple[float, ...] = ()
-    refused: str = ""
-    shared: bool = False
-    passed_over: tuple[tuple[str, str], ...] = ()
+    adequacy: FitTest | None = None  # the absolute test of fit, where there is one
+    one_of: tuple[str, ...] = ()  # what the data cannot separate, and what would settle it
+    gains: tuple[float, ...] = ()  # in -2 ln evidence, of each named effect with the others
+    refused: str = ""  # why the leader is not named although it gains what is due
+    shared: bool = False  # whether the deck's numbers are those of several states of one object
+    passed_over: tuple[tuple[str, str], ...] = ()  # names before the leader, and their refusals
 
     @property
     def found(self) -> HypothesisFit | None:

@@ -28,29 +28,19 @@ ALONE = "calibration alone"
 
 @dataclass(eq=False)
 class Explanation:
-    """One explanation; every test, score and deck of it is made once, and when it is read.
-
-    Attributes
-    ----------
-    rival : whether it is behind the leader, and has lost the model of its own
-    together : its members and what each gains, where it is several effects
-    known : its test of fit, where it was made before
-    note, distrust : of the refinement that made its fit
-    lost : why it could not be fitted again
-    after : test of the damping it leaves along the change of a leader
-    forgotten : whether its model is gone
-    """
+    """One explanation; every test, score and deck of it is made once, and when it is read."""
 
     case: "Hypotheses"
     fit: HypothesisFit
-    rival: bool = False
-    together: Several | None = None
-    known: FitChances | None = None
+    rival: bool = False  # whether it is behind the leader, and has lost the model of its own
+    together: Several | None = None  # its members and what each gains, of several effects
+    known: FitChances | None = None  # its test of fit, where it was made before
+    # of the refinement that made its fit
     note: str = ""
     distrust: tuple[str, ...] = ()
-    lost: str = ""
-    after: FitTest | None = None
-    forgotten: bool = False
+    lost: str = ""  # why it could not be fitted again
+    after: FitTest | None = None  # of the damping it leaves along the change of a leader
+    forgotten: bool = False  # whether its model is gone
 
     @property
     def name(self) -> str:
@@ -167,17 +157,13 @@ class Explanation:
 
 @dataclass(eq=False)
 class Hypotheses:
-    """All hypotheses of a diagnosis, and the problem on which one of them is fitted again.
-
-    Attributes
-    ----------
-    spare : the last rival that was fitted again; it keeps its model, 10 to 300 MB on a tailgate,
-        until the next one is
-    """
+    """All hypotheses of a diagnosis, and the problem on which one of them is fitted again."""
 
     question: Question
     prepared: Prepared
     found: Diagnosis
+    # the last rival that was fitted again; it keeps its model, 10 to 300 MB on a tailgate, until
+    # the next one is
     spare: Explanation | None = None
 
     @cached_property
