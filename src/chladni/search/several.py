@@ -83,8 +83,7 @@ def several(
 ) -> Search:  # fmt: skip
     """Sets of effects grown from the best one, where every member gains a good part of its price.
 
-    The fitted data alone suffice for sets that :attr:`Several.pay`. For other sets, held-out data
-    must supply the rest of the gain.
+    Sets that :attr:`Several.pay` can be named. The members of the others may be present too.
 
     Parameters
     ----------
