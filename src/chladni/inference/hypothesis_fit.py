@@ -216,7 +216,7 @@ class UpdatingProblem:
         """The responses of some base effects linear about x; computed once."""
         if (kept, x) not in self._linear:
             at = np.array(x)
-            J = self.data.scaled(evaluate(self.reduced.model, kept, at), True)[1]
+            J = self.data.scaled_slopes(evaluate(self.reduced.model, kept, at))
             self._linear[kept, x] = LinearModel(self.data.error, J, np.zeros((0, len(x)))), at
         return self._linear[kept, x]
 

@@ -191,7 +191,7 @@ def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.n
     unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in range(n))
     probe = _Probe(unknown, field=field)
     state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
-    _, J = data.scaled(state, True)
+    J = data.scaled_slopes(state)
     if base.mass_measurement is not None:
         J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
     return J[:, -n:]
@@ -220,7 +220,7 @@ def bending_slopes(
                 force[:r] += V.T @ own.reshape(len(V), -1)
 
         dK, dM = MatrixSlopes(len(chunk), [(len(chunk) - 1, bent)]), MatrixSlopes(len(chunk))
-        J = data.scaled(replace(still, dK=dK, dM=dM), True)[1]
+        J = data.scaled_slopes(replace(still, dK=dK, dM=dM))
         rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
     return np.concatenate(out, axis=1)
