@@ -31,7 +31,9 @@ def test_a_prior_has_one_cell_until_it_moves_modes_by_more_than_their_spread(pro
     """Beyond, cells grow with every direction of the prior that moves them."""
 
     def cells(effect):
-        model = problem.reduced.model.split_for(effect, np.array([p.mean for p in rolled.parameters]))
+        model = problem.reduced.model.split_for(
+            effect, np.array([p.mean for p in rolled.parameters])
+        )
         return pole_starts.cells(problem, model, [*problem.without(effect), effect])
 
     assert cells(wider(rolled, 0.2)) == 1.0

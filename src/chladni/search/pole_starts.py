@@ -35,7 +35,7 @@ def draws(effect: Effect, count: int) -> np.ndarray:
 def cells(problem: UpdatingProblem, model: Reduced, effects: Sequence[Effect]) -> float:
     """Π max(1, s_k / WIDE): regions of the last effect's prior with a pairing of their own.
 
-    s_k are the singular values of ∂ln f/∂x times the prior sd, over the root of the number of modes.
+    s_k are the singular values of ∂ln f/∂x times the prior sd, rms over the poles.
     """
     effect, data = effects[-1], problem.data
     assert isinstance(data, Poles)
