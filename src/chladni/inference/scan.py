@@ -187,14 +187,19 @@ class _Probe(Effect):
 
 def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.ndarray:
     """∂r/∂ln t, E or rho of every group, including the row of the weighing (n, n_groups)."""
-    n = len(model.groups)
-    unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in range(n))
-    probe = _Probe(unknown, field=field)
-    state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
+    groups = range(len(model.groups))
+    unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in groups)
+    return effect_slopes(base, model, data, _Probe(unknown, field=field))
+
+
+def effect_slopes(base: Baseline, model: Reduced, data: Data, effect: Effect) -> np.ndarray:
+    """∂r/∂x of an effect at its nominal values, including the row of the weighing (n, n_p)."""
+    nominal = np.array([p.nominal for p in effect.parameters])
+    state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, nominal]))
     J = data.scaled_slopes(state)
     if base.mass_measurement is not None:
         J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
-    return J[:, -n:]
+    return J[:, len(base.x) :]
 
 
 AT_ONCE = 64  # number of changes whose slopes are in memory at a time

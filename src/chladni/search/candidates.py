@@ -21,6 +21,7 @@ from ..inference.scan import (
     baseline,
     bending_slopes,
     direction_scores,
+    effect_slopes,
     field_slopes,
     oscillator_scores,
     point_scores,
@@ -111,16 +112,11 @@ def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> l
 
 
 def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
-    """Effects not searched on a structure of beams, and why; empty if it has shells."""
-    if problem.where.groups.sheet.any():
-        return ()
+    """Effects not searched on a structure without shells, and why; empty if it has some."""
     names = ", ".join(family.name for family in problem.families if family.on_sheets)
-    said = f"not searched, because they act on shells and the deck has none: {names}"
-    return (
-        *([said] if names else []),
-        "compliance of a joint where beams share a grid is not searched, because no element "
-        "models it; bushes between beams are searched",
-    )
+    if problem.where.groups.sheet.any() or not names:
+        return ()
+    return (f"not searched, because they act on shells and the deck has none: {names}",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,6 +305,14 @@ class UpdatingContext:
         """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
         base, model = self.baselines[about], self.problem.reduced.model
         return direction_scores(base, field_slopes(base, model, self.data, field) @ change)
+
+    def effect_scores(
+        self, about: int, effect: Effect, change: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of each change of an effect from its nominal values, and the score."""
+        base = self.context.baselines[about]
+        slopes = effect_slopes(base, self.context.problem.reduced.model, self.data, effect)
+        return direction_scores(base, slopes @ change)
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
         """Score of each fastener with some of its stiffness left (n, k)."""

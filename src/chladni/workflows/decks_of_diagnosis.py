@@ -97,11 +97,7 @@ def on_preferred_mesh(
     again = result_of(question, prepared, found, better)
     if last_step_in_words(again.agreement, bool(again.effects)):
         return stages, result
-    note = (
-        f"the mesh of the deck is too coarse to show the change: on it {worse}; the decks that "
-        "are written have every shell halved"
-    )
-    return better, replace(again, notes=(*again.notes, note))
+    return better, replace(again, halved=f"on the given mesh {worse}")
 
 
 def as_it_is(question: Question, searched: Modelled) -> Modelled:
