@@ -23,8 +23,8 @@ def joint_changes(deck: Deck, before: Assembly, after: Assembly, free: FreeIds) 
 
     A bush has a factor for each of its six directions, a spring or a mass has one factor.
 
-    A property is changed where all its elements changed alike; bushes and connectors that changed
-    otherwise get one of their own, whose id comes from ``free``.
+    A property is changed where all its elements changed in the same way. Bushes and connectors that
+    changed otherwise get one of their own, whose id comes from ``free``.
 
     Raises
     ------
@@ -101,7 +101,7 @@ _BUSHES = ("CBUSH", "CBUSH1D", "CGAP", "CWELD", "CFAST")
 def _bushes(deck: Deck, changed: dict[int, _BushChange], free: FreeIds) -> Iterator[Change]:
     """The property that bushes or connectors share; of those that changed otherwise their own.
 
-    What became of most stays with the card.
+    The card takes the change that most of them have.
     """
     for cards in deck.present(*_BUSHES):
         users: dict[int, dict[_BushChange, list[int]]] = {}

@@ -1,6 +1,7 @@
 """Unit factors, grids by row and coordinate systems, which every converter needs."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +71,18 @@ class Context:
         """Unit vectors (3, 3) of coordinate system ``cid`` at a basic place."""
         frame = self.frames.get(cid, cards, i)
         return frame.at(place[None])[0]
+
+
+def with_property(deck: Deck, cards: Cards) -> Iterator[tuple[int, Cards]]:
+    """Position of each element, and the card of its property: PGAP of a CGAP."""
+    name = "P" + cards.name[1:]
+    table = deck[name]
+    known = {int(id): i for i, id in enumerate(table.unique())}
+    for i, pid in enumerate(cards.properties().tolist()):
+        if pid not in known:
+            there = ", ".join(map(str, sorted(known)[:8])) or "none"
+            raise cards.refuse(i, f"there is no {name} {pid}; there are {there}")
+        yield i, table.single(known[pid])
 
 
 def parameter(deck: Deck, name: str) -> str:

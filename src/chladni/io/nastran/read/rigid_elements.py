@@ -8,6 +8,7 @@ from ....model.assembly import Average, Equation, RigidBody
 from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context, digits, id_list
+from .splines import spline
 from .springs_and_masses import skew
 
 Tie = RigidBody | Average | Equation
@@ -311,6 +312,7 @@ _READERS = {
     "RROD": _rrod,
     "RTRPLT": _rtrplt,
     "RBE1": _rbe1,
+    "RSPLINE": spline,
     "CRIGD1": _crigd1,
     "CRIGD2": _crigd2,
     "CRIGD3": _rbe1,
