@@ -8,7 +8,7 @@ from tests.builders.decks import alike, opened, rewritten
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
-from chladni.io.nastran import assembly
+from chladni.io.nastran import assembly, read_deck
 
 BEFORE = "SOL 103\nCEND\nSPC = 1\nBEGIN BULK\n"
 DECK = (
@@ -78,3 +78,14 @@ def test_numbers_without_units_are_those_of_the_deck(deck):
             before,
             replace(before, springs=replace(before.springs, value=0.9 * before.springs.value)),
         )
+
+
+def test_elements_that_are_allowed_are_passed_over(deck):
+    """--allow of a card that has been read since stays what it was: the structure without it."""
+    found, before = deck
+    names = ("CSHEAR", "CBEND", "RSPLINE")
+    bare = assembly(read_deck(found.path, names), "mm-t-s", loose=True)
+    assert not len(bare.springs)
+    assert not bare.rigid
+    assert len(bare.masses) == 2
+    assert len(before.springs) == 1 + 2 + 2 + 6

@@ -17,6 +17,7 @@ from .connectors import CONNECTORS, with_connectors
 from .context import Context, context, parameter, real_parameter
 from .curved_beams import curved_beams
 from .direct_matrices import direct
+from .general_elements import general_elements
 from .nonstructural_mass import with_nonstructural
 from .rigid_bushes import tied
 from .rigid_elements import ties
@@ -29,7 +30,7 @@ from .supports import selected, supports
 
 _STIFF = (
     "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D CGAP "
-    "CSHEAR CBEND".split()
+    "CSHEAR CBEND GENEL".split()
 )
 _ELEMENTS = (  # those of one kind have no id in common
     (*SHEETS, *SOLIDS, *_STIFF, *CONNECTORS),
@@ -96,9 +97,12 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         k6rot=_k6rot(deck),
     )
     made = with_nonstructural(ctx, tied(made), selected(deck, "NSM", subcase))
-    for read in (shear_panels, curved_beams):
-        found, masses = read(ctx)
-        made = with_springs(replace(made, masses=concatenated(made.masses, masses)), found)
+    if "CSHEAR" not in deck.allowed:
+        made = with_springs(made, *shear_panels(ctx))
+    if "CBEND" not in deck.allowed:
+        made = with_springs(made, *curved_beams(ctx))
+    if "GENEL" not in deck.allowed:
+        made = with_springs(made, general_elements(ctx))
     return with_connectors(ctx, made)
 
 

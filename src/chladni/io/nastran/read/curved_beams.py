@@ -85,8 +85,8 @@ def curved_beams(ctx: Context) -> tuple[list[StrainSpring], Masses]:
             compliance = np.array([1 / (E * A), *shear, 1 / (G * J), 1 / (E * I1), 1 / (E * I2)])
             K = np.linalg.inv(arc.flexibility(compliance, neutral))
             E_ab, eid = relative(arc.B - arc.A), cards.integer(i, 1)
-            span = float(np.linalg.norm(arc.B - arc.A))
-            springs += squares(eid, nodes[i].tolist(), E_ab, K, span, material.damping)
+            unit = np.array([1.0] * 3 + [float(np.linalg.norm(arc.B - arc.A))] * 3)
+            springs += squares(eid, nodes[i].tolist(), E_ab, K, unit, material.damping)
             each = material.rho * A + card.real(0, 19, 0.0) * ctx.scale.inertia / L
             lump = each * arc.half * arc.radius * np.diag([1.0] * 3 + [0.0] * 3)
             masses.append(Masses(np.full(2, eid), nodes[i], np.stack([lump, lump])))

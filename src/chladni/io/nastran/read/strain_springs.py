@@ -1,19 +1,19 @@
 """Elements that resist a few deformations, K = Σ k g gᵀ, as springs on scalar points.
 
 An equation makes a scalar point move by the deformation g · u, and a spring k holds it. Shear
-panels and curved beams are such elements. No card of a deck has these points.
+panels, curved beams and GENEL are such elements. No card of a deck has these points.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ....model.added_points import with_points
-from ....model.assembly import Assembly, Equation, Scalars, concatenated
+from ....model.assembly import Assembly, Equation, Masses, Scalars, concatenated
 
 FIRST = 102_000_001  # id of the first point that no card has
-_NOTHING = 1e-12  # of the largest factor of a deformation
+_NOTHING = 1e-14  # of the largest stiffness, or of the largest factor of a deformation: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,19 +28,19 @@ class StrainSpring:
 
 
 def squares(
-    id: int, nodes: Sequence[int], E: np.ndarray, K: np.ndarray, span: float, loss: float = 0.0
+    id: int, nodes: Sequence[int], E: np.ndarray, K: np.ndarray, unit: np.ndarray, loss: float = 0.0
 ) -> Iterator[StrainSpring]:
     """The deformations of a stiffness Eᵀ K E, one for each eigenvector of K.
 
     Parameters
     ----------
-    E : (6, 6n)    motions that K (6, 6) resists, rotations last
-    span : length by which rotations are made comparable with translations [m]
+    E : (m, 6n)    motions that K (m, m) resists
+    unit : (m,)    factors that make rotations comparable with translations
     """
-    unit = np.array([1.0] * 3 + [span] * 3)
     value, vectors = np.linalg.eigh(K / np.outer(unit, unit))
     for k, vector in zip(value.tolist(), vectors.T, strict=True):
-        yield StrainSpring(id, nodes, ((vector * unit) @ E).reshape(-1, 6), k, loss)
+        if abs(k) > _NOTHING * np.abs(value).max():
+            yield StrainSpring(id, nodes, ((vector * unit) @ E).reshape(-1, 6), k, loss)
 
 
 def relative(arm: np.ndarray) -> np.ndarray:
@@ -51,9 +51,12 @@ def relative(arm: np.ndarray) -> np.ndarray:
     return E
 
 
-def with_springs(made: Assembly, springs: Iterable[StrainSpring]) -> Assembly:
-    """The assembly with a scalar point, an equation and a spring for each deformation."""
-    found = list(springs)
+def with_springs(
+    made: Assembly, found: Sequence[StrainSpring], masses: Masses | None = None
+) -> Assembly:
+    """The assembly with a scalar point, an equation and a spring for each deformation; masses."""
+    if masses is not None:
+        made = replace(made, masses=concatenated(made.masses, masses))
     if not found:
         return made
     places = np.array([made.points[list(s.nodes)].mean(axis=0) for s in found])

@@ -80,7 +80,6 @@ REFUSED: Final = _by_name({  # {card: what of the structure it stands for}
     "CTRIAX CTRIAX6 CQUADX CQUADX4 CQUADX8 CTRAX3 CTRAX6 CCONEAX AXIC RINGAX FORCEAX AXIF AXSLOT",
     "spot welds, fasteners and seams": "CSEAM CBUTT CFILLET CSPOT",
     "bushings in two directions": "CBUSH2D",
-    "a matrix of stiffness": "GENEL",
     "ties": "RTRPLT1 RJOINT RSSCON RBE2GS RBE2F RBAR1 MPCREIG MPCY",
     "bolts with a preload": "BOLT",
     "lines in contact": "BLSEG BCONP",
