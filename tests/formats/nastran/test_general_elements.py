@@ -109,3 +109,15 @@ def test_a_scalar_point_has_no_component(bulk):
 )
 def test_a_matrix_that_is_none_is_refused(bulk, card, said):
     says(said, assembly, bulk(GRIDS + card), "mm-t-s", loose=True)
+
+
+def test_scalar_elements_make_their_points(bulk):
+    """What CELAS3, CMASS4 or a CELAS2 without a component names needs no SPOINT."""
+    mass = "PELAS,70,300.\nCMASS4,73,2.-3,51\nCELAS2,74,100.,51,,50\n"
+    text = GRIDS + "CELAS3,71,70,,50\nCMASS4,72,1.-3,50\n" + mass
+    found, due = (
+        assembly(bulk(text + more), "mm-t-s", loose=True) for more in ("", "SPOINT,50,51\n")
+    )
+    assert found.ids[found.scalar_points].tolist() == [50, 51]
+    alike(found, due, 1e-12)
+    says("grid 52 does not exist", assembly, bulk(text + "CELAS2,75,1.,52,1\n"), "mm-t-s")
