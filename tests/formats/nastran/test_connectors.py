@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from tests.builders.decks import alike, rewritten
 from tests.builders.refusals import says
 
-from chladni.effects.joints import fasteners, with_factor_on, with_family, without_joint
+from chladni.effects.joints import fasteners, lines, with_factor_on, with_family, without_joint
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly
 from chladni.model.assembly import Average
@@ -81,6 +81,13 @@ def test_length_of_a_weld_has_limits(bulk, gap, kind, length):
     assert k == pytest.approx(1e3 * E * np.pi * 25 / 4 / length)
 
 
+def test_a_fastener_may_lie_in_its_sheet(bulk):
+    """An axis in the plane of a patch: the weights of its square add up to four, as across it."""
+    deck = bulk(sheets("CFAST,900,31,ELEM,105,105,,300,7", gap=0.0))
+    (mean,) = (t for t in assembly(deck, "mm-t-s", loose=True).rigid if isinstance(t, Average))
+    assert sum(w for *_, w in mean.terms) == pytest.approx(4)
+
+
 def test_a_fastener_has_its_own_numbers(bulk):
     """KT1 along the axis; half of its mass lies at each end; GE is its loss."""
     made = assembly(bulk(sheets(FORMS["CFAST"])), "mm-t-s")
@@ -151,6 +158,7 @@ def test_a_connector_is_a_joint_that_may_be_soft(bulk, form, change):
     before = assembly(deck, "mm-t-s")
     found = fasteners(structure(before))
     assert [joint.ids for joint in found] == [(900,), (901,)]
+    assert lines(found) == [(0, 1)]
     assert all({*joint.parts} == {"PSHELL 1", "PSHELL 2"} for joint in found)
     after = CHANGES[change](before, found[0])
     with pytest.raises(AssertionError):

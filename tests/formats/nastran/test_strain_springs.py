@@ -9,6 +9,9 @@ from tests.builders.decks import alike, opened, rewritten
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck
+from chladni.units import UNITS
+from chladni_studies.variation import of_parts
+from chladni_studies.vary_text import vary_text
 
 BEFORE = "SOL 103\nCEND\nSPC = 1\nBEGIN BULK\n"
 DECK = (
@@ -89,3 +92,23 @@ def test_elements_that_are_allowed_are_passed_over(deck):
     assert not bare.rigid
     assert len(bare.masses) == 2
     assert len(before.springs) == 1 + 2 + 2 + 6
+
+
+def test_what_is_freed_stands_on_a_card_of_its_own(deck):
+    """K without parts means springs and bushes, not the deformations of a panel; PFAST has a K."""
+    found, before = deck
+    more = (
+        "CELAS2,81,5.,3,3\nGRID,8,,50.,40.,5.\nGRID,9,,50.,40.,-5.\nCFAST,82,83,ELEM,1,1,,8,9\n"
+        "PFAST,83,5.,,,1.+5,1.+5,1.+5,1.+7\n,1.+7,1.+7,.5-6\n"
+    )
+    found.path.write_text(found.path.read_text().replace("ENDDATA", f"{more}ENDDATA"))
+    again = read_deck(found.path)
+    made = assembly(again, "mm-t-s")
+    assert len(made.springs) == len(before.springs) + 1
+    for text, springs in (("K=90%:110%", [0]), ("K of PFAST 83=90%:110%", [])):
+        varied = of_parts(vary_text(text), made, again, UNITS["mm-t-s"])
+        changed = varied.applied(made, 1.1)
+        moved = np.flatnonzero(changed.springs.value != made.springs.value)
+        assert moved.tolist() == springs
+        np.testing.assert_allclose(changed.bushes.stiffness, 1.1 * made.bushes.stiffness)
+        rewritten(again, made, changed)

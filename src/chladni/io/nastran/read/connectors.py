@@ -208,7 +208,9 @@ def _axis(made: Assembly, one: _Connector, places: np.ndarray) -> np.ndarray:
 
 def _across(axis: np.ndarray, towards: np.ndarray | None = None) -> np.ndarray:
     """Rows x, y, z of a frame along an axis; y near ``towards`` or the least component's axis."""
-    y = np.eye(3)[np.argmin(np.abs(axis))] if towards is None else towards
+    y = np.eye(3)[np.argmin(np.abs(axis))]
+    if towards is not None and np.linalg.norm(np.cross(axis, towards)) > 1e-6:
+        y = towards
     y = y - axis * (axis @ y)
     y = y / np.linalg.norm(y)
     return np.array([axis, y, np.cross(axis, y)])
