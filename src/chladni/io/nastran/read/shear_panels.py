@@ -1,9 +1,9 @@
 """Shear panels (CSHEAR): one shear flow round the edges, and rods along them (PSHEAR, F1 and F2).
 
 A panel resists one deformation. Shear flows of its edges that are in equilibrium add up to forces
-along its diagonals. With the flow q of side 1-2 the shear stress is τ t = q p_1 p_2 / p², where p
-is the distance from the line through the points at which opposite sides meet. Its energy, with the
-stress normal to the edges' directions that equilibrium asks for, is
+along its diagonals. Opposite sides meet in two points, and p is the distance from the line through
+both. With the flow q of side 1-2 the shear stress is τ t = q p_1 p_2 / p². Its energy, with the
+normal stress that equilibrium asks for, is
 
     U = q²/2 ∫ (p_1 p_2 / p²)² (1 + 2 cot²α / (1+ν)) dA / G t
 

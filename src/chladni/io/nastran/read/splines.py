@@ -2,8 +2,9 @@
 
 The dofs that the card names carry no load: K_dd q_d + K_di q_i = 0, K the stiffness of the line.
 On a straight line between independent grids the tube's diameter cancels: translations along the
-line and twist are linear, deflections cubic. Where the line bends, the wall of the tube is thin and
-Poisson's ratio 0.3, which no manual states: I = A D²/8, J = 2 I, D is D/L times the whole length.
+line and twist are linear, deflections cubic. Where the line bends, the tube matters, which no
+manual describes. Its wall is thin here (I = A D²/8, J = 2 I), its Poisson's ratio 0.3, its diameter
+D/L times the whole length.
 """
 
 from collections.abc import Iterator
