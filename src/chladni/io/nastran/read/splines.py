@@ -39,11 +39,11 @@ def spline(ctx: Context, cards: Cards, i: int) -> Iterator[Equation]:
     if not ratio > 0:
         raise cards.refuse(i, f"D/L is {ratio:g}; it is to be positive")
     K, span = _line(ctx, cards, i, rows, ratio)
-    dependent = [6 * k + c - 1 for k, some in enumerate(follow) for c in some]
+    dependent = np.array([6 * k + c - 1 for k, some in enumerate(follow) for c in some])
     rest = np.setdiff1d(np.arange(len(K)), dependent)
     unit = np.tile([1.0] * 3 + [span] * 3, len(rows))
     G = -np.linalg.solve(K[np.ix_(dependent, dependent)], K[np.ix_(dependent, rest)])
-    for d, line in zip(dependent, G, strict=True):
+    for d, line in zip(dependent.tolist(), G, strict=True):
         at = np.flatnonzero(np.abs(line) > _NOTHING * np.abs(line).max())
         dofs = [d, *rest[at].tolist()]
         factors = [-1.0, *(line[at] * unit[rest[at]] / unit[d])]
