@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..decision.decision_rules import TIED
 from ..errors import FileError
 from ..inference.expected_information import (
     Forecast,
@@ -25,6 +24,7 @@ from ..inference.expected_information import (
 )
 from ..inference.result import NextMeasurement
 from ..results import ShownBriefly
+from .decision_rules import TIED
 
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
