@@ -20,7 +20,7 @@ from chladni.output import write_json
 from chladni.search.candidates import candidates
 from chladni.search.earlier_answer import (
     FILE,
-    Known,
+    KnownParameter,
     _moments,
     digests,
     earlier_answer,
@@ -55,11 +55,11 @@ def known(fits):
 @pytest.mark.parametrize("kind", ["log", "linear"])
 def test_a_prior_keeps_its_physical_value_where_the_scale_differs(kind):
     p = Parameter("M", "kg", 0.0, 9.0, scale=0.5, kind=kind)
-    now = Known("M", 0.7, 0.2, 2.0).of(p)
+    now = KnownParameter("M", 0.7, 0.2, 2.0).of(p)
     then = replace(p, scale=2.0)
     assert_allclose(now.value(now.mean), then.value(0.7))
     assert_allclose(now.value(now.mean + now.sd), then.value(0.9))
-    assert Known("M", 0.7, 20.0, 0.5).of(p).sd == p.sd
+    assert KnownParameter("M", 0.7, 20.0, 0.5).of(p).sd == p.sd
 
 
 def test_the_mixture_has_its_moments():

@@ -37,7 +37,7 @@ DIGITS = 4  # of a response, by which a file is known again in another format
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownParameter:
     """A parameter of an effect as its fit left it: x ~ N(mean, sd²), of value scale eˣ or scale x.
 
     ``sd`` is widened as that of an interval is.
@@ -73,7 +73,7 @@ class KnownEffect:
     text: str
     point_m: tuple[float, ...] | None
     radius_m: float
-    parameters: tuple[Known, ...]
+    parameters: tuple[KnownParameter, ...]
 
     def informed(self, effect: Effect) -> Effect:
         """An effect of this name with the prior that its place gives it."""
@@ -100,7 +100,7 @@ class KnownEffect:
 
 @dataclass(frozen=True)
 class EarlierAnswer:
-    """What an answer leaves to a later recording.
+    """Odds and posterior of an answer, for a later recording.
 
     Attributes
     ----------
@@ -146,9 +146,9 @@ class EarlierAnswer:
     def note(self) -> str:
         """The answer that a result builds on, in a sentence."""
         return (
-            f"this answer builds on that of {self.folder} ({self.said}): its odds and its "
-            "posterior of E, rho, t and effects are the prior here, so gains are those of both "
-            "recordings; a place where it found no effect has no odds from it"
+            f"this answer builds on that of {self.folder} ({self.said}): its odds and posterior "
+            "are the prior here, so gains are those of both recordings; effects elsewhere than it "
+            "found them have no odds from it"
         )
 
 
@@ -174,7 +174,7 @@ def earlier_answer(
     found: "Diagnosis", said: str, mass: float | None, data: dict[str, str],
     before: EarlierAnswer | None = None,
 ) -> EarlierAnswer:  # fmt: skip
-    """What a diagnosis leaves to a later recording; the data of the answer before it count too."""
+    """Odds and posterior of a diagnosis; it used the data of the answer before it as well."""
     alone = [h for h in found.hypotheses if len(h.effects) == 1]
     effects = tuple(
         _known(h, found.two_log_bayes_factor(h)) for h in alone if h.effect in h.fit.effects
@@ -187,7 +187,7 @@ def _known(h: HypothesisFit, gain: float) -> KnownEffect:
     x, sd = h.fit.of(h.effect), h.fit.sd(h.effect)
     place, wide = h.effect.location(x, sd), h.effect.widened(sd)
     each = zip(h.effect.parameters, x.tolist(), wide.tolist(), strict=True)
-    parameters = tuple(Known(p.name, mean, s, p.scale) for p, mean, s in each)
+    parameters = tuple(KnownParameter(p.name, mean, s, p.scale) for p, mean, s in each)
     radius = place.radius_m or 0.0
     return KnownEffect(h.effect.name, gain, h.effect.text, place.point_m, radius, parameters)
 
@@ -269,6 +269,6 @@ def _read(rows: Sequence[dict[str, Any]]) -> Iterator[KnownEffect]:
         yield KnownEffect(
             str(row["name"]), float(row["two_log_odds"]), str(row["text"]),
             None if point is None else tuple(float(v) for v in point), float(row["radius_m"]),
-            tuple(Known(str(p["name"]), *(float(p[k]) for k in ("mean", "sd", "scale")))
+            tuple(KnownParameter(str(p["name"]), *(float(p[k]) for k in ("mean", "sd", "scale")))
                   for p in row["parameters"]),
         )  # fmt: skip

@@ -132,7 +132,7 @@ def explained(
 
 
 def _left_to_later(made: Explained, found: Diagnosis) -> EarlierAnswer:
-    """What the answer leaves to a later recording of the same object."""
+    """Odds and posterior of the answer, for a later recording of the same object."""
     case, names = made.case, found.one_of
     named = found.found
     said = named.name if named else f"one of {', '.join(names)}" if names else found.verdict

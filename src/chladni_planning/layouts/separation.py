@@ -1,10 +1,10 @@
 """Sensors that tell explanations apart, as candidates of a layout.
 
-Two explanations predict the data y of a sensor as N(μ_i, I + F_i F_iᵀ).  Let a be 0 under the one
-and 1 under the other: y = μ_1 + a (μ_2 - μ_1) + F u + noise, with F the half of both.  What a
-layout tells of a, with u unknown, is the growth of ln(1/Var a) = ln(1 + d²), where d is their
-distance in units of all that is not known.  That is the criterion of one parameter of interest
-(Atkinson and Cox 1974, J. R. Stat. Soc. B 36, 321-348), ``S`` of :func:`.information.value`.
+Two explanations predict the data y of a sensor as N(μ_i, I + F_i F_iᵀ).  Both are one model
+y = μ_1 + a (μ_2 - μ_1) + F u + noise.  There a is 0 or 1, and F is the mean of both in variance.
+A layout with u unknown reduces Var a by 1 + d², where d is the distance of the explanations in
+units of all that is not known.  The objective is ln(1 + d²), that of one parameter of interest
+(Atkinson and Cox 1974, J. R. Stat. Soc. B 36, 321-348): ``S`` of :func:`.information.value`.
 """
 
 from collections.abc import Sequence
