@@ -311,7 +311,8 @@ class UpdatingContext:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of an effect from its nominal values, and the score."""
         base, model = self.baselines[about], self.problem.reduced.model
-        return direction_scores(base, effect_slopes(base, model, self.data, effect) @ change)
+        slopes = effect_slopes(base, model, self.data, effect)
+        return direction_scores(base, slopes @ change)
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
         """Score of each fastener with some of its stiffness left (n, k)."""
