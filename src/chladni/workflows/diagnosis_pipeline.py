@@ -136,7 +136,10 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit))
     study = known.study
     if not diagnosing:
-        reasons = compensating(found.plain.fit, result, question.mass_measurement)
+        reasons = compensating(
+            found.plain.fit, result.agreement, result.mass, question.mass_measurement,
+            result.residual_localisation,
+        )  # fmt: skip
         distrust = (*distrust, *reasons)
         if study is not None:
             rows, fit = result.frequencies, found.plain.fit
