@@ -29,7 +29,7 @@ from chladni.inference.scan import baseline
 from chladni.io.nastran import assembly, read_deck, write_assembly
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni.search.candidates import Scan
+from chladni.search.candidates import UpdatingContext
 from chladni.search.fastener_scan import (
     AT_ONCE,
     batched,
@@ -104,13 +104,12 @@ def context(ground, welds, data):
     base = baseline(
         ground.model, [calibration_parameter(ground.groups, "E", [0])], data, None, np.zeros(1)
     )
-    made = SimpleNamespace(
-        problem=SimpleNamespace(reduced=ground), baselines=(base, base),
-        loosened=tuple(welds), loosened_rows=loosened_rows(ground),
-        bases=(np.zeros(1), np.zeros(1)), where=SimpleNamespace(groups=ground.groups),
-        fasteners=tuple((one.joint, one.share) for one in welds),
-    )  # fmt: skip
-    made.scan = Scan(made, data)
+    where = SimpleNamespace(groups=ground.groups)
+    problem = SimpleNamespace(reduced=ground, data=data, where=where)
+    made = UpdatingContext(problem, SimpleNamespace())
+    vars(made).update(
+        baselines=(base, base), bases=(np.zeros(1), np.zeros(1)), loosened=tuple(welds)
+    )
     return made
 
 
