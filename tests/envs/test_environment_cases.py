@@ -8,12 +8,14 @@ from numpy.testing import assert_array_equal
 from tests.builders.environments import story
 from tests.builders.structures import stiffer
 
+import chladni
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
 from chladni.errors import ChladniError, ShapeError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.report import identification_page
 from chladni.workflows.working_model import load
 from chladni_envs import IDS, agents
 from chladni_envs import environment_cases as cases
@@ -100,6 +102,20 @@ def test_info_names_what_is_kept(ready, case):
     assert set(end["labels"]) <= set(ready.names)
     env = gym.make("chladni/SensorPlacement-v0", phi=np.eye(5)[:, :2], n_sensors=3)
     assert len(env.reset(seed=0)[1]["labels"]) == 5
+
+
+def test_identify_moves_the_test_on_the_mesh_of_its_case(case, tmp_path):
+    """As its sensors do; a recording alone, and a mesh that takes long, move sensors only."""
+    page = identification_page.identification_page
+    (drawing, *_), *_ = (s.blocks for s in page(tmp_path, chladni.identify(case)).sections)
+    sides = drawing.content.data["sides"]
+    assert list(sides) == ["expanded", "test"]
+    seen = folded_panel()
+    used = np.unique(seen.shells.nodes)
+    at = [int(np.searchsorted(used, seen.rows([int(n.partition(":")[0])])[0])) for n in SENSORS]
+    for whole, test in zip(sides["expanded"], sides["test"], strict=True):
+        z, known = np.array(whole["motion"])[2, at], np.array(test["motion"])
+        assert z @ known > 0.99 * np.linalg.norm(z) * np.linalg.norm(known)
 
 
 def test_vectors_with_a_case_are_identical(case):

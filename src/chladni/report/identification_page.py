@@ -203,7 +203,7 @@ def _shapes(
         sides = {EXPANDED: ModeSet(m.frequency, whole[used], psi, damping=damping), **sides}
         said += f" {ON_MESH}"
     auto = auto_mac(driven_shapes(m)) if 1 < m.order <= _MATRIX else None
-    alike = {} if auto is None else {f"{name}|test": auto for name in sides}
+    alike = {} if auto is None else {f"{name}|{name}": auto for name in sides}
     content = spatial("shapes", shown, lambda: live_shapes(
         sides, [[k] * len(sides) for k in range(m.order)], shown,
         [sensors[label] for label in outputs], alike,
