@@ -43,7 +43,7 @@ function button(box, text, pressed) {
 function layout(more) {
   const axis = { gridcolor: colour("line"), zerolinecolor: colour("line"), linecolor: colour("soft") };
   const made = {
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: 15, t: 25, b: 45 },
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: more.showlegend ? 42 : 15, t: 25, b: 45 },
     font: { color: colour("ink"), size: 12, family: "system-ui, DejaVu Sans, sans-serif" },
     hoverlabel: { align: "left", bgcolor: colour("sheet"), font: { color: colour("ink") } },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("ink"), orientation: more.showlegend ? "v" : "h" },
