@@ -125,7 +125,7 @@ themselves.
 | solids | E, rho, nu |
 | beams | E, rho |
 | closed tubes | wall: one factor on A, I1, I2, I12 and J, whatever card they stand in |
-| springs (`PELAS`, `CELAS2`), bushes (`PBUSH`) | K |
+| springs (`PELAS`, `CELAS2`), bushes and connectors (`PBUSH`, `PBUSH1D`, `PWELD`, `PFAST`) | K |
 | `CONM2` | M |
 
 `global-stiffness` and `part-stiffness` are E, `global-density` is rho, `thickness-scale` is t,

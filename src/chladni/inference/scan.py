@@ -196,7 +196,7 @@ def effect_slopes(base: Baseline, model: Reduced, data: Data, effect: Effect) ->
     """∂r/∂x of an effect at its nominal values, including the row of the weighing (n, n_p)."""
     nominal = np.array([p.nominal for p in effect.parameters])
     state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, nominal]))
-    _, J = data.scaled(state, True)
+    J = data.scaled_slopes(state)
     if base.mass_measurement is not None:
         J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
     return J[:, len(base.x) :]
@@ -225,7 +225,7 @@ def bending_slopes(
                 force[:r] += V.T @ own.reshape(len(V), -1)
 
         dK, dM = MatrixSlopes(len(chunk), [(len(chunk) - 1, bent)]), MatrixSlopes(len(chunk))
-        J = data.scaled(replace(still, dK=dK, dM=dM), True)[1]
+        J = data.scaled_slopes(replace(still, dK=dK, dM=dM))
         rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
     return np.concatenate(out, axis=1)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..case import Case
-from ..decision.decision_rules import RULES, odds_of_something_else
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
@@ -20,6 +19,7 @@ from ..io.nastran import assembly
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
+from ..search.decision_rules import RULES, odds_of_something_else
 from ..search.diagnosis import Diagnosis
 from ..search.frequency_table import frequency_error, frequency_rows
 from ..search.measured_modes import MeasuredModes, measured_modes
