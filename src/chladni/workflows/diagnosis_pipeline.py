@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..case import Case
-from ..decision.reasons import ALONE
 from ..ema.finding import Finding, Screening
 from ..inference.calibration_result import CalibrationStudy
 from ..inference.implausible_values import in_doubt
@@ -28,7 +27,7 @@ from ..search.damping_by_part import damping_by_part
 from ..search.decide import decide
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
-from ..search.hypotheses import Hypotheses
+from ..search.hypotheses import ALONE, Hypotheses
 from ..search.left_frequencies import left_frequencies
 from ..search.measurement_forecasts import outlook
 from ..search.next_measurement import Outlook, advised
