@@ -299,6 +299,6 @@ FAMILY = Family(
     candidates=candidates,
     closer=closer,
     cards=("MAT1", "MAT9", "PSOLID", "CHEXA", "CPENTA", "CPYRAM", "CTETRA"),
-    settled_by="look into the solid there by X-ray or ultrasound, and weigh it in pieces",
+    settled_by="tap the solid there and next to it, and look into it by ultrasound or X-ray",
     needs="solids",
 )
