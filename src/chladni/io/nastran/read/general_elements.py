@@ -36,7 +36,7 @@ def _element(ctx: Context, cards: Cards, i: int) -> Iterator[StrainSpring]:
         raise cards.refuse(i, "it gives no dofs UI, or not one of K and Z")
     if len({*u_i, *u_d}) < m + n:
         raise cards.refuse(i, "a dof is named twice")
-    A = np.zeros((m, m))
+    A: np.ndarray = np.zeros((m, m))
     A[np.triu_indices(m)] = _numbers(cards, i, kind, lists[kind], m * (m + 1) // 2)
     A = A + np.triu(A, 1).T
     size = _sizes(ctx, u_i)
