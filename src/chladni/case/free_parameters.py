@@ -219,9 +219,10 @@ def _all_that_have(
         for family, name in _OF_LUMPS.items()
         if name == field and len(getattr(made, family))
     }
-    for family in lumps.keys() & _HELD_BY.keys() if deck is not None else ():
-        own = sum(map(len, deck.present(*_HELD_BY[family])))
-        lumps[family] = [row for row in lumps[family] if row < own]
+    if deck is not None:
+        for family in lumps.keys() & _HELD_BY.keys():
+            own = sum(len(cards) for cards in deck.present(*_HELD_BY[family]))
+            lumps[family] = [row for row in lumps[family] if row < own]
     if "bushes" in lumps:
         lumps["bushes"] = np.flatnonzero(made.bushes.stiffness.any(axis=1)).tolist()
     if not positions and not any(lumps.values()):

@@ -310,8 +310,8 @@ class UpdatingContext:
         self, about: int, effect: Effect, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of an effect from its nominal values, and the score."""
-        base = self.context.baselines[about]
-        slopes = effect_slopes(base, self.context.problem.reduced.model, self.data, effect)
+        base, model = self.baselines[about], self.problem.reduced.model
+        slopes = effect_slopes(base, model, self.data, effect)
         return direction_scores(base, slopes @ change)
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
