@@ -11,7 +11,9 @@ from typing import Any
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
+import command_pages  # noqa: E402
 import mathml  # noqa: E402
+import name_links  # noqa: E402
 import reference_pages  # noqa: E402
 import tutorial_blocks  # noqa: E402
 
@@ -34,6 +36,7 @@ suppress_warnings = ["config.cache"]
 highlight_language = "none"
 
 autodoc_typehints = "none"  # the signature of a docstring says shapes and units
+autodoc_preserve_defaults = True
 autodoc_member_order = "bysource"
 autosummary_generate = False
 numpydoc_show_class_members = False
@@ -49,6 +52,7 @@ html_math_renderer = "mathml"
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,
+    "navigation_depth": 2,  # the sidebar lists pages, and no Python names
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],
@@ -64,16 +68,22 @@ def _bars(app: Any, what: str, name: str, value: object, options: object, lines:
 def setup(app: Any) -> None:
     """Write the reference, run the tutorials, and show what they printed and drew."""
     mathml.setup(app)
+    name_links.setup(app)
     quick = app.tags.has("quick")
-    outputs: dict[str, list[str] | None] = {}
+    runs = [*sorted((DOCS / "tutorials").glob("*.md")), command_pages.GALLERY]
+    outputs: dict[Path, list[str] | None] = dict.fromkeys(runs)
 
     def run(app: Any) -> None:
-        for page in sorted((DOCS / "tutorials").glob("*.md")):
-            outputs[f"tutorials/{page.stem}"] = None if quick else tutorial_blocks.run(page)
+        if not quick:
+            outputs.update((page, tutorial_blocks.run(page)) for page in runs)
 
     def show(app: Any, name: str, source: list[str]) -> None:
-        if "_build/tutorials" in source[0] or name in outputs:
-            source[0] = tutorial_blocks.shown(DOCS / f"{name}.md", outputs.get(name))
+        page = DOCS / f"{name}.md"
+        own = outputs.get(page)
+        if page.parent.name == "commands":
+            own = command_pages.outputs(page.stem, outputs[command_pages.GALLERY])
+        if page in outputs or "_build/tutorials" in source[0]:
+            source[0] = tutorial_blocks.shown(page, own)
 
     reference_pages.write(DOCS / "reference")
     app.connect("builder-inited", run)
