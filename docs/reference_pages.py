@@ -566,7 +566,7 @@ class _Grounds:
 
 def decision_rules() -> str:
     """Every rule of a decision with its number, from their dataclass."""
-    from chladni.decision.decision_rules import DecisionRules
+    from chladni.search.decision_rules import DecisionRules
 
     rows = [
         (f"`{f.name}`", f"`{f.default}`", f.metadata["why"])
@@ -575,7 +575,7 @@ def decision_rules() -> str:
     return "\n".join(
         [
             "# Rules of the decision\n",
-            BY.format("`chladni.decision.decision_rules`"),
+            BY.format("`chladni.search.decision_rules`"),
             "Gains are in -2 ln evidence. *Due* is the gain that a name needs. "
             "[Decision](../theory/decision.md) explains the road.\n",
             table(("rule", "value", "purpose"), rows),

@@ -82,8 +82,8 @@ BUGS = (
         "self.patch.slope(at, k) for k", "tests/effects/test_contract.py",
     ),
     DeliberateBug(  # half of the gain that a name costs
-        "src/chladni/decision/decision_rules.py", "return 2 * math.log(tried / chance)",
-        "return math.log(tried / chance)", "tests/decision",
+        "src/chladni/search/decision_rules.py", "return 2 * math.log(tried / chance)",
+        "return math.log(tried / chance)", "tests/search/test_decide.py",
     ),
     DeliberateBug(  # soft modes beside a stiff part are off by the shift
         "src/chladni/reduced/real_modes.py", "return 1 / mu - shift,", "return 1 / mu,",

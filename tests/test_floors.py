@@ -28,7 +28,6 @@ GROUND = {
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
     "model": GROUND,
-    "decision": GROUND,
     "geometry": GROUND | {"model"},
     "sparse": GROUND,
     "dynamics": GROUND | {"sparse"},
@@ -38,7 +37,7 @@ MAY_IMPORT = {  # floor: the floors it may use, its own aside
     "effects": GROUND | {"model", "geometry", "dynamics", "fem", "ema"},
 }
 MAY_IMPORT["reduced"] = MAY_IMPORT["effects"] | {"effects", "sparse"}
-MAY_IMPORT["inference"] = MAY_IMPORT["reduced"] | {"reduced", "decision"}
+MAY_IMPORT["inference"] = MAY_IMPORT["reduced"] | {"reduced"}
 MAY_IMPORT["search"] = MAY_IMPORT["inference"] | {"inference"}
 MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io", "effects"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}

@@ -1,5 +1,6 @@
 """Actuator placement: shakers are chosen one a step; places that would rattle are vetoed."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
@@ -7,7 +8,7 @@ import numpy as np
 
 from chladni.dynamics.frf import Quantity
 from chladni.errors import ShapeError
-from chladni_planning import best_layout, rattle_margin, shaking
+from chladni_planning import Rules, best_layout, rattle_margin, shaking
 
 from . import drawing
 from .reset_first import refuse_before_reset
@@ -53,6 +54,8 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     units : str               unit system of a bare deck, as mm-t-s; a case states its own. Where it
                               is missing, the materials show it, and ``notes`` and the info of a
                               reset name it.
+    regions, fixed, forbidden : places of a case, in the words of ``chladni.plan``; without them
+                              those of [plan] of the case. Fixed ones are sensors.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
@@ -71,17 +74,25 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         case: "Source | None" = None,
         modes: int = 24,
         units: str | None = None,
+        regions: Sequence[str] = (),
+        fixed: Sequence[str] = (),
+        forbidden: Sequence[str] = (),
         render_mode: str | None = None,
     ) -> None:
         if specimen is None:
-            specimen = plate(7, 7, 6) if case is None else of_case(case, modes, units)
+            places = {"regions": regions, "fixed": fixed, "forbidden": forbidden}
+            specimen = of_case(case, modes, units, places, plate(7, 7, 6))
         s = self.specimen = specimen
         self.notes = s.notes
         n, r = s.phi.shape
         access = s.access if access is None else access
         if gap_shapes is None and clearance is None:
             gap_shapes, clearance = s.gap_shapes, s.clearance
-        at = best_layout(s.phi, min(n, r + 2)) if sensors is None else np.asarray(sensors)
+        if sensors is None:
+            held = np.zeros(n, bool) if s.fixed is None else s.fixed
+            count = max(min(n, r + 2), int(held.sum()))
+            sensors = best_layout(s.phi, count, rules=Rules(fixed=held))
+        at = np.asarray(sensors)
         self.shaker = shaking(s.frequency, s.damping, s.phi[at], s.phi, quantity)
         self.allowed = np.ones(n, bool) if access is None else np.asarray(access, bool).copy()
         self.margin = np.full(n, np.inf)

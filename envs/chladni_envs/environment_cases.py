@@ -2,16 +2,18 @@
 
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from chladni.arguments import settings_of
 from chladni.case import Case, load_case
 from chladni.effects.effect import Effect, Parameter
 from chladni.errors import FileError
 from chladni.inference.likelihood import Responses
 from chladni.reduced.reduced_model import State, evaluate
 from chladni.workflows.given_case import Source
-from chladni.workflows.loaded_model import is_case, model_in_si
+from chladni.workflows.loaded_model import is_case, model_in_si, opened
 from chladni.workflows.question_of_case import prepared
 from chladni_planning import (
     Linearised,
@@ -22,6 +24,7 @@ from chladni_planning import (
     openings,
     seen_at,
     target_modes,
+    with_places_of,
 )
 
 from .calibration_questions import CalibrationQuestion
@@ -32,7 +35,7 @@ REACH = 2.0  # bounds of a calibration environment, in prior standard deviations
 
 
 def specimen(
-    case: Source, modes: int, *, candidates: int = 300, units: str | None = None
+    case: Source, modes: int, *, candidates: int = 300, units: str | None = None, **places: Any
 ) -> ModalSpecimen:
     """Flat, reachable places found on the mesh and the first flexible modes along their normals.
 
@@ -46,23 +49,30 @@ def specimen(
     candidates : int     largest number of places
     units : str          unit system of a bare deck; default the one that its materials show, which
                          the notes name
+    places : ``regions``, ``fixed``, ``forbidden``, ``cost`` of :class:`PlanSettings`; without them
+             those of [plan] of the case
     """
-    model, said = model_in_si(case, "plan", units)
-    places = find_sensor_candidates(model.assembly, candidates, unit=model.unit)
-    target, _, _ = target_modes(model.structure, PlanSettings(modes=modes))
-    mounts, moving = mounts_at(places), motion(model.structure, target)
-    labels, seen = mounts.labels[: len(places)], model.seen
+    given = opened(case, units)
+    settings = with_places_of(given, settings_of(PlanSettings, PlanSettings(modes=modes), places))
+    model, said = model_in_si(given, "plan")
+    rules = settings.rules(model.assembly, model.seen)
+    found = find_sensor_candidates(model.assembly, candidates, unit=model.unit, rules=rules)
+    target, _, _ = target_modes(model.structure, settings)
+    mounts, moving = mounts_at(found), motion(model.structure, target)
+    labels, seen = mounts.labels[: len(found)], model.seen
     gaps = openings(model.assembly, moving)
     return ModalSpecimen(
-        places.points,
-        seen_at(places, mounts, moving)[: len(places)],
+        found.points,
+        seen_at(found, mounts, moving)[: len(found)],
         target.frequency,
         target.damping,
         labels,
         outline=seen.points[seen.outline()],
-        access=places.straight,
+        access=found.straight,
         gap_shapes=gaps.motion,
         clearance=gaps.clearance,
+        fixed=found.fixed != "",
+        cost=found.cost,
         notes=(said, *model.notes) if said else model.notes,
     )
 

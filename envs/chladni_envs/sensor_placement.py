@@ -1,12 +1,13 @@
 """Sensor placement: candidates are deleted, or sensors added, one a step."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium as gym
 import numpy as np
 
-from chladni.errors import LabelError
+from chladni.errors import LabelError, ShapeError, named
 from chladni_planning import Candidates, Rules, Walk, candidates
 
 from . import drawing
@@ -20,11 +21,33 @@ Reset = tuple[np.ndarray, dict[str, Any]]
 Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 
 
-def of_case(case: "Source", modes: int, units: str | None = None) -> ModalSpecimen:
-    """Candidates and target modes of a case folder or deck (see :mod:`.environment_cases`)."""
+def of_case(
+    case: "Source | None",
+    modes: int,
+    units: str | None,
+    places: dict[str, Any],
+    usual: ModalSpecimen,
+) -> ModalSpecimen:
+    """Candidates and target modes of a case folder or deck (see :mod:`.environment_cases`).
+
+    Parameters
+    ----------
+    places : words on places; None and empty ones are left out
+    usual : without a case
+
+    Raises
+    ------
+    ShapeError
+        If there are words on places, but no case.
+    """
+    words = {name: value for name, value in places.items() if value}
+    if case is None:
+        if words:
+            raise ShapeError(f"{named(words)}: these words name places on a mesh; give case= too")
+        return usual
     from .environment_cases import specimen  # the finite element part is loaded only here
 
-    return specimen(case, modes, units=units)
+    return specimen(case, modes, units=units, **words)
 
 
 def kept_labels(labels: tuple[str, ...], kept: np.ndarray) -> tuple[str, ...]:
@@ -52,9 +75,11 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     Reward
         Change of log det F. The rewards of an episode add up to the score ``info["score"]``: log
         det of the layout less that of the start (all candidates, or the faint prior). Layouts
-        compare by ``info["log_det"]``.
+        compare by ``info["log_det"]``. With costs the information of each place is divided by its
+        cost.
     Info
-        ``info["labels"]`` names the places kept, as ``info["kept"]`` masks them.
+        ``info["labels"]`` names the places kept, as ``info["kept"]`` masks them. ``info["cost"]``
+        is the sum of their costs, 1 each by default.
     End
         Terminated with ``n_sensors`` kept (or without a legal action); truncated after four times
         the number of steps needed.
@@ -74,6 +99,8 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     units : str                   unit system of a bare deck, as mm-t-s; a case states its own.
                                   Where it is missing, the materials show it, and ``notes`` and the
                                   info of a reset name it.
+    regions, fixed, forbidden, cost : places of a case, in the words of ``chladni.plan``; without
+                                  them those of [plan] of the case
 
     A frame of ``render_mode="rgb_array"`` is 256 pixels high and 320 wide.
     """
@@ -95,24 +122,37 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         case: "Source | None" = None,
         modes: int = 24,
         units: str | None = None,
+        regions: Sequence[str] = (),
+        fixed: Sequence[str] = (),
+        forbidden: Sequence[str] = (),
+        cost: Sequence[str] | Mapping[str, float] = (),
         render_mode: str | None = None,
     ) -> None:
         self.outline: np.ndarray | None = None
         self.notes: tuple[str, ...] = ()
+        places = {"regions": regions, "fixed": fixed, "forbidden": forbidden, "cost": cost}
+        specimen = of_case(case, modes, units, places, plate())
+        price = specimen.cost if phi is None else None
+        rules = rules or Rules()
         if phi is None:
-            specimen = plate() if case is None else of_case(case, modes, units)
             phi, points, self.outline = specimen.phi, specimen.points, specimen.outline
             self.notes, labels = specimen.notes, labels or specimen.labels
+            if specimen.fixed is not None:
+                rules = replace(rules, fixed=rules.masks(len(phi))[0] | specimen.fixed)
         self.labels = tuple(labels)
         self.candidates = candidates(phi, noise, prior)
         n = len(self.candidates)
+        self.cost = np.ones(n)
+        if price is not None:
+            rows = self.candidates.rows / np.sqrt(price)[:, None, None]
+            self.cost, self.candidates = price, replace(self.candidates, rows=rows)
         if self.labels and len(self.labels) != n:
             raise LabelError(f"{len(self.labels)} labels were given for {n} candidates")
         usual = min(n, -(-5 * self.candidates.unknowns // 4))
         self.n_sensors = usual if n_sensors is None else n_sensors
         if moves not in ("delete", "add"):
             raise LabelError(f"moves {moves!r}; there are delete and add")
-        self.grow, self.rules, self.unusable = moves == "add", rules or Rules(), unusable
+        self.grow, self.rules, self.unusable = moves == "add", rules, unusable
         self.points, self.render_mode = points, render_mode
         self.walk = self._walk(np.zeros(n, bool))  # an impossible request raises here
         self.action_space = gym.spaces.Discrete(n)
@@ -168,5 +208,6 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             "log_det": float(self.walk.log_det),
             "score": float(self.walk.log_det - self.start),
             "kept": self.walk.kept.copy(),
+            "cost": float(self.cost[self.walk.kept].sum()),
             "labels": kept_labels(self.labels, self.walk.kept),
         }

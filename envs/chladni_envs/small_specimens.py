@@ -24,6 +24,8 @@ class ModalSpecimen:
     access: np.ndarray | None = None
     gap_shapes: np.ndarray | None = None  # (g, r) opening of gaps between sheets [1/√kg]
     clearance: np.ndarray | None = None  # (g,) of these gaps [m]
+    fixed: np.ndarray | None = None  # (n,) bool: True where every layout has a sensor
+    cost: np.ndarray | None = None  # (n,) of a sensor at each place, relative
     notes: tuple[str, ...] = ()  # sentences on the deck, as the unit system that was guessed
 
 

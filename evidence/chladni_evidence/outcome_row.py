@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from chladni.decision.reasons import Reason
-from chladni.search.decision_in_words import REFUSED
+from chladni.search.decision_in_words import Reason
 
 from .blind_diagnosis import Answer
 from .pair_kinds import AND, catalogued, members
@@ -40,7 +39,7 @@ KIN = (  # effects that change the same operator: the right family, if not the r
 NEAR_PLACE = {"tailgate": 0.150}  # largest distance of a right place [m]; else ``CLOSE``
 CLOSE = 0.060
 DRAWN_IN = 1.645 / 1.960  # intervals are written for 95 %, and scored for 90 %
-_VETOES = "|".join(re.escape(REFUSED[why]) for why in (Reason.AGAINST, Reason.WORSE))
+_VETOES = "|".join(re.escape(why.value) for why in (Reason.AGAINST, Reason.WORSE))
 VETO = re.compile(rf"(\S+) gained .* in -2 ln evidence, but (?:{_VETOES})")
 
 

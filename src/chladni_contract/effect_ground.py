@@ -17,6 +17,7 @@ from chladni.effects.identified_damping import IdentifiedDamping
 from chladni.effects.joint_stiffness import model_families
 from chladni.effects.joints import beads, stiffness
 from chladni.effects.rigid_ties import on_firm_springs
+from chladni.effects.user_parameters import defaults_of_solids, user_parameter
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
@@ -29,7 +30,14 @@ from chladni.model.assembly import Assembly
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import ReducedProblem, reduced_problem
 from chladni.search.candidates import UpdatingContext
-from chladni_specimens import bushed_plates, jointed_plates, plate, tied_plates, tube_frame
+from chladni_specimens import (
+    bushed_plates,
+    jointed_plates,
+    plate,
+    solid_plate,
+    tied_plates,
+    tube_frame,
+)
 
 TOP = 300.0  # Hz; six flexible modes of the generated plates lie below
 MODES = 6  # flexible modes that are compared
@@ -102,7 +110,9 @@ def _context(
 
 
 def _modulus(reduced: ReducedProblem) -> Effect:
-    """E of the first part that has groups."""
+    """E of the first part that has groups, or of the solids."""
+    if not len(reduced.groups):
+        return user_parameter(reduced.groups, defaults_of_solids(reduced.structure.assembly)[0])
     return calibration_parameter(reduced.groups, "E", [int(reduced.groups.part.min())])
 
 
@@ -165,17 +175,23 @@ def tubes(times: int = 1) -> Assembly:
     return spaced(tube_frame(d, 0.06 / times))
 
 
-def _of_frame() -> EffectGround:
-    """Ground on a frame of tubes, with sensors far from each other."""
-    deck = tubes()
+def block(times: int = 1) -> Assembly:
+    """A free steel plate of 400 x 300 x 20 mm of 8 x 6 solids, or more on each side."""
+    return spaced(solid_plate(0.4, 0.3, 0.02, 8 * times, 6 * times))
+
+
+def _without_shells(made: Callable[[int], Assembly], top: float) -> EffectGround:
+    """Ground on a structure of beams or solids, with sensors far from each other."""
+    deck = made(1)
     spread = deck.ids[farthest_point_sample(deck.points, SENSORS)]
-    return ground(deck, tubes(2), spread.tolist(), 900.0)
+    return ground(deck, made(2), spread.tolist(), top)
 
 
 GROUNDS: Mapping[str, Callable[[], EffectGround]] = {
     "plate": lambda: ground(plain_plate(), plain_plate(2), CORNERS),
     "clamped plate": lambda: ground(clamped_plate(), clamped_plate(2), HELD),
-    "frame": _of_frame,
+    "frame": lambda: _without_shells(tubes, 900.0),
+    "block": lambda: _without_shells(block, 3000.0),
     "two plates with joints": lambda: _of_plates(jointed_plates(), jointed_plates(0.03)),
     "two plates with joints and a rigid element": lambda: _of_plates(
         tied_plates(), tied_plates(0.03)
@@ -188,6 +204,7 @@ def usual_grounds(family: Family) -> tuple[str, ...]:
     """Names of generated structures that may have what a family needs, the most likely first."""
     known = {
         "": "plate", "a shaker": "plate", "supports": "clamped plate", "beams that meet": "frame",
+        "solids": "block",
     }  # fmt: skip
     if family.needs in known:
         return (known[family.needs],)

@@ -58,19 +58,20 @@ from .measurement_lines import lines_for_poles as lines_for_poles
 from .measurement_lines import lines_per_bandwidth as lines_per_bandwidth
 from .measurement_lines import lines_time as lines_time
 from .measurement_lines import transient_left as transient_left
+from .mounts import mounts_at as mounts_at
+from .mounts import seen_at as seen_at
 from .parameter_information import Linearised as Linearised
 from .plan_summary import sensors_csv as sensors_csv
 from .plan_summary import summary as summary
 from .plan_workflow import plan as plan
+from .plan_workflow import with_places_of as with_places_of
 from .rattle import openings as openings
 from .sensor_candidates import SensorCandidates as SensorCandidates
 from .sensor_candidates import find_sensor_candidates as find_sensor_candidates
 from .whole_plan import Plan as Plan
 from .whole_plan import PlanSettings as PlanSettings
 from .whole_plan import motion as motion
-from .whole_plan import mounts_at as mounts_at
 from .whole_plan import plan_test as plan_test
-from .whole_plan import seen_at as seen_at
 from .whole_plan import target_modes as target_modes
 
 __all__ = [
@@ -143,5 +144,6 @@ __all__ = [
     "transient_left",
     "value",
     "visibility",
+    "with_places_of",
     "with_visible_modes",
 ]

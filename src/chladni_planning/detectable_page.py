@@ -7,8 +7,9 @@ import numpy as np
 from chladni.report.blocks import Block, Section, Table
 from chladni.report.mesh_drawings import field, mesh_of
 from chladni.report.words import number, quantity, rounded
-from chladni.search.detectable import Detectable
 from chladni.workflows.loaded_model import Model, on_faces
+
+from .detectable import Detectable
 
 _HEADS = ("what", "at the best place", "at half of the places", "at the worst", "nowhere found")
 _CAPTION = (

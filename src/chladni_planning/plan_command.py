@@ -9,11 +9,11 @@ from chladni.cli.run import Allow, DeckOrCase, Out, Pictures, Units, started
 from chladni.progress import within
 from chladni.report.result_json import to_json
 from chladni.workflows.before_any_test import before_any_test
-from chladni.workflows.loaded_model import model_in_si
+from chladni.workflows.loaded_model import model_in_si, opened
 
 from . import PlanSettings
 from .plan_summary import durations
-from .plan_workflow import plan
+from .plan_workflow import plan, with_places_of
 from .smallest_findings import smallest_findings
 
 
@@ -64,6 +64,28 @@ def run(
             "weld-missing,adhesive-stiffness, and the sensors that would."
         ),
     ] = "",
+    region: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Where sensors and shakers may be: a part, 'box x y z x y z' [m], a label or a "
+            "CSV file of labels (repeatable)."
+        ),
+    ] = None,
+    fixed: Annotated[
+        list[str] | None,
+        typer.Option(help="Sensor of the layout: 412:+Z or a table of sensors (repeatable)."),
+    ] = None,
+    forbidden: Annotated[
+        list[str] | None,
+        typer.Option(help="Where none may be, written as a region (repeatable)."),
+    ] = None,
+    cost: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Cost of a sensor by place, else 1: inner=3, 412:n=5 or a CSV file with label or "
+            "part, and cost (repeatable)."
+        ),
+    ] = None,
     noise: Annotated[
         float, typer.Option(help="Expected noise relative to |H|, for --detect.", min=1e-5, max=0.5)
     ] = 0.01,
@@ -85,6 +107,10 @@ def run(
         alike=alike,
         mass=mass,
         draws=drawn,
+        regions=region or (),
+        fixed=fixed or (),
+        forbidden=forbidden or (),
+        cost=cost or (),
     )
     from .detectable_page import detectable_section
     from .plan_page import plan_page
@@ -92,7 +118,9 @@ def run(
 
     with started("plan", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
-        model, said = model_in_si(source, "plan", units, allow or ())
+        given = opened(source, units, allow or ())
+        settings = with_places_of(given, settings)
+        model, said = model_in_si(given, "plan")
         job.note(model.notes)
         if said:
             job.say(said)

@@ -23,7 +23,8 @@ def plan_json(plan: PlanSummary) -> dict[str, Any]:
 
 
 def _sensor(s: PlannedSensor) -> dict[str, Any]:
-    return {"rank": s.rank, **vars(s.at), "for_mode": s.for_mode, "mass_kg": s.mass_kg}
+    return {"rank": s.rank, **vars(s.at), "for_mode": s.for_mode, "mass_kg": s.mass_kg,
+            "cost": s.cost}  # fmt: skip
 
 
 def _actuator(a: PlannedActuator) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from chladni.errors import named
 from chladni.fem.assemble import Structure
 from chladni.output import write_text
 from chladni.report.blocks import (
@@ -18,7 +19,7 @@ from chladni.report.blocks import (
     Text,
     still,
 )
-from chladni.report.mesh_drawings import layout, mesh_of, mode_shapes
+from chladni.report.mesh_drawings import field, layout, mesh_of, mode_shapes
 from chladni.report.shown import Shown
 from chladni.report.words import direction, fixed, hertz, number, percent, rounded
 from chladni.view import annotations, charts
@@ -31,6 +32,7 @@ from .plan_summary import (
     PlannedActuator,
     PlannedPlace,
     PlanSummary,
+    cost_of,
     sensors_csv,
     summary,
 )
@@ -71,7 +73,9 @@ def lead(result: PlanSummary) -> str:
 def notes(found: Plan) -> list[str]:
     """List decisions of the planning, and warnings."""
     centres = int((~found.places.is_grid).sum())
-    out = [*found.notes, *_places_notes(found.places)]
+    out = [*found.notes, *_places_notes(found.places), *_cost_notes(found)]
+    if fixed := [name for name in found.places.fixed if name]:
+        out.append(f"Fixed by the settings: {named(fixed)}.")
     if len(found.layout) == len(found.places):
         out.append(f"Every place has a sensor: there is room for only {len(found.places)}.")
     if centres:
@@ -121,6 +125,17 @@ def _places_notes(places: SensorCandidates) -> list[str]:
             "glue."
         )
     return out
+
+
+def _cost_notes(found: Plan) -> list[str]:
+    """State the cost of the layout, and of that without costs."""
+    if "without costs" not in found.cost:
+        return []
+    plain = number(found.cost["without costs"])
+    return [
+        f"The sensors cost {number(cost_of(found))}; a layout that regards no costs would cost "
+        f"{plain}. The information of each place was divided by its cost."
+    ]
 
 
 def _rattle_notes(found: Plan) -> list[str]:
@@ -175,10 +190,23 @@ def _sensors(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     ]
     return [
         layout("where", placed, "sensors", caption, "the layout"),
+        *_allowed(found, shown),
         _layout(result),
         Text([_compared(found)]),
         Items(moves or ["All modes were visible, so no sensor was moved."]),
     ]
+
+
+def _allowed(found: Plan, shown: Shown) -> list[Block]:
+    """Draw where sensors may be, where the settings say it."""
+    rules, faces = found.rules, len(shown.seen.faces)
+    some, cost = rules.allowed[-faces:], rules.cost[-faces:]
+    if not faces or (some.all() and np.ptp(cost) == 0):
+        return []
+    limits = (0.0, float(cost[some].max(initial=1.0)))
+    caption = "Coloured: sensors and shakers may be there, at this cost. Grey: not allowed."
+    values = np.where(some, cost, np.nan)
+    return [field(shown, values, limits, "allowed", "cost of a sensor", caption, "YlGnBu")]
 
 
 def _compared(found: Plan) -> str:

@@ -34,18 +34,19 @@ class PlannedPlace:
     grid: int | None  # None: the centre of a shell
     direction: np.ndarray
     point_m: np.ndarray
-    mounted: Literal["flat", "on a block"]
+    mounted: Literal["flat", "on a block", "fixed"]
     side: int
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedSensor:
-    """A sensor; ``for_mode`` is the mode it was moved for."""
+    """A sensor; ``for_mode`` is the mode it was moved for, ``cost`` that of its place."""
 
     rank: int
     at: PlannedPlace
     for_mode: int | None
     mass_kg: float
+    cost: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,8 @@ class PlanScores:
 
     log_det: float
     log_det_by_method: Mapping[str, float]
+    cost: float  # of the sensors, by their places
+    cost_by_method: Mapping[str, float]
     auto_mac_highest: float
     observability_rank: int
     states: int
@@ -168,14 +171,22 @@ def _place(found: Plan, i: int) -> PlannedPlace:
     """Description of one place and direction."""
     m = found.mounts
     grid = int(m.ids[i]) if found.places.is_grid[m.place[i]] else None
-    mounted: Literal["flat", "on a block"] = "flat" if m.normal[i] else "on a block"
+    mounted: Literal["flat", "on a block", "fixed"] = "flat" if m.normal[i] else "on a block"
+    if m.normal[i] and found.places.fixed[m.place[i]]:
+        mounted = "fixed"
     return PlannedPlace(m.labels[i], grid, m.directions[i], m.points[i], mounted, int(m.side[i]))
 
 
 def _sensors(found: Plan) -> tuple[PlannedSensor, ...]:
     moved = {m.into: found.first + 1 + m.mode for m in found.moves}
     return tuple(
-        PlannedSensor(k + 1, _place(found, i), moved.get(i), found.settings.mass)
+        PlannedSensor(
+            k + 1,
+            _place(found, i),
+            moved.get(i),
+            found.settings.mass,
+            float(found.places.cost[found.mounts.place[i]]),
+        )
         for k, i in enumerate(found.layout.tolist())
     )
 
@@ -238,11 +249,18 @@ def _scores(found: Plan) -> PlanScores:
     return PlanScores(
         log_det=value("D", kept),
         log_det_by_method=found.log_det,
+        cost=cost_of(found),
+        cost_by_method=found.cost,
         auto_mac_highest=float((found.auto_mac - np.eye(len(found.modal))).max(initial=0.0)),
         observability_rank=found.observable[0],
         states=found.observable[1],
         gramian_quotient=found.quotient,
     )
+
+
+def cost_of(found: Plan) -> float:
+    """Sum of the costs of the sensors' places."""
+    return float(found.places.cost[found.mounts.place[found.layout]].sum())
 
 
 def durations(found: Plan) -> Durations:

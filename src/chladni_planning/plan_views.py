@@ -3,8 +3,8 @@
 from chladni.report.result_json import to_json
 from chladni.report.result_views import Paged
 from chladni.results import show_by
-from chladni.search.detectable import Detectable
 
+from .detectable import Detectable
 from .detectable_page import detectable_json
 from .plan_json import plan_json
 from .plan_summary import summary

@@ -1,17 +1,21 @@
 """Where to put sensors and shakers, and which lines to measure."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from chladni.arguments import checked, settings_of
+from chladni.case import Case
 from chladni.parallel import one_blas_thread
 from chladni.progress import Progress, silent
 from chladni.units import Units
 from chladni.workflows.given_case import Source
-from chladni.workflows.loaded_model import model_in_si
+from chladni.workflows.loaded_model import DeckModels, Model, model_in_si, opened
 
+from .place_words import FILES
 from .whole_plan import Plan, PlanSettings, plan_test
+
+PLACES = ("regions", "fixed", "forbidden", "cost")
 
 
 @checked
@@ -42,8 +46,29 @@ def plan(
         If there is no such file or setting, the deck is wrong, several unit systems fit it, or it
         has too few places for the sensors.
     """
-    chosen = settings_of(PlanSettings, settings, words)
-    model, said = model_in_si(source, "plan", units, allow)
+    found = opened(source, units, allow)
+    chosen = with_places_of(found, settings_of(PlanSettings, settings, words))
+    model, said = model_in_si(found, "plan")
     built, unit = model.structure, model.unit
-    found = plan_test(model.assembly, chosen, built=built, unit=unit, progress=progress)
-    return replace(found, origin=model, notes=(said,) if said else ())
+    made = plan_test(model.assembly, chosen, built=built, unit=unit, progress=progress)
+    return replace(made, origin=model, notes=(said,) if said else ())
+
+
+def with_places_of(source: Case | Model | DeckModels, settings: PlanSettings) -> PlanSettings:
+    """Settings with the places that [plan] of a case states, where they state none."""
+    if not isinstance(source, Case):
+        return settings
+    asked = source.asked
+    words: Mapping[str, Any] = asked.said.words
+    at = asked.said.places
+
+    def resolved(name: str, text: str) -> str:
+        is_file = text.lower().endswith(FILES)
+        return str(asked.file(text, at[name])) if is_file else text
+
+    stated = {
+        name: [resolved(name, text) for text in words[name]]
+        for name in PLACES
+        if name in words and not getattr(settings, name)
+    }
+    return settings_of(PlanSettings, settings, stated)

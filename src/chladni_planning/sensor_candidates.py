@@ -1,21 +1,25 @@
 """Candidate places for sensors: flat, off edges and folds, with room above; across a beam."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from chladni.errors import ModelError
+from chladni.fem.locate import shares_of
 from chladni.geometry.facets import point_normals, tangents, unit, vector_areas
 from chladni.geometry.nearest import ShellSurface
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.model.assembly import Assembly
 from chladni.view.surface import Surface, surface
 
+from .place_words import PlaceRules, centre_ids, place_rules
+
 TILT = np.radians(35.0)  # of the four oblique lines of sight around the normal one
 FOOT, ROOM = 0.008, 0.03  # radius of a sensor's foot, height it needs [m]
 SMALLER = (1.0, 0.5, 0.25)  # of a foot, in turn, until a place passes
+ALONG = 1 - 1e-6  # cosine of two directions that are one
 RELATIVE = 400.0  # size of the structure over a foot, where the unit of length is unknown
 
 
@@ -40,6 +44,8 @@ class SensorCandidates:
     refused : {why: count}  places of the surface that were refused
     foot : share of a sensor's foot over which the surface is flat: 1, or 1/2 or 1/4 where no place
            passes with more; 0 on beams, which have no sheet
+    cost : (n,)             of a sensor there, relative to other places
+    fixed : (n,) text       label of the fixed sensor there, which points along the normal; else ""
     """
 
     ids: np.ndarray
@@ -52,6 +58,14 @@ class SensorCandidates:
     straight: np.ndarray
     refused: Mapping[str, int]
     foot: float = 1.0
+    cost: np.ndarray = field(default_factory=lambda: np.ones(0))
+    fixed: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=object))
+
+    def __post_init__(self) -> None:
+        if len(self.cost) != len(self.ids):
+            object.__setattr__(self, "cost", np.ones(len(self.ids)))
+        if len(self.fixed) != len(self.ids):
+            object.__setattr__(self, "fixed", np.full(len(self.ids), "", dtype=object))
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -67,12 +81,6 @@ class SensorCandidates:
         return np.einsum("nc,nc...->n...", self.weights[which], at)
 
 
-def centre_ids(assembly: Assembly) -> np.ndarray:
-    """Numbers for the centres of all shells that no grid has: 47 -> 100047 with grid 12345."""
-    longest = max(int(assembly.ids.max(initial=0)), int(assembly.shells.ids.max(initial=0)))
-    return assembly.shells.ids + 10 ** len(str(longest))
-
-
 def find_sensor_candidates(
     assembly: Assembly,
     count: int = 300,
@@ -81,6 +89,7 @@ def find_sensor_candidates(
     room: float | None = None,
     flat: float = 10.0,
     unit: str = "m",
+    rules: PlaceRules | None = None,
 ) -> SensorCandidates:
     """At most ``count`` places spread over the sheets, each farthest from the earlier ones.
 
@@ -93,6 +102,7 @@ def find_sensor_candidates(
     room : height that must be free above [m]
     flat : greatest root mean square angle of the surface within the foot [degree]
     unit : "" where lengths are in an unknown unit: foot and room are then parts of the structure
+    rules : on the surface of the assembly; its fixed sensors are places beyond the count
 
     Raises
     ------
@@ -100,43 +110,84 @@ def find_sensor_candidates(
         If no place passes.
     """
     seen = surface(assembly, unit)
+    rules = rules or place_rules(assembly, seen)
     if not len(seen.faces):
-        return _across_beams(assembly, count)
+        return _with_fixed(_across_beams(assembly, count, rules), assembly, rules)
     foot = foot or (FOOT if unit else seen.size / RELATIVE)
     room = room or (ROOM if unit else 4 * foot)
     sheet = seen.faces[: len(assembly.shells)] if len(assembly.shells) else seen.faces
     every = _every(assembly, seen, sheet)
+    allowed, named = rules.allowed[every.spot], rules.named[every.spot]
     for share in SMALLER:
         normals, smooth, clear = _flat(seen, sheet, every, share * foot, flat)
+        clear = (clear | named) & allowed
         if clear.any():
             break
-    grid = every.is_grid
+    grid = every.is_grid & allowed
     refused = {
-        "not flat": int((~smooth & grid).sum()),
+        "not allowed": int((every.is_grid & ~allowed).sum()),
+        "not flat": int((~smooth & ~named & grid).sum()),
         "near an edge, fold or joint": int((smooth & ~clear & grid).sum()),
     }
     has_one = np.zeros(int(every.nodes.max()) + 1, bool)
     has_one[every.nodes[clear & every.is_grid, 0]] = True
-    clear &= grid | ~has_one[every.nodes].any(axis=1)
+    clear &= every.is_grid | ~has_one[every.nodes].any(axis=1)
     if not clear.any():
+        where = "place of the surface" if allowed.all() else "allowed place"
         raise ModelError(
-            f"no place of the surface is flat within {1e3 * SMALLER[-1] * foot:.2g} mm and as far "
-            "from edges, folds and joints: refine the mesh, or give your own places"
+            f"no {where} is flat within {1e3 * SMALLER[-1] * foot:.2g} mm and as far "
+            "from edges, folds and joints: refine the mesh, or give your own places by label"
             if unit
-            else "no place of the surface is flat and away from edges, folds and joints; give "
-            "--units"
+            else f"no {where} is flat and away from edges, folds and joints; give --units"
         )
     at = np.flatnonzero(clear)
     at = at[farthest_point_sample(every.points[at], min(3 * count, len(at)))]
     side, straight = _reachable(seen, every.points[at], normals[at], foot, room, count)
+    side[named[at] & (side == 0)] = 1
     good = np.flatnonzero(side)[:count]
     refused["not reachable"] = int((side[: good[-1]] == 0).sum()) if len(good) else len(at)
     if not len(good):
         raise ModelError("no flat grid can be reached from outside")
-    return every.taken(at[good], normals[at[good]], side[good], straight[good], refused, share)
+    found = every.taken(at[good], normals[at[good]], side[good], straight[good], refused, share)
+    return _with_fixed(replace(found, cost=rules.cost[every.spot[at[good]]]), assembly, rules)
 
 
-def _across_beams(assembly: Assembly, count: int) -> SensorCandidates:
+def _with_fixed(
+    places: SensorCandidates, assembly: Assembly, rules: PlaceRules
+) -> SensorCandidates:
+    """Name the places of fixed sensors; sensors at none of the places, or across it, are more."""
+    held, fixed = rules.fixed, places.fixed.copy()
+    more: list[int] = []
+    for k in range(len(held.labels)):
+        along = np.abs(places.normals @ held.directions[k]) > ALONG
+        here = np.linalg.norm(places.points - held.points[k], axis=1) < 1e-6
+        if (same := along & here & (fixed == "")).any():
+            fixed[np.argmax(same)] = held.labels[k]
+        else:
+            more.append(k)
+    if not more:
+        return replace(places, fixed=fixed)
+    nodes, weights = np.zeros((len(more), 4), int), np.zeros((len(more), 4))
+    for i, share in enumerate(shares_of(assembly, held.grids[more], held.points[more])):
+        nodes[i] = assembly.rows([share[0][0]])[0]
+        nodes[i, : len(share)] = assembly.rows([grid for grid, _ in share])
+        weights[i, : len(share)] = [weight for _, weight in share]
+    free = 10 * int(centre_ids(assembly).max(initial=int(assembly.ids[-1])))
+    ids = np.where(held.grids[more] > 0, held.grids[more], free + np.arange(len(more)))
+    n, grid = len(more), held.grids[more] > 0
+    added = {
+        "ids": ids, "is_grid": grid, "nodes": nodes, "weights": weights,
+        "points": held.points[more], "normals": held.directions[more], "side": np.ones(n),
+        "straight": np.zeros(n, bool), "cost": np.where(grid, rules.cost[nodes[:, 0]], 1.0),
+    }  # fmt: skip
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(places, name), new]) for name, new in added.items()
+    }
+    labels = np.array([held.labels[k] for k in more], dtype=object)
+    return replace(places, **joined, fixed=np.concatenate([fixed, labels]))
+
+
+def _across_beams(assembly: Assembly, count: int, rules: PlaceRules) -> SensorCandidates:
     """Grids of beams, each with the two axes of the basic frame that lie most across its beams."""
     nodes = assembly.beams.nodes
     if not len(nodes):
@@ -146,6 +197,10 @@ def _across_beams(assembly: Assembly, count: int) -> SensorCandidates:
     for end in nodes.T:  # Σ l cos² to each axis
         np.add.at(own, end, along**2 / np.linalg.norm(along, axis=1)[:, None])
     grids = np.unique(nodes)
+    refused = {"not allowed": int((~rules.allowed[grids]).sum())}
+    grids = grids[rules.allowed[grids]]
+    if not len(grids):
+        raise ModelError("no beam has an allowed place for a sensor")
     few = farthest_point_sample(assembly.points[grids], min((count + 1) // 2, len(grids)))
     at = np.repeat(grids[few], 2)
     axes = np.argsort(own[grids[few]], axis=1, kind="stable")[:, :2].ravel()
@@ -153,7 +208,7 @@ def _across_beams(assembly: Assembly, count: int) -> SensorCandidates:
     return SensorCandidates(
         assembly.ids[at], np.ones(n, bool), np.repeat(at[:, None], 4, axis=1),
         np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)), assembly.points[at], np.eye(3)[axes], np.ones(n),
-        np.ones(n, bool), {}, 0.0,
+        np.ones(n, bool), refused, 0.0, rules.cost[at],
     )  # fmt: skip
 
 
@@ -166,10 +221,12 @@ class _Every:
     nodes: np.ndarray
     weights: np.ndarray
     points: np.ndarray
+    spot: np.ndarray  # (n,) int: position among the points, then the faces, of the surface
 
     def taken(self, at: np.ndarray, *given: Any) -> SensorCandidates:
         """The sensor candidates at some of these places, with their own properties."""
-        return SensorCandidates(*(value[at] for value in vars(self).values()), *given)
+        own = (self.ids, self.is_grid, self.nodes, self.weights, self.points)
+        return SensorCandidates(*(value[at] for value in own), *given)
 
 
 def _every(assembly: Assembly, seen: Surface, sheet: np.ndarray) -> _Every:
@@ -187,6 +244,7 @@ def _every(assembly: Assembly, seen: Surface, sheet: np.ndarray) -> _Every:
         nodes,
         weights,
         np.einsum("nc,nci->ni", weights, seen.points[nodes]),
+        np.concatenate([grids, len(seen.points) + np.arange(len(sheet))]),
     )
 
 

@@ -8,11 +8,13 @@ from chladni.errors import FileError
 from chladni.fem.energy import mass_properties
 from chladni.inference.map_fit import MassMeasurement
 from chladni.progress import Progress, silent
-from chladni.search.detectable import NOISE, Detectable, detectable
 from chladni.search.question import Question
+from chladni.search.simulated_test import NOISE
 from chladni.workflows.frf import layout_places
 from chladni.workflows.loaded_model import Model
 from chladni.workflows.question_of_case import MASS_SD
+
+from .detectable import Detectable, detectable
 
 
 def smallest_findings(

@@ -3,6 +3,7 @@
 The method is that of Echaniz Granado (2015), section 4.1.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
@@ -10,7 +11,6 @@ from math import inf
 import numpy as np
 
 from chladni.arguments import refuse_fields
-from chladni.dofs import label
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.modes import ModalModel, rigid_modes
 from chladni.effects.calibration_parameters import thickness_of
@@ -20,6 +20,7 @@ from chladni.fem.assemble import Structure, structure
 from chladni.model.assembly import Assembly
 from chladni.progress import Progress, silent, within
 from chladni.results import Result
+from chladni.view.surface import Surface, surface
 
 from .actuator_ranking import ActuatorRanking, best_actuators, ranked_actuators, shaking
 from .drawn_models import drawn, ensemble
@@ -27,15 +28,16 @@ from .gramians import gramian_quotient, modal_rank, observability_gramian
 from .layouts.deletion import deletion, effective_independence, greedy, qr_ranking
 from .layouts.distinct import distinct
 from .layouts.exchange import exchange
-from .layouts.information import candidates, value
+from .layouts.information import Candidates, candidates, value
 from .layouts.layout_quality import Move, loaded_frequency, overlap, visibility, with_visible_modes
 from .layouts.layout_rules import Rules, too_near
+from .mounts import Mount, mounts_at, seen_at
+from .place_words import PlaceRules, place_rules
 from .rattle import Openings, Rattle, first_rattle, openings
 from .sensor_candidates import SensorCandidates, find_sensor_candidates
 
 SPARE = 6  # modes computed beyond the target modes, for the sweep over more modes
 BLIND = 0.25  # of the floor: a mode that no place sees better is no target of the layout
-TANGENT = 0.6  # a direction this far off the normal (cosine) needs a mounting block
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,12 @@ class PlanSettings:
     draws, spread : number of models drawn, and standard deviation of ln of every part's thickness;
                     the layout then serves all of them
     seed : of the draws
+    regions : parts, boxes, labels or files of labels, in words of :mod:`.place_words`; nothing is
+              put elsewhere
+    fixed : labels, or tables, of sensors in every layout
+    forbidden : places for no sensor, shaker or cord, in words as the regions
+    cost : of a sensor, by place: ``inner=3`` (a dict in Python) or a CSV file; others cost 1. The
+           layout has the most information with that of a place divided by its cost.
     """
 
     sensors: int = 30
@@ -74,6 +82,10 @@ class PlanSettings:
     draws: int = 0
     spread: float = 0.1
     seed: int = 0
+    regions: Sequence[str] = ()
+    fixed: Sequence[str] = ()
+    forbidden: Sequence[str] = ()
+    cost: Sequence[str] | Mapping[str, float] = ()
 
     def __post_init__(self) -> None:
         refuse_fields(
@@ -83,19 +95,9 @@ class PlanSettings:
             seed=(0, inf),
         )  # fmt: skip
 
-
-@dataclass(frozen=True, eq=False)
-class Mount:
-    """A place and a direction in which a sensor may measure: rows of ``phi`` of a :class:`Plan`."""
-
-    ids: np.ndarray  # (m,) int; grids, or numbers of centres as in :class:`SensorCandidates`
-    place: np.ndarray  # (m,) int; position among the places
-    # points, directions: (m, 3)
-    points: np.ndarray
-    directions: np.ndarray
-    labels: tuple[str, ...]  # 412:+Z along an axis, else 412:n
-    normal: np.ndarray  # (m,) bool glued flat; False: on a block, along the sheet
-    side: np.ndarray  # (m,) +1, -1: side of the surface normal
+    def rules(self, assembly: Assembly, seen: Surface) -> PlaceRules:
+        """The rules for places on a mesh that these settings state."""
+        return place_rules(assembly, seen, self.regions, self.fixed, self.forbidden, self.cost)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,6 +116,7 @@ class Plan(Result):
     moves : tuple of Move         sensors moved so that a mode is seen
     visible_before, visible : (r,)  before and after the moves
     log_det : {method: value}     of the layouts of several methods, before the moves
+    cost : {method: value}        of these layouts, the sum over their sensors
     sweep : ((modes, overlap), ...)  share of the layout kept when the sweep takes more modes
     actuators : ActuatorRanking   over the normals, each alone; vetoed without a free line to the
                                   place, or where it rattles below the force of the settings
@@ -126,6 +129,7 @@ class Plan(Result):
     loaded : (r,)                 frequencies with the sensors' mass on [Hz]
     hangers : (k,) int            grids, the quietest first
     quiet : (k,)                  their rms motion over the first modes, of the largest anywhere
+    rules : PlaceRules            on the surface of the model
     notes : the unit system, where it was guessed
     """
 
@@ -141,6 +145,7 @@ class Plan(Result):
     visible_before: np.ndarray
     visible: np.ndarray
     log_det: dict[str, float]
+    cost: dict[str, float]
     sweep: tuple[tuple[int, float], ...]
     actuators: ActuatorRanking
     rattle: Rattle
@@ -152,6 +157,7 @@ class Plan(Result):
     loaded: np.ndarray
     hangers: np.ndarray
     quiet: np.ndarray
+    rules: PlaceRules
     notes: tuple[str, ...] = ()
 
 
@@ -174,7 +180,8 @@ def plan_test(
     if not any(map(thickness_of, assembly.parts)):
         settings = replace(settings, draws=0)  # nothing to draw
     progress("places for sensors", 0.05)
-    places = find_sensor_candidates(assembly, settings.candidates, unit=unit)
+    rules = settings.rules(assembly, surface(assembly, unit))
+    places = find_sensor_candidates(assembly, settings.candidates, unit=unit, rules=rules)
     settings = replace(settings, sensors=min(settings.sensors, len(places)))
     progress("modes", 0.2)
     built = built or structure(assembly)
@@ -195,10 +202,10 @@ def plan_test(
         basis = seen_at(places, mounts, recovered(built, models.basis))[normal]
         _, draws = drawn(models, basis, r, settings.draws, settings.spread, settings.seed)
         draws = draws[:, :, aimed]
-    ranked, log_det = _layout(draws, mounts, settings)
-    near = too_near(mounts.points, max(settings.spacing, 1e-9))
+    ranked, log_det, cost = _layout(draws, places, settings)
+    held = _rules(mounts.points, np.flatnonzero(places.fixed != ""), max(settings.spacing, 1e-9))
     layout, moves = with_visible_modes(
-        phi[:, :r], ranked, largest, floor=settings.floor, rules=Rules(near=near)
+        phi[:, :r], ranked, largest, floor=settings.floor, rules=held
     )
     progress("shaker and cords", 0.8)
     f, zeta, seen = modal.frequency, modal.damping, phi[layout, :r]
@@ -228,6 +235,7 @@ def plan_test(
         visibility(phi[ranked, :r], largest),
         visibility(seen, largest),
         log_det,
+        cost,
         mode_sweep(phi[normal][:, visible], settings.sensors, int(aimed.sum())),
         ranking,
         rattle,
@@ -239,6 +247,7 @@ def plan_test(
         loaded_frequency(f, three, settings.mass),
         hangers,
         quiet,
+        rules,
     )
 
 
@@ -271,71 +280,49 @@ def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
     return u.reshape(len(built.assembly.points), 6, -1)[:, :3]
 
 
-def seen_at(places: SensorCandidates, mounts: Mount, moving: np.ndarray) -> np.ndarray:
-    """Motion along the mounts' directions (m, r), from that of all points (n_points, 3, r)."""
-    at = places.moving(moving, mounts.place)
-    return np.einsum("mir,mi->mr", at, mounts.directions)
-
-
-def mounts_at(places: SensorCandidates) -> Mount:
-    """Normals of all places, then the two axes of the basic frame most along each sheet."""
-    place, directions = [np.arange(len(places))], [places.normals]
-    across = np.argsort(np.abs(places.normals), axis=1)[:, :2]
-    for k in range(2):
-        axes = np.eye(3)[across[:, k]]
-        good = np.abs(np.einsum("ij,ij->i", axes, places.normals)) < TANGENT
-        place.append(np.flatnonzero(good))
-        directions.append(axes[good])
-    at, along = np.concatenate(place), np.concatenate(directions)
-    labels = _labels(places.ids[at], along)
-    once = np.sort(np.unique(labels, return_index=True)[1])  # beams already have both directions
-    at, along, labels = at[once], along[once], [labels[k] for k in once]
-    ids = places.ids[at]
-    return Mount(
-        ids,
-        at,
-        places.points[at],
-        along,
-        tuple(labels),
-        np.arange(len(at)) < len(places),
-        places.side[at],
-    )
-
-
-def _labels(ids: np.ndarray, directions: np.ndarray) -> list[str]:
-    """412:+Z where the direction is an axis, else 412:n."""
-    axis = np.abs(directions).argmax(axis=1)
-    value = directions[np.arange(len(ids)), axis]
-    return [
-        label(int(i), int(a) + 1, 1 if v > 0 else -1) if abs(v) > 1 - 1e-6 else f"{i}:n"
-        for i, a, v in zip(ids, axis, value, strict=True)
-    ]
+def _rules(points: np.ndarray, fixed: np.ndarray, spacing: float) -> Rules:
+    """Fixed places, and a minimum distance between others and to them; 0: any."""
+    if spacing <= 0:
+        return Rules(fixed=fixed)
+    near = too_near(points, spacing)
+    near[np.ix_(fixed, fixed)] = False
+    return Rules(fixed=fixed, near=near)
 
 
 def _layout(
-    phi: np.ndarray, mounts: Mount, settings: PlanSettings
-) -> tuple[np.ndarray, dict[str, float]]:
-    """The layout, ranked, and log det of the layouts of several methods."""
-    c = candidates(phi)
-    rules = Rules(near=too_near(mounts.points[mounts.normal], settings.spacing))
-    rules = rules if settings.spacing > 0 else Rules()
-    efi = deletion(c, settings.sensors, rules=rules).ranked
-    best = kept = exchange(c, efi, rules=rules)
-    layouts = {
-        "greedy": greedy(c, settings.sensors, rules=rules),
-        "effective independence": efi,
-        "with exchange": kept,
-    }
-    if settings.alike < 1:
-        layouts["with modes distinguished"] = best = distinct(
-            c, kept, ceiling=settings.alike, rules=rules
-        )
-    if settings.spacing == 0 and c.rows.shape[0] == 1:
-        layouts = {"pivoted QR": qr_ranking(c.rows[0])[: settings.sensors], **layouts}
+    phi: np.ndarray, places: SensorCandidates, settings: PlanSettings
+) -> tuple[np.ndarray, dict[str, float], dict[str, float]]:
+    """The layout, ranked; log det and cost of the layouts of several methods.
+
+    With costs c the rows of φ are divided by √c, as in designs under a limit on the total cost
+    (Fedorov and Leonov 2013, Optimal Design for Nonlinear Response Models, chapter 4). The unit of
+    the costs is of no matter.
+    """
+    plain, n = candidates(phi), settings.sensors
+    even = bool(np.ptp(places.cost) == 0)
+    c = plain if even else candidates(phi, places.cost)
+    rules = _rules(places.points, np.flatnonzero(places.fixed != ""), settings.spacing)
+
+    def improved(c: Candidates) -> dict[str, np.ndarray]:
+        efi = deletion(c, n, rules=rules).ranked
+        kept = {"effective independence": efi, "with exchange": exchange(c, efi, rules=rules)}
+        if settings.alike < 1:
+            kept["with modes distinguished"] = distinct(
+                c, kept["with exchange"], ceiling=settings.alike, rules=rules, shapes=plain
+            )
+        return kept
+
+    layouts = {"greedy": greedy(c, n, rules=rules), **improved(c)}
+    best = list(layouts.values())[-1]
+    if not even:
+        layouts = {"without costs": list(improved(plain).values())[-1], **layouts}
+    if even and rules.near is None and not len(rules.fixed) and c.rows.shape[0] == 1:
+        layouts = {"pivoted QR": qr_ranking(c.rows[0])[:n], **layouts}
     forbidden = np.ones(len(c), bool)
     forbidden[best] = False
-    ranked = deletion(c, settings.sensors, rules=Rules(forbidden=forbidden)).ranked
-    return ranked, {name: value("D", c.fisher(k)) for name, k in layouts.items()}
+    ranked = deletion(c, n, rules=Rules(forbidden=forbidden)).ranked
+    log_det = {name: value("D", plain.fisher(k)) for name, k in layouts.items()}
+    return ranked, log_det, {name: float(places.cost[k].sum()) for name, k in layouts.items()}
 
 
 def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int, float], ...]:

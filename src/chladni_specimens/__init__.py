@@ -20,6 +20,7 @@ from .joints.builders import spot_welds as spot_welds
 from .plates import box as box
 from .plates import folded_panel as folded_panel
 from .plates import plate as plate
+from .plates import solid_plate as solid_plate
 from .tailgate.design import TailgateDesign as TailgateDesign
 from .tailgate.formed_thickness import forming_mesh as forming_mesh
 from .tailgate.skin import Skin as Skin
@@ -48,6 +49,7 @@ __all__ = [
     "plate",
     "rectangle",
     "screw",
+    "solid_plate",
     "spot_welds",
     "stops",
     "tailgate",

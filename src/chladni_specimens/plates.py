@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from chladni.model.assembly import Assembly, Shells
-from chladni.model.properties import Isotropic, Material, Part, ShellSection
+from chladni.model.assembly import Assembly, Shells, Solids
+from chladni.model.properties import Isotropic, Material, Part, ShellSection, SolidSection
 
 STEEL = Isotropic(E=210e9, nu=0.3, rho=7850.0)
 
@@ -36,6 +36,29 @@ def plate(
         middle = points[nodes].mean(axis=1)
         nodes = nodes[np.hypot(middle[:, 0] - x, middle[:, 1] - y) >= r]
     return sheet(points, nodes, t, material)
+
+
+def solid_plate(
+    length: float, width: float, t: float, nx: int, ny: int, material: Isotropic = STEEL
+) -> Assembly:
+    """A flat plate of hexahedra, one of them through its thickness, between z = 0 and t.
+
+    Parameters
+    ----------
+    length, width, t : along x, y and z [m]
+    nx, ny : elements along x and y
+
+    >>> len(solid_plate(1.0, 0.5, 0.1, 4, 2).solids[0])
+    8
+    """
+    points, below = grid(np.linspace(0, length, nx + 1), np.linspace(0, width, ny + 1))
+    nodes = np.hstack([below, below + len(points)])
+    n, section = len(nodes), SolidSection(material)
+    return Assembly(
+        np.arange(2 * len(points)) + 1, np.concatenate([points, points + np.array([0.0, 0.0, t])]),
+        (Part(1, "block", section),),
+        solids=(Solids(np.arange(n) + 1, nodes, np.zeros(n, int)),),
+    )  # fmt: skip
 
 
 def folded_panel(

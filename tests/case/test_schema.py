@@ -25,8 +25,10 @@ from chladni.io.tables.sensor_table import _OPTIONAL
 from chladni.io.tables.write_tables import write_npz
 from chladni.search.preparation import prepare
 from chladni.units import UNITS
+from chladni.view.surface import surface
 from chladni.workflows.case_model import model_frf
 from chladni.workflows.question_of_case import question_of
+from chladni_planning import PlanSettings, with_places_of
 
 from .test_case import deck
 
@@ -72,6 +74,11 @@ sensors = ["16:+Z"]
 band = [50.0, 60.0]
 [search]
 effects = ["point-mass"]
+[plan]
+regions = ["sheet"]
+fixed = ["12:+Z"]
+forbidden = ["3:+Z"]
+cost = ["sheet=2"]
 [[parameter]]
 name = "E of the sheet"
 parts = ["sheet"]
@@ -95,7 +102,7 @@ OTHER = {  # another accepted value of every word
     ("model", "thickness_units"): '"SI"',
     ("model", "thickness_place"): '"aligned"',
     ("model", "damping"): "0.02",
-    ("model", "allow"): '["GENEL"]',
+    ("model", "allow"): '["CSEAM"]',
     ("model", "outside"): "true",
     ("test", "recordings"): '["b.npz"]',
     ("test", "use"): '"b.npz"',
@@ -124,6 +131,10 @@ OTHER = {  # another accepted value of every word
     ("held_out", "sensors"): "1",
     ("held_out", "band"): "[48.0, 60.0]",
     ("search", "effects"): '["point-mass", "crack"]',
+    ("plan", "regions"): '["box 0 0 -1 0.2 1 1"]',
+    ("plan", "fixed"): '["12:+X"]',
+    ("plan", "forbidden"): '["4:+Z"]',
+    ("plan", "cost"): '["sheet=3"]',
     ("parameter", "name"): '"stiffness"',
     ("parameter", "parts"): '["CELAS2 99"]',
     ("parameter", "field"): '"nu"',
@@ -247,6 +258,9 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
     mark.update(repr(known).encode())
     mark.update(repr((ready.held.whole.tolist(), ready.what, ready.notes)).encode())
     mark.update(repr([case.said(c) for c in COMMANDS]).encode())
+    rules = with_places_of(case, PlanSettings()).rules(case.assembly, surface(case.assembly))
+    for array in (rules.allowed, rules.cost, rules.fixed.grids, rules.fixed.directions):
+        mark.update(np.ascontiguousarray(array).tobytes())
     model = modelled(case.tested(case.assembly), 200.0)
     curves = model_frf(case, model, case.damping or 0.01, case.frfs[0])
     mark.update(np.round(curves.values / np.abs(curves.values).max(), 9).tobytes())

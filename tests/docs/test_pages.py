@@ -230,8 +230,8 @@ def test_every_exit_code_has_a_meaning(reference):
 
 
 def test_cards_and_rules_are_listed(reference):
-    from chladni.decision.decision_rules import DecisionRules
     from chladni.io.nastran.text.cards import FIELDS
+    from chladni.search.decision_rules import DecisionRules
 
     cards, rules = reference.cards(), reference.decision_rules()
     assert not [n for n in FIELDS if f"| `{n}` |" not in cards]

@@ -62,7 +62,7 @@ CONTRACT = {  # names that issue texts, cases and other programs may use
     *("weld-compliance", "over-constraint", "contact-stiffness", "rattle", "joint-friction"),
     *("point-mass", "mass-patch", "sensor-mass", "local-resonator", "suspension"),
     *("shaker-restraint", "extra-support", "compliant-support", "sensor-fault", "crack"),
-    "rotating-part",
+    *("rotating-part", "solid-patch"),
 }
 
 

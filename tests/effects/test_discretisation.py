@@ -10,8 +10,7 @@ from tests.fem.test_curved_shell import sheet
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import iterated
 from chladni.effects import model_errors
-from chladni.effects.model_errors import LIMIT, mesh_errors
-from chladni.errors import ModelError
+from chladni.effects.model_errors import LIMIT, limit_of, mesh_errors
 from chladni.fem.assemble import Structure, structure
 from chladni.fem.modelled import modelled
 from chladni.geometry.refine import refined
@@ -38,12 +37,21 @@ def test_no_mode_loses_all_its_stiffness():
         assert_allclose(np.sort(lam[6:])[: len(due) // 2], due[: len(due) // 2], rtol=1e-6)
 
 
-def test_shells_with_nodes_on_their_edges_are_not_halved():
-    """Halves without these nodes are another element: their difference is no error of the mesh."""
-    made = sheet(4, 3)
-    assert mesh_errors(modelled(made, 100.0), 40.0) == []
-    with pytest.raises(ModelError, match="shell 1 has nodes on its edges"):
-        refined(made)
+def test_the_error_of_shells_with_nodes_on_their_edges_falls_as_h4():
+    """The limit that two meshes give is near the modes of one a quarter as fine again."""
+    top = 20.0  # [Hz] seven modes of a free plate on nine shells
+    coarse = modelled(sheet(3, 3, t=2e-3), 2.0 * top)
+    (error,) = mesh_errors(coarse, top)
+    assert error.order == 4
+    due = normal_modes(structure(refined(refined(coarse.assembly))).system, 12).frequency[6:]
+    n = min(len(error.limit), len(due))
+    own = coarse.modes.frequency[6:]
+    off, left = (np.abs(f[:n] / due[:n] - 1) for f in (own, error.limit))
+    assert off.max() > 2e-3
+    assert left.max() < 0.15 * off.max()
+    assert limit_of(4) == pytest.approx(16 / 15)
+    (mixed,) = mesh_errors(modelled(plate(0.4, 0.3, 4, 2, 1.5e-3), 4 * TOP), TOP)
+    assert (mixed.order, limit_of(2)) == (2, pytest.approx(LIMIT))
 
 
 def test_sheets_of_shells_with_nodes_on_their_edges_are_one():

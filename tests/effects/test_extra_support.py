@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.structures import held_along_x0
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import WIDER
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.springs import ExtraSupport
 from chladni.fem.assemble import structure
+from chladni.model.properties import Isotropic
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
@@ -87,3 +89,23 @@ def test_at_the_edge_of_a_fold_what_leads_off_it_is_no_doubt(support):
     line = replace(support.patch, flat=support.patch.flat * [1.0, 0.0])
     known = replace(support, patch=line).location(np.zeros(5), np.array([0.1, 0.8, 1.5, 0.1, 0.1]))
     assert known.radius_m == pytest.approx(1.96 * WIDER * 0.8 * support.patch.size)
+
+
+def test_starts_reach_from_a_spring_that_is_hardly_noticed_to_a_rigid_support():
+    """Tip of a strip: it yields by L³/3EI, and at the highest line it moves with a mass of m/4r."""
+    L, E, width, t, rho = 0.5, 210e9, 0.02, 2e-3, 7850.0
+    strip = held_along_x0(plate(L, width, 25, 1, t, Isotropic(E, 0.0, rho)))
+    problem, top = reduced_problem(strip, 600.0), 600.0
+    shapes = problem.shapes
+    f = problem.frequency[: shapes.shape[1]]
+    setup = Setup((), (), float(problem.groups.weight.sum()), top)
+    where = EffectContext(problem.groups, problem.grids, problem.candidates, setup, f, shapes)
+    tip = int(np.argmax(problem.grids.point[:, 0]))
+    K = ExtraSupport.near(where, tip).parameters[0]
+    soft, rigid = (np.exp(K.starts[k]) * K.scale for k in (0, -1))
+    assert soft < 0.2 * 3 * E * width * t**3 / 12 / L**3
+    fixed = rho * L * width * t / (4 * len(f)) * (2 * np.pi * top) ** 2
+    assert rigid > 3 * fixed
+    assert np.diff(K.starts).max() < 2.1
+    alone = ExtraSupport.near(replace(where, frequency=f[:0], shapes=shapes[:, :0]), tip)
+    assert alone.parameters[0].starts == (-2.0, 0.0, 2.0)

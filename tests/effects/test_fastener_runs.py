@@ -26,9 +26,10 @@ from chladni.effects.welds import WeldCompliance, WeldMissing, of_one, proposed
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
 from chladni.inference.scan import baseline
+from chladni.io.nastran import assembly, read_deck, write_assembly
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni.search.candidates import Scan
+from chladni.search.candidates import UpdatingContext
 from chladni.search.fastener_scan import (
     AT_ONCE,
     batched,
@@ -49,14 +50,23 @@ def connection(point, parts=("a", "b")):
     return Connection("solids", 0, np.array([0]), (1,), np.asarray(point, float), parts)
 
 
-@pytest.fixture(scope="module")
-def seam():
-    """Two plates welded along one edge by ten welds."""
+@pytest.fixture(scope="module", params=["solids", "CWELD"])
+def seam(request, tmp_path_factory):
+    """Two plates welded along one edge by ten welds, of solids or as a deck has connectors."""
     sides = stops([0.0, 0.5], 0.025), stops([0.0, 0.1], 0.025)
     pieces = [rectangle("lower", (0, 0, 0), *sides), rectangle("upper", (0, 0.07, HIGH), *sides)]
     made = of_pieces(pieces, {"lower": (1.5e-3, STEEL), "upper": (1e-3, STEEL)})
     places = np.array([(x, 0.085, HIGH / 2) for x in np.linspace(0.025, 0.475, COUNT)])
-    return spot_welds(made, places, ("lower", "upper"))[0]
+    if request.param == "solids":
+        return spot_welds(made, places, ("lower", "upper"))[0]
+    path = write_assembly(made, tmp_path_factory.mktemp("seam") / "seam.bdf", "SI")
+    lower, upper = (part.id for part in made.parts)
+    cards = ["PWELD,900,901,.006", "MAT1,901,2.1+11,,.3"]
+    for id, (x, y, z) in enumerate(places.tolist(), start=9001):
+        cards += [f"CWELD,{id},900,,PARTPAT", f",{lower},{upper}", f",{x},{y},{z}"]
+    text = path.read_text().replace("ENDDATA", "\n".join([*cards, "ENDDATA"]))
+    path.write_text(text)
+    return assembly(read_deck(path), "SI")
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +79,9 @@ def welds(ground):
     return sorted(singles(loosened_rows(ground)), key=lambda one: one.joint.point[0])
 
 
-def receptances(assembly, data):
+def receptances(made, data):
     """Of the structure as a whole, on the lines of the data."""
-    system, rows = structure(assembly).system, data.outputs.toarray()
+    system, rows = structure(made).system, data.outputs.toarray()
     solved = [rows @ spsolve(sp.csc_array(system.K + s**2 * system.M), rows[0]) for s in data.s]
     return np.array(solved)[:, :, None]
 
@@ -94,13 +104,12 @@ def context(ground, welds, data):
     base = baseline(
         ground.model, [calibration_parameter(ground.groups, "E", [0])], data, None, np.zeros(1)
     )
-    made = SimpleNamespace(
-        problem=SimpleNamespace(reduced=ground), baselines=(base, base),
-        loosened=tuple(welds), loosened_rows=loosened_rows(ground),
-        bases=(np.zeros(1), np.zeros(1)), where=SimpleNamespace(groups=ground.groups),
-        fasteners=tuple((one.joint, one.share) for one in welds),
-    )  # fmt: skip
-    made.scan = Scan(made, data)
+    where = SimpleNamespace(groups=ground.groups)
+    problem = SimpleNamespace(reduced=ground, data=data, where=where)
+    made = UpdatingContext(problem, SimpleNamespace())
+    vars(made).update(
+        baselines=(base, base), bases=(np.zeros(1), np.zeros(1)), loosened=tuple(welds)
+    )
     return made
 
 
@@ -188,7 +197,7 @@ def test_the_run_that_is_gone_is_proposed_whole(context, welds):
     every = proposed(WeldMissing, context)
     run, *others = [c.effect for c in every if len(c.effect.joint.ids) > 1]
     assert set(run.joint.ids) == {i for k in GONE for i in welds[k].joint.ids}
-    assert run.text.startswith("4 welds in a row")
+    assert run.text.startswith(("4 welds in a row", "4 fasteners in a row"))
     assert len({c.effect.joint.ids for c in every}) == len(every)
     assert others
 
@@ -214,4 +223,4 @@ def test_a_run_that_is_gone_is_the_deck_without_it(seam, ground, welds):
     due = normal_modes(structure(gone).system, 14).frequency[6:]
     assert_allclose(np.sqrt(lam) / (2 * np.pi), due, rtol=2e-3)
     made = effect.apply(seam, x)
-    assert sum(len(s.ids) for s in made.solids) == COUNT - len(GONE)
+    assert sum(len(s.ids) for s in (*made.solids, made.bushes)) == COUNT - len(GONE)

@@ -26,7 +26,7 @@ from chladni.model.properties import (
 from chladni.reduced.accuracy import products
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni_specimens.plates import plate
+from chladni_specimens.plates import plate, solid_plate
 
 TOP = 200.0
 GLUE = Isotropic(2e9, 0.4, 1200.0, id=2)
@@ -143,6 +143,15 @@ def test_pickles(reduced):
 def test_of_solids_their_materials_are_free():
     found = defaults_of_solids(jointed())
     assert [(p.field, p.positions) for p in found] == [("E", (1,)), ("rho", (1,))]
+    assert {p.sd for p in found} == {None}
+
+
+@pytest.mark.parametrize(("material", "sd"), [
+    (STEEL, [0.03, 0.005]), (Isotropic(112e9, 0.34, 4430.0), [None, None]),
+])  # fmt: skip
+def test_a_deck_of_solids_has_all_dimensions_so_its_alloy_alone_scatters(material, sd):
+    made = solid_plate(0.1, 0.1, 0.01, 2, 2, material)
+    assert [p.sd for p in defaults_of_solids(made)] == sd
 
 
 SHEET_OF = {

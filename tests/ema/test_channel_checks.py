@@ -7,7 +7,13 @@ import pytest
 from tests.builders.modal_frfs import modal_frf, noisy
 
 from chladni.dynamics.frf import FRF
-from chladni.ema.chain_checks import fitted_delay, level_checks, modal_gains, other_reading
+from chladni.ema.chain_checks import (
+    fitted_delay,
+    level_checks,
+    median_slope,
+    modal_gains,
+    other_reading,
+)
 from chladni.ema.channel_checks import channel_checks
 from chladni.ema.frf_maps import misreadings
 from chladni.ema.identification import Identified, identify
@@ -262,3 +268,14 @@ def test_a_channel_that_the_model_misjudges_has_no_wrong_gain() -> None:
         psi[4] *= factors
         assert faults(psi) == []
     assert faults(times({4: 1.65}) @ SHAPES) == [("wrong gain", ("5:+Z",))]
+
+
+@pytest.mark.parametrize("n", [5, 6, 14])
+def test_slope_and_interval_are_those_of_theil_and_sen(n: int) -> None:
+    from scipy.stats import theilslopes
+
+    rng = np.random.default_rng(n)
+    x = np.sort(rng.normal(size=n))
+    y = -2 * x + 0.3 * rng.standard_t(2, size=n)
+    slope, _, low, high = theilslopes(y, x, 0.999)
+    np.testing.assert_allclose(median_slope(y, x), (slope, low, high), rtol=1e-12)

@@ -122,6 +122,46 @@ def test_actuators_of_a_case(case):
     assert agents.play(env, agents.best_actuators(env))["condition"] < 1e3
 
 
+PLACES = {"regions": ["panel"], "forbidden": ["box 0 0 -1 0.3 0.3 1"]}
+
+
+@pytest.mark.parametrize("moves", ["delete", "add"])
+def test_places_obey_the_words_of_a_plan(case, moves):
+    """Labels of the info, whoever plays: fixed ones stay in, none is where it is not allowed."""
+    id, more = "chladni/SensorPlacement-v0", {"fixed": ["402:+X", "513:n"], "cost": {"513:n": 4}}
+    env = gym.make(id, case=case, modes=4, n_sensors=7, moves=moves, **PLACES, **more)
+    for agent in (agents.at_random(0), agents.exchange(env)):
+        end = agents.play(env, agent)
+        assert {"402:+X", "513:n"} < set(end["labels"])
+        assert end["cost"] == 7 + 3
+    inner = env.unwrapped
+    outside = np.array([n not in more["fixed"] for n in inner.labels])
+    assert inner.points[outside, 0].min() > 0.3
+    if moves == "delete":
+        env.reset(seed=0)
+        masks = dict(zip(inner.labels, inner.action_masks(), strict=True))
+        assert not masks["402:+X"]
+        assert not masks["513:n"]
+
+
+def test_costs_divide_information_in_an_environment(case):
+    """Four times the cost everywhere is half of every row: log det falls by r ln 4."""
+    id, same = "chladni/SensorPlacement-v0", {"case": case, "modes": 4, "regions": ["panel"]}
+    one, four = (gym.make(id, **same, cost={"panel": c}).unwrapped for c in (1, 4))
+    assert one.walk.log_det - four.walk.log_det == pytest.approx(4 * np.log(4))
+
+
+def test_shakers_obey_the_words_of_a_plan(case):
+    env = gym.make("chladni/ActuatorPlacement-v0", case=case, modes=4, fixed=["402:+X"], **PLACES)
+    end = agents.play(env, agents.at_random(0))
+    at = [env.unwrapped.specimen.labels.index(n) for n in end["labels"]]
+    assert env.unwrapped.specimen.points[at, 0].min() > 0.3
+    assert "402:+X" not in end["labels"]
+    for id in ("chladni/SensorPlacement-v0", "chladni/ActuatorPlacement-v0"):
+        with pytest.raises(ShapeError, match=r"regions, forbidden: .* give case="):
+            gym.make(id, **PLACES)
+
+
 def test_selection_of_a_case(ready, case):
     """Freeing the modulus that is off improves the held-out data and is learned."""
     env = gym.make("chladni_envs:chladni/ParameterSelection-v0", case=case)

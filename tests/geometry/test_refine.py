@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.builders.elements import bars
+from tests.fem.test_curved_shell import sheet as curved_sheet
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.fem import shell
 from chladni.fem.assemble import structure
+from chladni.fem.curved_shell import strains
 from chladni.geometry.facets import cell_areas, vector_areas
 from chladni.geometry.refine import refined
 from chladni.model.properties import BeamSection, Part
@@ -205,3 +208,91 @@ def test_an_edge_that_is_held_stays_held_between_its_points(components):
         for a in (refined(held(4, 3)), held(8, 6))
     )
     assert_allclose(halved, due, rtol=1e-9)
+
+
+def cylinder(x, y):
+    """An arc of 2 rad on a radius of 0.5 m."""
+    return 0.5 * np.sin(2 * x), y, 0.5 * np.cos(2 * x)
+
+
+def true_area(made):
+    """∫ dA of shells with nodes on their edges [m²]."""
+    return strains(shell.geometry(made.points, made.shells))[1].sum()
+
+
+KINDS = pytest.mark.parametrize("corners", [4, 3])
+
+
+@KINDS
+@pytest.mark.parametrize("lacks", [None, lambda p: p[0] < 1e-9], ids=["all", "some lack a node"])
+def test_quarters_of_a_curved_shell_lie_on_its_own_surface(corners, lacks):
+    """The area stays, quarter by quarter; neighbours share the nodes of their edges."""
+    coarse = curved_sheet(3, 2, corners, shape=cylinder, lacks=lacks)
+    fine = refined(coarse)
+    assert len(fine.shells) == 4 * len(coarse.shells)
+    assert_allclose(true_area(fine), true_area(coarse), rtol=5e-6)  # to the quadrature
+    assert fine.shells.curved.all()
+    own = fine.shells.middle[:, :corners]
+    assert (own < 0).sum() == (0 if lacks is None else 2 * 2)
+    used = np.unique(np.concatenate([fine.shells.nodes.ravel(), own[own >= 0]]))
+    places = fine.points[used].round(9)
+    assert len(np.unique(places, axis=0)) == len(places)
+
+
+@KINDS
+def test_the_area_of_a_cylinder_is_reached_as_h4(corners):
+    """Its arc is a parabola a shell: of 1 m² it lacks h⁴; nodes on the edges lie near the arc."""
+    meshes = [curved_sheet(n, 1, corners, shape=cylinder) for n in (2, 4)]
+    off = [abs(true_area(a) - 1.0) for a in meshes]
+    assert off[0] / off[1] > 12
+    fine = refined(meshes[1])
+    x, _, z = fine.points.T
+    assert np.abs(np.hypot(x, z) - 0.5).max() < 1e-3 * 0.5
+
+
+@KINDS
+def test_modes_that_are_interpolated_are_the_same_motion(corners):
+    """Quarters hold every motion of their shell: ΦᵀMΦ = I, and constant curvature has its energy.
+
+    The places of new nodes are linear in the old ones, and so are motions.
+    """
+    coarse = curved_sheet(3, 2, corners, t=2e-3)
+    built, fine = structure(coarse), structure(refined(coarse))
+    x, y = coarse.points[:, :2].T
+    bent = np.zeros((len(coarse.points), 6, 1))
+    bent[:, 2, 0], bent[:, 3, 0], bent[:, 4, 0] = x * x - 2 * x * y, -2 * x, 2 * y - 2 * x
+    modes = normal_modes(built.system, 12).sel(slice(6, 12)).shapes
+    u = np.concatenate([(built.T @ modes).reshape(len(x), 6, -1), bent], axis=2)
+
+    def between(values):
+        moved = replace(coarse, points=coarse.points + values)
+        return refined(moved).points - fine.assembly.points
+
+    each = [np.hstack([between(u[:, :3, k]), between(u[:, 3:, k])]) for k in range(u.shape[2])]
+    q = fine.T.T @ np.stack(each, axis=2).reshape(-1, u.shape[2])
+    assert_allclose((q.T @ (fine.system.M @ q))[:6, :6], np.eye(6), atol=2e-3)
+    p = built.T.T @ bent.reshape(-1, 1)
+    energies = [float((v.T @ (s.system.K @ v)).item()) for v, s in ((q[:, 6:], fine), (p, built))]
+    assert energies[0] == pytest.approx(energies[1], rel=1e-9)
+
+
+def test_a_clamped_quadratic_edge_stays_clamped():
+    """Its new nodes are held, its neighbours inside are free."""
+    coarse = curved_sheet(2, 2)
+    edge = np.flatnonzero(coarse.points[:, 0] < 1e-9)
+    held = np.array([(row, c) for row in edge for c in range(1, 7)])
+    fine = refined(replace(coarse, supports=held))
+    rows = np.unique(fine.supports[:, 0])
+    assert_allclose(fine.points[rows, 0], 0, atol=1e-12)
+    assert len(rows) == 2 * len(edge) - 1
+
+
+def test_a_beam_on_a_quadratic_edge_uses_its_nodes():
+    """From a corner to the node in the middle: the half takes the node of the finer shell."""
+    coarse = curved_sheet(2, 2)
+    corner, node = coarse.shells.nodes[0, 0], coarse.shells.middle[0, 0]
+    beam = Part(2, "rib", BeamSection(STEEL, 1e-4, 1e-9, 1e-9, J=2e-9))
+    made = replace(coarse, beams=bars([(corner, node)], 1), parts=(*coarse.parts, beam))
+    fine = refined(made)
+    used = set(fine.shells.nodes.ravel()) | set(fine.shells.middle.ravel())
+    assert set(fine.beams.nodes.ravel()) <= used

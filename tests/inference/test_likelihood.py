@@ -41,6 +41,22 @@ def effects(reduced):
 X = np.array([0.03, -0.02, 0.2, 0.1, -0.2, -1.0, -0.1, 0.3, 0.2, -0.1, 0.15, -0.3])
 
 
+def test_fields_met_before_give_the_same_state(reduced, effects):
+    """K and M of the last fields are kept: a state must not carry what effects added to them."""
+    model = replace(reduced.model)  # has met no fields
+    for x in (X, X + 0.1 * (np.arange(len(X)) > 1), X, 0 * X, X):  # the first two have equal fields
+        fresh = evaluate(replace(reduced.model), effects, x)
+        again = evaluate(model, effects, x)
+        np.testing.assert_array_equal(again.lam, fresh.lam)
+        np.testing.assert_array_equal(again.dK.along(again.vectors), fresh.dK.along(fresh.vectors))
+
+
+def test_slopes_alone_are_those_of_the_residuals(reduced, responses, effects):
+    state = evaluate(reduced.model, effects, X)
+    for data in (responses, responses.allowing_errors(state)):
+        np.testing.assert_array_equal(data.scaled_slopes(state), data.scaled(state, True)[1])
+
+
 @pytest.fixture(scope="module")
 def poles(reduced):
     state = evaluate(

@@ -4,6 +4,7 @@ import pytest
 
 from chladni.report.diagnosis_json import from_json
 from chladni.report.next_steps import next_steps
+from chladni.report.sentence import sentence
 from chladni.report.verdict import HEADING
 
 MASS = {"name": "M", "value": 0.06, "unit": "kg", "low": 0.05, "high": 0.07}
@@ -78,3 +79,13 @@ def test_a_deck_is_recommended_only_without_a_doubt(doubts, verb):
         files={"deck": "calibrated.bdf"}, deck_changed=True,
     )  # fmt: skip
     assert any(s.startswith(f"{verb} calibrated.bdf") for s in found)
+
+
+@pytest.mark.parametrize(("why", "times"), [("", 0), ("on the given mesh it predicts worse", 1)])
+def test_headline_and_recommendation_name_halved_shells(why, times):
+    found = {"verdict": "missing physics", "effects": [LUMP], "halved": why, "deck_changed": True,
+             "files": {"deck": "updated.bdf"}}  # fmt: skip
+    (use,) = (s for s in steps(**found) if s.startswith("Use updated.bdf"))
+    assert use.count(f"; every shell of it is halved, because {why}.") == times
+    headline = sentence(from_json(found))
+    assert headline.count(f"Every shell of the written decks is halved, because {why}.") == times

@@ -1,6 +1,7 @@
 """The list of runs and the comparison of two, on folders as the commands write them."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ def made(place, command, source=None, lead="", drawn=(), **files):
 def runs(tmp_path):
     """A diagnosis, a correlation, a mode analysis of a hostile name, and what is none of ours."""
     root = tmp_path / "runs"
-    held = {"held_out": {"Q_nominal": 0.2, "Q_calibrated": 0.2, "Q_with_effect": 0.02}}
+    held = {"held_out": {"Q_nominal": 0.3, "Q_calibrated": 0.2, "Q_with_effect": 0.02}}
     effect = {"name": "point-mass", "claim": "", "parameters": [], "where": {"text": "at 7"}}
     found = {"verdict": "missing physics", "effects": [effect], "fit": held, "alternatives": [{}]}
     found["alternatives"] = [{"name": "crack", "log_evidence": -1.0, "why_not": ""}]
@@ -65,7 +66,7 @@ def test_every_run_below_a_folder_is_found_once(runs):
     seen = {run.command: run for run in finished_runs(runs)}
     assert sorted(seen) == ["correlate", "diagnose", "modes"]
     assert seen["diagnose"].source == "bracket"
-    assert seen["diagnose"].q() == (0.2, 0.02)
+    assert seen["diagnose"].q() == (0.3, 0.02)
     assert seen["diagnose"].lead.startswith("The model lacks point-mass, at 7")
     assert seen["correlate"].source == "plate.bdf"
     assert seen["correlate"].q() == (3, None)
@@ -79,7 +80,7 @@ def test_the_list_is_written_again_and_hostile_names_are_text(runs):
     assert EVIL not in text
     assert "&lt;img src=x" in text
     assert 'href="./deep/c/report.html"' in text
-    assert "-90 %" in text
+    assert "-93 %" in text  # from the given deck, not from the calibrated one
 
 
 @pytest.mark.parametrize("words", [("index", "empty"), ("compare", "empty", "empty")])
@@ -96,6 +97,9 @@ def test_two_runs_are_compared(runs, tmp_path):
     said = ran("compare", runs / "d", runs / "deep" / "c", "--out", out).stdout
     assert "d and c come to different results" in said
     assert "0.2" in said
+    for folder in (runs / "d", runs / "deep" / "c"):
+        link = f"./{os.path.relpath(folder / 'report.html', out)}"
+        assert f'href="{link}"' in (out / "report.html").read_text()
     ran("compare", runs / EVIL, runs / EVIL, "--out", out)
     assert EVIL not in (out / "report.html").read_text()
 

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni.decision.decision_rules import TIED
 from chladni.effects.effect import Parameter, Traits
 from chladni.effects.estimate import Remarks
 from chladni.effects.joint_stiffness import ModelFamily
 from chladni.effects.masses import LocalResonator
 from chladni.effects.registry import families
 from chladni.inference.adequacy import FitTest
+from chladni.search.decision_rules import TIED
 from chladni.search.diagnosis import Diagnosis
 from chladni.search.result_parts import laid_on_sheets, remainder, why_not
 
@@ -33,6 +33,7 @@ def tried(name, S, becomes="", implausible="", ln_k=0.0, nearly=""):
         effects=(effect,),
         physics=True,
         channels=(),
+        remarks=said,
     )
 
 

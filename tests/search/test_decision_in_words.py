@@ -1,17 +1,17 @@
 """Reasons become sentences at the end: each says what was found, of what, with its numbers."""
 
-from types import SimpleNamespace
-
 import pytest
-from tests.decision.tables import FOR, row, table, together
 
-from chladni.decision.decide import decide
-from chladni.decision.decision_rules import gain_due
-from chladni.decision.hypotheses import AlternativeRow, Left
-from chladni.search.decision_in_words import UNEXPLAINED, DecisionWords
+from chladni.search.conclusion import _doubts
+from chladni.search.decide import decide
+from chladni.search.decision_in_words import UNEXPLAINED, refusal
+from chladni.search.decision_rules import gain_due
+from chladni.search.several import AlternativeRow
+
+from .decision_tables import FOR, row, table, together
 
 ONE, DUE = (gain_due(n, 1e-5) for n in (1, 2))
-WORSE = Left((1.0, 0.1), (1.0, 2.0))
+WORSE = (1.0, 0.1), (1.0, 2.0)
 PAIR = together((2 * DUE, 0.8 * DUE), DUE)
 PAID = together((2 * DUE, 2 * DUE), DUE)
 BAD = together((2 * DUE, 2 * DUE), DUE, (FOR, -2 * DUE))
@@ -20,13 +20,6 @@ TIES = together(
     DUE,
     alternatives=((), (AlternativeRow("hem-contact", 4.0, "odd"),)),
 )
-
-
-def words(made):
-    """All that is said of a table."""
-    found = decide(made)
-    asked = SimpleNamespace(too_little="2 modes do not separate the explanations")
-    return DecisionWords(asked, made, found), found
 
 
 SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
@@ -41,7 +34,7 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
             (f"together more than the required {ONE:.0f}",),
         ),
         (
-            table(row("crack", 200.0, left=WORSE)),
+            table(row("crack", 200.0, Q=WORSE)),
             (
                 "held-out Q 1 calibrated, 2 with it",
                 "the deck with it fits worse than the calibrated deck",
@@ -52,7 +45,7 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
             ("the held-out data speak against it", "what calibration leaves"),
         ),
         (
-            table(row("crack", 200.0, left=WORSE), row("point-mass", 199.0)),
+            table(row("crack", 200.0, Q=WORSE), row("point-mass", 199.0)),
             ("crack is refused: the deck with it fits", "; point-mass is next"),
         ),
         (
@@ -87,7 +80,7 @@ SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
     ],
 )
 def test_each_step_is_said_with_its_numbers(made, said):
-    text = "\n".join(words(made)[0].sentences())
+    text = "\n".join(decide(made).sentences)
     for part in said:
         assert part in text
 
@@ -95,41 +88,39 @@ def test_each_step_is_said_with_its_numbers(made, said):
 def test_a_name_is_never_followed_by_that_nothing_explains_the_recording():
     """The leader was refused by its fit; what stands in its place was not."""
     made = table(row("crack", 200.0, p=0.005), row("point-mass", 199.0))
-    words_, found = words(made)
+    found = decide(made)
     assert found.named
-    assert not any(UNEXPLAINED in text for text in words_.sentences())
+    assert not any(UNEXPLAINED in text for text in found.sentences)
 
 
 def test_the_absolute_test_is_that_of_the_answer():
-    named, _ = words(table(*SINGLES))
-    assert named.test().what == "what crack leaves"
+    assert decide(table(*SINGLES)).tested.chances.test.what == "what crack leaves"
     for gain in (1.0, 200.0):
-        quiet, _ = words(table(row("crack", gain, left=WORSE)))
-        assert quiet.test().what == "what calibration leaves"
+        quiet = decide(table(row("crack", gain, Q=WORSE)))
+        assert quiet.tested.chances.test.what == "what calibration leaves"
 
 
 @pytest.mark.parametrize(
     ("made", "doubt"),
     [
-        (table(row("crack", 200.0, left=WORSE)), True),
+        (table(row("crack", 200.0, Q=WORSE)), True),
         (table(row("crack", 200.0)), False),  # it is named
         (table(row("crack", 15.0, news=0.0)), False),  # too weak to be named
         (table(row("crack", 200.0, news=-190.0)), False),  # all data give it little
     ],
 )
 def test_a_refused_effect_that_gains_enough_is_a_reason_for_doubt(made, doubt):
-    said = tuple(words(made)[0].doubts())
+    said = tuple(_doubts(made, decide(made)))
     assert len(said) == doubt
     assert all("all data together give crack 250" in why for why in said)
 
 
 def test_why_another_is_not_named_is_said_of_each():
     made = table(
-        row("suspension", 200.0, left=WORSE), row("crack", 199.0), row("point-mass", 198.0),
-        then={"crack": {"fitted": False}},
+        row("suspension", 200.0, Q=WORSE), row("crack", 199.0), row("point-mass", 198.0),
+        then={"crack": {"lost": "it is no structure"}},
     )  # fmt: skip
-    words_, found = words(made)
-    over = [words_.refusal(h, why) for h, why in found.passed_over]
+    over = [refusal(made, h, why) for h, why in decide(made).passed_over]
     assert over == [
         "the deck with it fits worse than the calibrated deck",
         "it could not be fitted again: it is no structure",

@@ -1,7 +1,6 @@
 """Fitted, choosing and reporting data are disjoint; no decision uses data that report."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -12,11 +11,11 @@ from chladni.fem.modelled import modelled
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import MassMeasurement
 from chladni.model.point_masses import with_masses
-from chladni.search.basis_refinement import refined
-from chladni.search.deciding import decided
-from chladni.search.decision_in_words import concluded
+from chladni.search.conclusion import concluded
+from chladni.search.decide import decide
 from chladni.search.diagnosis import diagnose
 from chladni.search.held_out_data import HeldOutChoice, of_poles, upper_part
+from chladni.search.hypotheses import Hypotheses
 from chladni.search.preparation import prepare
 from chladni.search.question import HeldOut, Question
 from chladni.search.verdict_models import scores_of
@@ -110,8 +109,8 @@ def test_no_decision_uses_data_that_report(question, answered):
     _, again, worse = _answer(question, spoilt)
     assert decision.named
     assert (again.verdict, again.news) == (decision.verdict, decision.news)
-    assert [h.neg2_log_evidence for h in again.order] == [
-        h.neg2_log_evidence for h in decision.order
+    assert [h.fit.neg2_log_evidence for h in again.order] == [
+        h.fit.neg2_log_evidence for h in decision.order
     ]
     (fitted, held), (fitted_again, spoilt_Q) = Q, worse
     assert_allclose(fitted, fitted_again, rtol=1e-9)
@@ -136,7 +135,8 @@ def _spoilt(data: Responses, at: np.ndarray) -> Responses:
 
 def _answer(question, prepared):
     found = diagnose(prepared.problem)
-    case, decision = decided(prepared, found, partial(refined, question, prepared))
-    said = concluded(prepared, found, case, decision)[0]
+    case = Hypotheses(question, prepared, found)
+    decision = decide(case)
+    said = concluded(case, decision)[0]
     decks = [(h, h.fit.state) for h in (said.plain, said.as_deck or said.plain)]
     return found.null, decision, scores_of(prepared, decks[-1][0], decks, prepared.held.reporting)

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni.decision.decision_rules import TIED
 from chladni.effects.element_groups import element_groups
 from chladni.effects.orthotropy import orthotropic
 from chladni.fem.assemble import structure
 from chladni.inference.likelihood import Responses
 from chladni.inference.pole_data import Poles
 from chladni.model.properties import Isotropic
+from chladni.search.decision_rules import TIED
 from chladni.search.diagnosis import Diagnosis, threshold
 from chladni_specimens.plates import plate
 

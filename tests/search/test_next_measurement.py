@@ -10,12 +10,13 @@ from numpy.testing import assert_allclose
 from tests.builders.commands import ran, refused
 from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
 
-from chladni.decision.reasons import ALONE, BEYOND
 from chladni.fem.energy import mass_properties
 from chladni.output import write_npz
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import measurement_forecasts
-from chladni.search.deciding import open_explanations
+from chladni.search.conclusion import open_explanations
+from chladni.search.decision_in_words import BEYOND
+from chladni.search.hypotheses import ALONE
 from chladni.search.measurement_forecasts import Rival, _new, _responses, outlook
 from chladni.search.next_measurement import (
     advised,
@@ -139,7 +140,7 @@ def test_calibration_stands_for_what_the_catalogue_lacks(one_of, due):
     """Of explanations with a model there are two at least, or nothing is to be told apart."""
 
     def named(name):
-        return SimpleNamespace(name=name, numbers=SimpleNamespace(whole=name))
+        return SimpleNamespace(name=name, whole=name)
 
     order = [named("crack"), named("point-mass")]
     case, decision = SimpleNamespace(null=named("")), SimpleNamespace(one_of=one_of, order=order)

@@ -26,9 +26,9 @@ from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.written_hypothesis import as_written
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import diagnosis as diagnosing
-from chladni.search.candidates import candidates, proposals, repeats
-from chladni.search.deciding import Evaluated, Trial
-from chladni.search.diagnosis import Diagnosis, could_not_be_evaluated, threshold
+from chladni.search.candidates import UpdatingContext, candidates, proposals, repeats
+from chladni.search.diagnosis import Diagnosis, FitChances, could_not_be_evaluated, threshold
+from chladni.search.hypotheses import Hypotheses
 from chladni.search.search_round import _of_the_same_lump, on_common_basis, search_round
 from chladni.search.several import _begun_with, _More, _paying, _revised, _same, several
 
@@ -210,8 +210,8 @@ def test_a_rival_has_a_basis_of_its_own_again(two, found):
     with pytest.raises(ValueError, match="mismatch"):
         alternative.data.scaled(alternative.fit.state, False)
     null = null_of(two)
-    trial = Trial(None, SimpleNamespace(null=null), None)
-    again = Evaluated(two, alternative, trial=trial)._on_its_own_basis()
+    diagnosis = Diagnosis(null, null, null, (lead, alternative))
+    again = Hypotheses(None, SimpleNamespace(problem=two), diagnosis).singles[1].whole
     assert again.data.scaled(again.fit.state, False)[0].size
     gains = [null.neg2_log_evidence - t.neg2_log_evidence for t in (again, lead)]
     assert gains[0] == pytest.approx(gains[1], rel=0.02)
@@ -297,16 +297,12 @@ def test_what_is_written_holds_all_that_was_found(found):
 
 def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monkeypatch):
     """A null costs nothing and stays one."""
-    fit = SimpleNamespace(state=SimpleNamespace(dissipated=None))
-    null = SimpleNamespace(data=SimpleNamespace(error=1), effects=(), fit=fit)
-    fits = SimpleNamespace(passes=True, p=0.5, what="", where="")
-    lead = SimpleNamespace(effect=SimpleNamespace(name="point-mass", expected=False))
+    null = SimpleNamespace(data=SimpleNamespace(error=1), name="", neg2_log_evidence=0.0)
+    effect = SimpleNamespace(name="point-mass", expected=False)
+    lead = SimpleNamespace(effect=effect, neg2_log_evidence=-1.0)
     monkeypatch.setattr(diagnosing, "several", lambda *given: 1 / 0)
-    monkeypatch.setattr(diagnosing, "adequacy", lambda *given, **more: fits)
-    quiet = Diagnosis(null, null, null, (lead,), "nothing missing")
-    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
-    found = diagnosing._with_sets_of_effects(problem, quiet, lambda text, share: None)
-    assert (found.verdict, found.sets) == ("nothing missing", ())
+    quiet = Diagnosis(null, null, null, (lead,), chances={"": FitChances(None, 0.5, 1.0)})
+    assert diagnosing._with_sets_of_effects(None, quiet, None) is quiet
 
 
 @pytest.mark.parametrize("shift", [-0.6, 0.6])
@@ -351,10 +347,10 @@ def test_what_fails_numerically_is_one_hypothesis_lost(reduced):
     problem = problem_of(reduced, [lump(reduced, HERE, 1.0)], weight)
     problem = replace(problem, families=(broken, sinking, own))
     null = null_of(problem)
-    tried = proposals(problem, null)
-    singles = search_round(problem, null, tried.candidates, lambda text, share: None)
+    tried, lost = proposals(UpdatingContext(problem, null))
+    singles = search_round(problem, null, tried, lambda text, share: None)
     assert [t.effect.name for t in singles] == ["point-mass"]
-    assert sorted(could_not_be_evaluated(tried, singles)) == [
+    assert sorted(could_not_be_evaluated(tried, lost, singles)) == [
         "the hypothesis broken could not be evaluated: singular matrix",
         "the hypothesis sinking could not be evaluated: no start of its fit is a structure",
     ]

@@ -129,6 +129,31 @@ def test_fill_grows_like_n_log_n(metis, monkeypatch):
     assert rate[-1] < 1.35
 
 
+def test_rows_of_a_node_that_nothing_couples_are_apart(monkeypatch):
+    """Two fields on one grid, each alone: half the fill of both together, and the same solution."""
+    monkeypatch.setattr(elimination_fronts, "_LEAF", 1)  # no zeros are stored
+    monkeypatch.setattr(elimination_fronts, "_ZEROS", 0.0)
+    A, nodes = grid(24, 24, dofs=3)
+    n, rng = A.shape[0], np.random.default_rng(0)
+    both = sp.csr_array(sp.block_diag([A, A]))
+    at = np.argsort(np.tile(nodes, 2), kind="stable")
+    fields, nodes = sp.csr_array(both[at][:, at]), np.tile(nodes, 2)[at]
+    vertex = elimination_fronts.coupled(fields, np.unique(nodes, return_inverse=True)[1])
+    assert len(np.unique(vertex)) == 2 * len(np.unique(nodes))
+    apart = Multifrontal(fields, nodes)
+    joined = elimination_fronts.analyse(sp.csr_array(sp.kron(A[::3, ::3], np.ones((6, 6)))),
+                                        np.repeat(np.arange(24 * 24), 6))  # fmt: skip
+    assert apart.nnz < 0.6 * joined.nnz
+    b = rng.standard_normal(2 * n)
+    np.testing.assert_allclose(fields @ apart.solve(b), b, atol=1e-10)
+
+
+def test_rows_that_only_a_third_one_couples_stay_together():
+    """A chain 0-2-1 within a node; row 3 is alone."""
+    A = sp.csr_array(np.eye(4) + np.array([[0, 0, 1, 0], [0, 0, 1, 0], [1, 1, 0, 0], [0] * 4]))
+    assert elimination_fronts.coupled(A, np.zeros(4, int)).tolist() == [0, 0, 0, 1]
+
+
 @given(st.integers(0, 10**6))
 @settings(max_examples=40, deadline=None)
 def test_parent_is_the_first_row_below_the_diagonal_of_the_factor(seed):

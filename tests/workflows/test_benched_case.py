@@ -31,14 +31,14 @@ def deck(demo, tmp_path_factory):
     """A bare deck with a card that nobody understands, and where it is measured."""
     folder = tmp_path_factory.mktemp("bare")
     text = (demo / "deck.bdf").read_text(encoding="latin-1")
-    (folder / "deck.bdf").write_text(text.replace("ENDDATA", "GENEL,99,1\nENDDATA"), "latin-1")
+    (folder / "deck.bdf").write_text(text.replace("ENDDATA", "CSEAM,99,1\nENDDATA"), "latin-1")
     rows = [r for r in (demo / "sensors.csv").read_text().splitlines() if r]
     rows = [f"{rows[0]},position_sd", *(f"{r},0.002" for r in rows[1::2])]
     (folder / "sensors.csv").write_text("\n".join(rows) + "\n")
     return folder / "deck.bdf"
 
 
-BARE = ("--units", "mm-t-s", "--allow", "GENEL")
+BARE = ("--units", "mm-t-s", "--allow", "CSEAM")
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
     words = {
         "model": {"deck": "deck.bdf", "units": "mm-t-s", "thickness": "t.csv", "damping": 0.02,
                   "thickness_units": "mm-t-s", "thickness_place": "as it lies",
-                  "allow": ["GENEL"], "outside": False},
+                  "allow": ["CSEAM"], "outside": False},
         "test": {"recordings": ["recording.uff"], "use": "recording.uff", "gain": "unknown",
                  "quantity": "accelerance", "factor": 1.0, "delay": 0.0,
                  "frequency_unit": "Hz", "conjugated": False, "sensors": "sensors.csv",

@@ -162,6 +162,86 @@ def test_modes_of_nastran_itself():
     assert found.pairs.mac.min() > 1 - 1e-6
 
 
+def hinged(path, stiff, n=N, rib=False):
+    """Two square plates whose facing edges are joined by springs, and a rib across one of them."""
+    lines = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,2.1+11,,0.3,7850.", "PSHELL,1,1,.001,1,,1"]
+    h, side = 0.2 / (n - 1), n * n
+    for p, i, j in np.ndindex(2, n, n):
+        lines.append(f"GRID,{1 + j + n * i + p * side},,{h * i + 0.2 * p:.4f},{h * j:.4f},0.")
+    for p, i, j in np.ndindex(2, n - 1, n - 1):
+        a = 1 + j + n * i + p * side
+        lines.append(f"CQUAD4,{a},1,{a},{a + n},{a + n + 1},{a + 1}")
+    for j, k in enumerate(stiff):
+        a = 1 + j * (n - 1) // (len(stiff) - 1) + n * (n - 1)
+        b = a + n
+        lines += [f"CELAS2,{2000 + 6 * j + c},{k},{a},{c},{b},{c}" for c in range(1, 7) if k]
+    if rib:
+        lines += [
+            "GRID,900,,0.05,0.05,0.02",
+            "GRID,901,,0.1,0.05,0.02",
+            "PBAR,2,1,1.-5,1.-10,1.-10",
+        ]
+        a = 1 + (n - 1) // 4 + n * (n - 1) // 4
+        lines += [f"CBAR,900,2,{a},900,0.,1.,0.", "CBAR,901,2,900,901,0.,0.,1."]
+    path.write_text("\n".join([*lines, "ENDDATA", ""]))
+    return path
+
+
+FIRM = (1e6,) * 5
+
+
+def test_a_deck_is_compared_with_a_variant_of_its_joint(tmp_path):
+    """Without the spring at one end every mode is lower or equal (Rayleigh), and MAC says which.
+
+    The same deck is its own partner; a variant may be a path or a model.
+    """
+    deck = hinged(tmp_path / "firm.bdf", FIRM)
+    loose = hinged(tmp_path / "loose.bdf", (*FIRM[:4], 0))
+    same, found = (chladni.other_modes(deck, other, units="SI") for other in (deck, loose))
+    np.testing.assert_allclose(np.diag(same.mac)[: len(same.f_other)], 1, atol=1e-9)
+    n = min(len(found.f_other), len(found.f_model))
+    assert np.all(found.f_other[:n] <= found.f_model[:n] * (1 + 1e-9))
+    assert found.pairs.mac.min() < 0.99 < found.pairs.mac.max()
+    assert (found.grids, found.expanded, found.whole) == (2 * N * N, 0, True)
+    again = chladni.other_modes(chladni.load(deck, "SI"), chladni.load(loose, "SI"))
+    np.testing.assert_allclose(again.mac, found.mac, atol=1e-9)
+
+
+def test_grids_that_a_variant_lacks_move_by_expansion(tmp_path):
+    """A rib of the deck is not in the variant: in the picture it follows the plates."""
+    deck = hinged(tmp_path / "rib.bdf", FIRM, rib=True)
+    found = chladni.other_modes(deck, hinged(tmp_path / "plain.bdf", FIRM), units="SI")
+    assert found.expanded == 2
+    assert found.whole
+    best = int(np.argmax(found.pairs.mac))
+    i, j = found.pairs.model[best], found.pairs.test[best]
+    rib = found.origin.assembly.rows([900, 901])
+    scale = np.vdot(found.motion[:, :, i], found.shapes[:, :, j]) / np.sum(
+        found.motion[:, :, i] ** 2
+    )
+    own = scale * found.motion[rib, :, i]
+    np.testing.assert_allclose(found.shapes[rib, :, j], own, atol=0.1 * np.abs(own).max())
+
+
+def test_a_variant_may_have_another_mesh(tmp_path):
+    """Twice as fine, with other numbers at the same places: points, not numbers, are compared."""
+    deck = hinged(tmp_path / "firm.bdf", FIRM)
+    found = chladni.other_modes(deck, hinged(tmp_path / "fine.bdf", FIRM, n=9), units="SI")
+    assert found.pairs.mac[:6].min() > 0.95
+    assert found.grids > N * N
+
+
+def test_the_page_of_two_decks_shows_both(tmp_path):
+    """A square of the MAC opens both shapes, partners in phase."""
+    deck = hinged(tmp_path / "firm.bdf", FIRM)
+    loose = hinged(tmp_path / "loose.bdf", (*FIRM[:4], 0))
+    words = ["correlate", deck, "--modes", loose, "--units", "SI", "--pictures"]
+    ran(*words, "--out", tmp_path / "out")
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "loose.bdf against the model; framed: the pairs. Click one to see it." in page
+    assert {"mac.png", "shapes.png"} <= {p.name for p in (tmp_path / "out").iterdir()}
+
+
 @pytest.mark.parametrize(
     ("words", "text", "told"),
     [

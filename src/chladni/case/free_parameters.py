@@ -24,8 +24,14 @@ from .key import refuse_other
 from .request import Stated
 from .schema import ALIASES, FIELDS, PLANNED, ParameterWords
 
-_CARD = re.compile(r"^\s*([A-Z]+[0-9]?)\s+(\d{1,8})\s*$")
-_LUMPS = {"PBUSH": "bushes", "PELAS": "springs", "CELAS2": "springs", "CONM2": "masses"}
+_CARD = re.compile(r"^\s*([A-Z]+[0-9]?D?)\s+(\d{1,8})\s*$")
+_LUMPS = {
+    "PBUSH": "bushes", "PFAST": "bushes", "PWELD": "bushes", "PBUSH1D": "bushes",
+    "PELAS": "springs", "CELAS2": "springs", "CONM2": "masses",
+}  # fmt: skip
+_HELD_BY = {  # the first members of a family, one a card; others belong to elements of more numbers
+    "springs": ("CELAS1", "CELAS2", "CELAS3", "CELAS4"), "masses": ("CONM2",),
+}  # fmt: skip
 _OF_LUMPS = {"springs": "K", "bushes": "K", "masses": "M"}
 _WORDS = {"springs": "a spring", "bushes": "a bush", "masses": "a mass"}
 
@@ -72,7 +78,7 @@ def free_parameter(
     field = ALIASES.get(what, what)
     given, positions, lumps = _members(stated, made, deck)
     if not given:
-        positions, lumps = _all_that_have(at["field"], made, field, what)
+        positions, lumps = _all_that_have(at["field"], made, deck, field, what)
     for k in positions:
         _serves(at["field"], made.parts[k], field)
     for family in lumps:
@@ -186,8 +192,8 @@ def _lumps(at: str, made: Assembly, deck: Deck, kind: str, id: int) -> tuple[str
 
 def _elements(deck: Deck, kind: str, id: int) -> list[int]:
     """Ids of the elements that take their value from a card."""
-    users = {"PBUSH": ("CBUSH",), "PELAS": ("CELAS1", "CELAS3")}.get(kind)
-    if users is None:
+    users = ("CELAS1", "CELAS3") if kind == "PELAS" else ("C" + kind[1:],)
+    if kind[0] == "C":
         return [id]
     out: list[int] = []
     for cards in deck.present(*users):
@@ -197,7 +203,7 @@ def _elements(deck: Deck, kind: str, id: int) -> list[int]:
 
 
 def _all_that_have(
-    at: str, made: Assembly, field: str, what: str
+    at: str, made: Assembly, deck: Deck | None, field: str, what: str
 ) -> tuple[list[int], dict[str, list[int]]]:
     """Every part, spring, bush or mass that has the field, and not as zero."""
     if what == "adhesive-stiffness":
@@ -213,6 +219,10 @@ def _all_that_have(
         for family, name in _OF_LUMPS.items()
         if name == field and len(getattr(made, family))
     }
+    if deck is not None:
+        for family in lumps.keys() & _HELD_BY.keys():
+            own = sum(map(len, deck.present(*_HELD_BY[family])))
+            lumps[family] = [row for row in lumps[family] if row < own]
     if "bushes" in lumps:
         lumps["bushes"] = np.flatnonzero(made.bushes.stiffness.any(axis=1)).tolist()
     if not positions and not any(lumps.values()):

@@ -37,10 +37,10 @@ class FormedThickness:
         parts, fit = self.mapped.parts, self.alignment
         worst = min(parts, key=lambda p: p.coverage)
         out = [
-            f"Thickness from {self.source.name}, onto {len(parts)} parts of "
-            f"{_parts_with_shells(self.mapped.assembly)} (least covered: {worst.part}, "
-            f"{100 * worst.coverage:.0f} %); their mass goes from {self.mapped.mass_before:.4g} "
-            f"to {self.mapped.mass_after:.4g} kg."
+            f"Thickness from {self.source.name}, onto {len(parts)} of the deck's "
+            f"{_parts_with_shells(self.mapped.assembly)} parts with shells (least covered: "
+            f"{worst.part}, {100 * worst.coverage:.0f} %); their mass goes from "
+            f"{self.mapped.mass_before:.4g} to {self.mapped.mass_after:.4g} kg."
         ]
         if fit is not None:
             out.append(

@@ -72,7 +72,8 @@ def on_structure(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
 
 def numbers_agree(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
     """True if nodes [m] lie where the grids of their numbers do, or no grid has these numbers."""
-    ids = [n for n in nodes if n in set(made.ids.tolist())]
+    known = set(made.ids.tolist())
+    ids = [n for n in nodes if n in known]
     if not ids:
         return True
     places = np.array([nodes[n] for n in ids])

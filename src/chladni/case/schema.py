@@ -42,7 +42,7 @@ PLANNED = (  # names of the public contract that no model stands behind yet
     "rattle", "joint-friction",
 )  # fmt: skip
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)
-SECTIONS = ("model", "test", "recording", "band", "held_out", "search", "parameter")
+SECTIONS = ("model", "test", "recording", "band", "held_out", "search", "plan", "parameter")
 
 
 # fmt: off
@@ -62,6 +62,19 @@ class FileWords(TypedDict, total=False):
         "model. Recordings of the same article, level and state with other drive points are "
         "stacked with it, and those with shapes are merged. The others are held out and scored. "
         "`identify` reads all.", kind="list of files")]
+    regions: Annotated[Sequence[str], Key("plan", '["inner", "box 0 0 0 0.4 0.3 0.1"]', ("plan",),
+        "everywhere", "m",
+        "Where sensors, shakers and cords may be: parts, boxes by two opposite corners, or labels. "
+        "A CSV file with a column `label` or `part` lists some. A place with a label need not be "
+        "flat.", kind="list of places")]
+    fixed: Annotated[Sequence[str], Key("plan", '["412:+Z", "sensors.csv"]', ("plan",), "none", "",
+        "Sensors of every layout: labels, or tables of sensors.", kind="list of labels")]
+    forbidden: Annotated[Sequence[str], Key("plan", '["outer", "507:n"]', ("plan",), "none", "m",
+        "Places for no sensor, shaker or cord, written as `regions`.", kind="list of places")]
+    cost: Annotated[Sequence[str], Key("plan", '["inner=3", "costs.csv"]', ("plan",), "1", "",
+        "Cost of a sensor by place: a word of `regions`, `=` and a number. A CSV file of places "
+        "has a column `cost`. The last of several holds. The information of a place is divided by "
+        "its cost.", kind="list of costs")]
 
 
 class RecordingWords(TypedDict, total=False):

@@ -17,8 +17,9 @@ def run(first: Folder, second: Folder, out: Out = None) -> None:
     """Put two runs next to each other: results, values, charts of the same quantities."""
     runs = [_opened(folder) for folder in (first, second)]
     name = f"compare-{'-'.join(r.folder.resolve().name for r in runs)}"
-    with started("compare", first, out or Path("runs") / name) as job:
-        job.show(compared_runs(*runs))
+    place = out or Path("runs") / name
+    with started("compare", first, place) as job:
+        job.show(compared_runs(runs[0], runs[1], place))
 
 
 def _opened(folder: Path) -> FinishedRun:

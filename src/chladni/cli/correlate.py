@@ -20,8 +20,8 @@ def run(
     modes: Annotated[
         Path | None,
         typer.Option(
-            help="Modes from another program instead of a test: OP2, punch or universal file "
-            "(dataset 55)."
+            help="Modes instead of a test: OP2, punch or universal file (dataset 55) of another "
+            "program, or another deck, as one with a joint left out."
         ),
     ] = None,
     units: Units = None,
@@ -32,7 +32,7 @@ def run(
     """Compare model and test without a fit: paired modes, MAC, deviation Q by channel and band.
 
     A case is compared with its recording. With --modes, a case or a bare deck is compared with
-    the modes of another program.
+    the modes of another program or of another deck.
     """
     with started("correlate", source, out, pictures=pictures) as job:
         if modes is not None:
@@ -49,8 +49,8 @@ def _with_test(job: Run, source: Path) -> None:
     if source.is_file() and not is_case(source):
         refuse_foreign(source)
         raise FileError(
-            f"{source} is a deck; give a case with a recording, or --modes with the modes from "
-            "another program"
+            f"{source} is a deck; give a case with a recording, or --modes with another deck or "
+            "the modes from another program"
         )
     case = opened(source)
     found = correlate(case, progress=within(job.progress, 0.0, 0.8))

@@ -101,10 +101,11 @@ class _Problem:
     fronts: Fronts
 
     def shifted(self, K: sp.csr_array, sigma: float) -> sp.csr_array:
-        """K - σM in the order of elimination."""
-        A = sp.csr_array(K - sigma * self.M)
+        """K - σM in the order of elimination; columns of a row in any order."""
+        new, A = np.argsort(self.fronts.order), sp.csr_array(K - sigma * self.M)
         A = A[self.fronts.order]
-        return A[:, self.fronts.order]
+        at = new.astype(A.indices.dtype)[A.indices]
+        return sp.csr_array((A.data, at, A.indptr), shape=A.shape)
 
     def factor(self, sigma: float) -> Factor:
         """Positive definite factorisation of K - σM in that order; an error names the dof."""

@@ -29,7 +29,7 @@ from .estimate import Estimate, Location, Remarks
 from .family import Article, Family
 from .identified_damping import LEVEL_SD, IdentifiedDamping, paired_with
 from .joint_stiffness import JointFamilies, JointStiffness, joint_families
-from .joints import Connection, beads, joined, stiffness, with_factor_on
+from .joints import BUSHES, Connection, beads, joined, stiffness, with_factor_on
 from .search_context import Candidate, SearchContext, best_places
 
 SD = 3.0  # of ln of the factor on E
@@ -317,7 +317,7 @@ FAMILY = Family(
     ViscoelasticJoint,
     conceal,
     candidates=candidates,
-    cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBUSH", "CBUSH"),
+    cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", *BUSHES),
     settled_by=(
         "repeat the test at another temperature, which changes only a viscoelastic joint, and at "
         "another level of excitation, which changes only a slipping joint"

@@ -25,6 +25,7 @@ SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
 MOST_SOLIDS = 27  # of a weld: more of them in one piece are a casting
 NEXT = 2.0  # median distances to the nearest: fasteners farther apart are not in one line
 MOST_RUN = 8  # fasteners in a run that is tried as one
+BUSHES = ("PBUSH", "CBUSH", "PWELD", "CWELD", "PFAST", "CFAST")  # cards read as bushes
 FLAT = 1e-9  # of the stiffest direction of a joint: softer ones are rounding
 
 
@@ -310,10 +311,15 @@ def with_family(assembly: Assembly, name: str, factor: float) -> Assembly:
 
 
 def without_joint(assembly: Assembly, joint: Connection) -> Assembly:
-    """The assembly with the elements of a joint taken out."""
+    """The assembly with the elements of a joint taken out, and the mass of a CFAST with it."""
     old = members(assembly, joint.kind, joint.group)
     kept = np.setdiff1d(np.arange(len(old.ids)), joint.elements)
-    return _with_members(assembly, joint, picked(old, kept))
+    assembly = _with_members(assembly, joint, picked(old, kept))
+    if joint.kind != "bushes":
+        return assembly
+    m = assembly.masses
+    own = [np.isin(m.ids, joint.ids), np.isin(m.node, old.nodes[joint.elements])]
+    return replace(assembly, masses=picked(m, ~np.all(own, axis=0)))
 
 
 def _with_members(assembly: Assembly, joint: Connection, new: Any) -> Assembly:

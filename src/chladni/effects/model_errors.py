@@ -17,6 +17,7 @@ from ..dynamics.modes import ModalModel
 from ..dynamics.reduction import iterated
 from ..fem.assemble import Structure, structure
 from ..fem.modelled import Modelled, solved
+from ..geometry.beam_lines import member_beams
 from ..geometry.facets import cell_areas
 from ..geometry.folds import share_at_folds
 from ..geometry.footprints import on_smaller_shells, regions_of_joints
@@ -31,7 +32,8 @@ LARGE = 20_000  # dofs from which refined modes are solved only up to the compar
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
 FAR = 0.1  # largest change of a frequency for which modes of one mesh are near those of another
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
-MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
+LEFT = 0.17 / LIMIT  # share of an error of h² that meshes of other tools still have
+MESH_SD = 0.3  # of the prior of the mesh error
 FOOTPRINT = 0.5, 0.7  # prior of the footprint error: as in the deck, half or a quarter as wide
 REGIONS = 4  # regions of joints with their own footprints; each needs one refined solution
 FOLDS = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
@@ -56,11 +58,12 @@ class MeshError(Effect):
     log: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (k, k) L
     # (p, k) change of motion at the measured places by each coordinate
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    order: int = 2  # p: errors fall as h^p
 
     @property
     def limit(self) -> np.ndarray:
         """Natural frequencies of the modes on an infinitely fine mesh (k,) [Hz], increasing."""
-        w, V = np.linalg.eigh(LIMIT * self.log)
+        w, V = np.linalg.eigh(limit_of(self.order) * self.log)
         lam = np.linalg.eigvalsh(self.omega[:, None] * ((V * np.exp(w)) @ V.T) * self.omega)
         return np.asarray(np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi))
 
@@ -126,8 +129,8 @@ Places = Callable[[Structure], sp.csr_array]  # rows of the measured dofs, on an
 def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> list[MeshError]:
     """Mesh errors of a structure up to somewhat above ``f_max``.
 
-    A large structure has none, nor one of shells with nodes on their edges, whose errors fall as
-    h⁴.
+    A large structure has none. Errors of shells with nodes on their edges fall as h⁴, of others as
+    h².
 
     The list holds the error of the elements. Joints on whole shells add the error of their
     footprints: one common to all, and one for each region, because two meshers attach one joint to
@@ -144,8 +147,6 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     built = model.structure
     made = built.assembly
     if len(built.system.dofs) > MOST_DOFS or not len(made.shells) + len(made.beams):
-        return []
-    if made.shells.curved.any():
         return []
     above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
     band = above[1] * f_max
@@ -168,7 +169,9 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
 
     fine = refined(built.assembly)
     of_shells, begun = change(fine, begun)
-    errors = [of_shells.error(MeshError, MESH)]
+    order = order_of(made)
+    prior = limit_of(order) * (1 - LEFT ** (order / 2)), MESH_SD
+    errors = [of_shells.error(MeshError, prior, order)]
     smaller = on_smaller_shells(built.assembly, fine)
     moved = [k for k, (new, old) in enumerate(zip(smaller, fine.rigid, strict=True)) if new != old]
 
@@ -183,6 +186,17 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
         if len(regions) > 1 and len(built.system.dofs) < LARGE:
             errors += [footprints(at.tolist(), 0.0, FOOTPRINT[1] / np.sqrt(n)) for at, n in regions]
     return errors
+
+
+def limit_of(order: int) -> float:
+    """Share of the change to h/2 that leads to h = 0 where errors fall as h^p: 1 / (1 - 2^-p)."""
+    return 1 / (1 - 0.5**order)
+
+
+def order_of(assembly: Assembly) -> int:
+    """Order p of the error of a mesh, that of its worst elements."""
+    quadratic = assembly.shells.curved.all() and not len(member_beams(assembly))
+    return 4 if len(assembly.shells) and quadratic else 2
 
 
 def _nowhere(built: Structure) -> sp.csr_array:
@@ -211,12 +225,12 @@ class _ModalChange:
         within = self.omega <= 2 * np.pi * f_max
         return float(np.abs(self.log.diagonal()[within]).max(initial=0.0)) / 2
 
-    def error(self, kind: type[MeshError], prior: tuple[float, float]) -> MeshError:
+    def error(self, kind: type[MeshError], prior: tuple[float, float], order: int = 2) -> MeshError:
         """The nuisance effect with this change."""
         unknown = Parameter("mesh", "-", *prior, kind="linear", step=0.5)
         return kind(
             (unknown,), "every mode", rows=self.rows, omega=self.omega, log=self.log,
-            shapes=self.seen,
+            shapes=self.seen, order=order,
         )  # fmt: skip
 
 

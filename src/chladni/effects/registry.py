@@ -24,6 +24,7 @@ from . import (
     orthotropy,
     rotating_part,
     sheets,
+    solid_patch,
     springs,
     stiffener,
     welds,
@@ -57,6 +58,7 @@ BUILT_IN = (
     springs.SHAKER,
     adhesive.FAMILY,
     rotating_part.FAMILY,
+    solid_patch.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -90,6 +90,14 @@ class ResponseScan(Protocol):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
 
+    def effect_scores(
+        self, about: int, effect: Effect, change: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of each change (n_p, k) of an effect, and the score: (k,), (k,).
+
+        The responses are linearised in its parameters at their nominal values.
+        """
+
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -35,6 +35,9 @@ TILT = 0.5  # prior sd of the tangent of its tilt: folds of a sheet have normals
 FLATTEST = 0.2  # least cosine to a new normal for which the tilt is converted exactly
 STRAIGHT = 0.97  # cosine to the normal from which the direction is not reported
 TRIED = np.exp(np.linspace(-4.5, 4.5, 9))  # multiples of the prior median
+RIGID = 1e-3  # of the highest line: rigid modes lie below
+SMALLEST = 1e-6  # of the mobility of the whole mass: a place at rest
+BEYOND = 2.0  # ln of a spring: step of its starts, and their reach beyond both ends
 MOST_DRIVES = 3  # drive points of fixed shakers; more points mean a hammer or a roving shaker
 ACROSS, TURNING, GAUGE = 1e4, 3.0, 0.01  # medians of their priors [N/m, N m/rad, kg]
 
@@ -124,8 +127,8 @@ class ExtraSupport(MovableAttachment):
     @classmethod
     def near(cls, where: EffectContext, k: int) -> Self:
         """A spring along the normal near the k-th grid."""
-        K = strength("K", "N/m", where.setup.stiffness, 2.0, (-2.0, 0.0, 2.0))
-        n = where.grids.normal[k]
+        scale, n = where.setup.stiffness, where.grids.normal[k]
+        K = strength("K", "N/m", scale, 2.0, free_to_fixed(where, k, scale))
         tilt = [Parameter(f"tilt {a}", "-", 0.0, TILT, kind="linear", step=0.2) for a in "uv"]
         return cls.at_grid(where, k, K, np.stack([n, *tangents(n)]), tilt, direction=n)
 
@@ -170,6 +173,24 @@ class ExtraSupport(MovableAttachment):
         if abs(d @ self.direction) > STRAIGHT:
             return found
         return replace(found, text=f"{found.text}, along ({', '.join(f'{v:.2f}' for v in d)})")
+
+
+def free_to_fixed(where: EffectContext, k: int, scale: float) -> tuple[float, ...]:
+    """ln of springs over ``scale``: from 1/c, below which modes hardly notice one, to m ω².
+
+    c = Σ φ²/ω² is the compliance of the k-th grid along its normal, 1/m = Σ φ² its mobility at the
+    highest spectral line ω. Beyond m ω² the place is fixed. Modes pair differently on either end.
+    """
+    flexible = where.frequency > RIGID * where.setup.f_max
+    if not flexible.any():
+        return (-2.0, 0.0, 2.0)
+    square = np.asarray(where.grids.rows[[k]] @ where.shapes)[0] ** 2
+    square = square + SMALLEST / where.setup.weight
+    omega = 2 * np.pi * where.frequency[flexible]
+    c, mobility = float((square[flexible] / omega**2).sum()), float(square.sum())
+    ends = 1 / c, (2 * np.pi * where.setup.f_max) ** 2 / mobility
+    low, high = (float(np.log(end / scale)) for end in ends)
+    return tuple(np.arange(low - BEYOND, high + BEYOND + 1, BEYOND).tolist())
 
 
 def _tilted(tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -217,6 +217,9 @@ def candidates(context: SearchContext) -> list[Candidate]:
         path for line in drawn for path in grids.beside(line, shells.half(line.through, line.times))
     ])  # fmt: skip
     effects = [e for path in every if (e := Stiffener.along(where, path, tried)) is not None]
+    if alone:
+        leading = best_places(context, effects, BEGUN, anywhere=True)
+        effects = [c.effect for c in leading if isinstance(c.effect, Stiffener)]
     best = best_places(context, effects, FOLLOWED, extended=True)
     return [closer(context, best[0].effect, best[0].start) or best[0], *best[1:]] if best else []
 

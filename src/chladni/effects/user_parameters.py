@@ -18,12 +18,14 @@ from ..fem.derivative import Slope, by_part, of_lumps, of_part
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
-from ..model.properties import Part, SolidSection
+from ..model.properties import AnyMaterial, Part, SolidSection
 from .calibration_parameters import (
+    OF_ALLOYS,
     OF_FIELDS,
     SHEET,
     TUBE,
     LinearScale,
+    alloy_of,
     calibration_parameter,
     linear_scale,
     prior_sd,
@@ -182,14 +184,16 @@ def freed_effect(effect: Effect, called: str) -> UserParameter:
 
 
 def defaults_of_solids(assembly: Assembly) -> list[FreeParameter]:
-    """E and rho of every material of solids."""
-    by_material: dict[object, list[int]] = {}
+    """E and rho of every material of solids; the mesh has all dimensions of these alone."""
+    by_material: dict[AnyMaterial, list[int]] = {}
     for k, part in enumerate(assembly.parts):
         if isinstance(part.section, SolidSection):
             by_material.setdefault(part.section.material, []).append(k)
     return [
-        FreeParameter(name, name, positions=tuple(at))
-        for at in by_material.values()
+        FreeParameter(
+            name, name, positions=tuple(at), sd=OF_ALLOYS[name] if alloy_of(material) else None
+        )
+        for material, at in by_material.items()
         for name in ("E", "rho")
     ]
 

@@ -25,7 +25,15 @@ from .effect import MatrixTerm, Parameter, Traits
 from .estimate import Estimate, Remarks
 from .family import Article, Family
 from .joint_stiffness import Fastener, JointFamilies, joint_families
-from .joints import MOST_RUN, Connection, fasteners, with_factor_on, with_family, without_joint
+from .joints import (
+    BUSHES,
+    MOST_RUN,
+    Connection,
+    fasteners,
+    with_factor_on,
+    with_family,
+    without_joint,
+)
 from .rigid_ties import RigidTie, firmly_held, rigid_ties, sprung
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
 
@@ -271,7 +279,7 @@ COMPLIANCE = Family(
     WeldCompliance,
     _loosen,
     candidates=softer,
-    cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBAR", "CBAR", "PBUSH", "CBUSH"),
+    cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBAR", "CBAR", *BUSHES),
     settled_by="tap on both sides of the joint with a small hammer, and test a coupon of it",
     needs=NEEDS,
 )
@@ -279,7 +287,7 @@ MISSING = Family(
     WeldMissing,
     _remove,
     candidates=missing,
-    cards=("MAT1", "CHEXA", "CPENTA", "CTETRA", "CBAR", "CBUSH", "PBUSH"),
+    cards=("MAT1", "CHEXA", "CPENTA", "CTETRA", "CBAR", *BUSHES),
     settled_by="inspect that joint, and test it by ultrasound or a chisel",
     needs=NEEDS,
 )

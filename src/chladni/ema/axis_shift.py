@@ -15,7 +15,7 @@ from ..dynamics.frf import FRF
 from ..units import number
 from .finding import Check, Finding
 from .identification import Identified, kept_lines, pole_data
-from .pole_fitting import PoleData, bounded, polish, solved
+from .pole_fitting import PoleData, bounded, polish, solve
 from .pole_search import chi_of
 from .pole_selection import Rule
 
@@ -50,7 +50,7 @@ def axis_shift(
         """χ² with the price of its poles, χ, and the poles on the recorded axis."""
         data, top = pole_data(replace(some, frequency=some.frequency - shift), lines)
         q = bounded((p - 2j * np.pi * shift) / top, 0.1)
-        fit, _ = polish(data, q, iterations=steps) if steps else solved(data, q)
+        fit = (polish(data, q, iterations=steps) if steps else solve(data, q))[0]
         return fit.chi2 + _price(data) * len(p), chi_of(data, fit), fit.p * top + 2j * np.pi * shift
 
     low = found.frequency < lowest / 2

@@ -8,6 +8,7 @@ unit multiplies all of them by one factor.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from ..units import number
 from .finding import Check, Finding
@@ -226,11 +227,9 @@ def _derivative(size: np.ndarray, w: np.ndarray, known_gain: bool) -> tuple[int,
 
     A known level shows them clearly, because ω is hundreds of radians per second.
     """
-    from scipy.stats import theilslopes
-
     if len(size) < LEAST_MODES + 1:
         return 0, size
-    slope, _, low, high = (float(v) for v in theilslopes(size, w, 0.999))
+    slope, low, high = median_slope(size, w)
     order = int(np.clip(round(slope), -2, 2))
     if order == 0:
         return 0, size
@@ -239,6 +238,18 @@ def _derivative(size: np.ndarray, w: np.ndarray, known_gain: bool) -> tuple[int,
     if known_gain:  # the level says it as well
         sure = abs(np.median(left)) < min(abs(np.median(size)), NEAR_FACTOR if not sure else np.inf)
     return (order, left) if sure else (0, size)
+
+
+def median_slope(y: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
+    """Median slope of all pairs of points, and its 99.9 % interval (Sen 1968, JASA 63, 1379)."""
+    i, j = np.triu_indices(len(x), 1)
+    apart = x[i] != x[j]
+    each = np.sort((y[j] - y[i])[apart] / (x[j] - x[i])[apart])
+    n, pairs = len(x), len(each)
+    half = float(ndtri(0.9995)) * np.sqrt(n * (n - 1) * (2 * n + 5) / 18)
+    low = max(round((pairs - half) / 2) - 1, 0)
+    high = min(round((pairs + half) / 2), pairs - 1)
+    return float(np.median(each)), float(each[low]), float(each[high])
 
 
 def _quantity(identified: Identified, order: int) -> Finding:

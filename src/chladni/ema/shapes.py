@@ -14,6 +14,24 @@ from ..errors import LabelError
 from .identification import Identified
 from .propagation import propagated, standard_deviations
 
+SEPARATE = 1e3  # condition of Φ at the sensors from which they cannot tell modes apart
+
+
+def mixture(phi: np.ndarray, psi: np.ndarray) -> np.ndarray | None:
+    """q = Φ⁺ ψ (m, r), the modes that expand shapes at the sensors onto the model (SEREP).
+
+    O'Callahan, Avitabile and Riemer (1989), IMAC VII, 29-37. None where the sensors cannot tell the
+    modes apart.
+
+    Parameters
+    ----------
+    phi : (n, m)   modes of the model at the sensors
+    psi : (n, r)   the shapes
+    """
+    if not phi.size or len(phi) < phi.shape[1] or np.linalg.cond(phi) > SEPARATE:
+        return None
+    return np.asarray(np.linalg.pinv(phi) @ psi)
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredShapes:

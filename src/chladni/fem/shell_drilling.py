@@ -18,11 +18,12 @@ s = 1.001e-4 G t. Twice the area of a CTRIA3 is based on MYSTRAN's comparison wi
 
 Corners alone transfer little twist round a bend. At K6ROT 100 MacNeal-Harder's twisted beam is 1.64
 times too soft (field 0.99) and Raasch's hook 1.26 times. Sheets of a tailgate change by 0.2 % in
-frequency. Nastran corrects this by shell normals (PARAM,SNORM), which are not read here. Therefore
-the field is used for meshes that are made here. Beams with offsets on a sheet twist the rotation
-about its normal, and there the field is too stiff. A stringer on a floor has its first mode at
-22.06 Hz with it and at 20.26 Hz with K6ROT 100. Another code has 20.31 Hz. Decks are read with
-Nastran's 100.
+frequency. Nastran corrects this by shell normals (SNORM). No manual states their formula, and no
+result at hand determines it: the free cylinder above was computed without them. Therefore the
+field is used for meshes that are made here. Beams with offsets on a sheet twist the rotation about
+its normal, and there the field is too stiff. A stringer on a floor has its first mode at 22.06 Hz
+with it and at 20.26 Hz with K6ROT 100. Another code has 20.31 Hz. Decks are read with Nastran's
+100.
 """
 
 import numpy as np

@@ -9,6 +9,7 @@ from scipy.special import logsumexp
 
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
+from ..effects.estimate import Remarks
 from ..effects.family import Family
 from ..effects.registry import catalogue
 from ..errors import ModelError
@@ -71,6 +72,11 @@ class HypothesisFit:
         """Channels of its effects, if every effect is one of channels."""
         every = [e.channels for e in self.effects]
         return tuple(c for each in every for c in each) if all(every) else ()
+
+    @property
+    def remarks(self) -> Remarks:
+        """Simpler effects to which it reduces, and why its values are impossible."""
+        return self.effect.remarks(self.fit.of(self.effect), self.fit.sd(self.effect))
 
     @property
     def own(self) -> LocalOptimum:
@@ -153,12 +159,6 @@ class UpdatingProblem:
             return self
         return replace(self, data=self.data.allowing_errors(state, delta))
 
-    def exactly(self) -> "UpdatingProblem":
-        """Return the problem for a model without errors of form."""
-        if not isinstance(self.data, Responses):
-            return self
-        return replace(self, data=self.data.exactly())
-
     def holding(self, found: Sequence[tuple[Effect, np.ndarray]]) -> "UpdatingProblem":
         """Return the problem with effects in its base, and their changes in its model."""
         problem = self
@@ -216,7 +216,7 @@ class UpdatingProblem:
         """The responses of some base effects linear about x; computed once."""
         if (kept, x) not in self._linear:
             at = np.array(x)
-            J = self.data.scaled(evaluate(self.reduced.model, kept, at), True)[1]
+            J = self.data.scaled_slopes(evaluate(self.reduced.model, kept, at))
             self._linear[kept, x] = LinearModel(self.data.error, J, np.zeros((0, len(x)))), at
         return self._linear[kept, x]
 

@@ -32,6 +32,9 @@ class Data(Protocol):
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """r (n,) over the spread of each sample and ∂r/∂x (n, n_p); ``error`` is still in them."""
 
+    def scaled_slopes(self, state: State) -> np.ndarray:
+        """The slopes ∂r/∂x of :meth:`scaled` alone."""
+
     def rebased(self, model: Reduced) -> Self:
         """Return the data with rows in another basis."""
 
@@ -179,14 +182,15 @@ class Responses:
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """δ over its spread on used samples, real and imaginary, sensors' errors whitened out."""
-        sd = self.std()
-        r = self.stacked(self.deviation(state)[None] / sd)[:, 0]
-        if not gradient:
-            return r, np.zeros((len(r), 0))
+        r = self.stacked(self.deviation(state)[None] / self.std())[:, 0]
+        return r, self.scaled_slopes(state) if gradient else np.zeros((len(r), 0))
+
+    def scaled_slopes(self, state: State) -> np.ndarray:
+        """The slopes of :meth:`scaled` alone."""
         f, o = np.asarray(self.use.any(axis=1)), np.asarray(self.use.any(axis=0))
         J = self.slopes(state, f, o)
-        J /= sd[f][:, o]
-        return r, self._stacked(J, self.use[f][:, o])
+        J /= self.std()[f][:, o]
+        return self._stacked(J, self.use[f][:, o])
 
     def stacked(self, z: np.ndarray) -> np.ndarray:
         """Columns of residuals (n, k) of k complex deviations over their spread (k, n_f, ...)."""

@@ -177,7 +177,7 @@ def posterior(
     r0 = prior_residuals(effects, mass_measurement, x, state.without_slopes())[0][first:]
 
     def sloped() -> tuple[Squares, LinearPosterior]:
-        J = data.scaled(state, True)[1]
+        J = data.scaled_slopes(state)
         J0 = prior_residuals(effects, mass_measurement, x, state)[1][first:]
         linear = LinearModel(data.error, J, J0)
         return linear.squares(r, r0), LinearPosterior(state, linear, r, r0)

@@ -111,7 +111,7 @@ def _objective(
         frozen = replace(alone, J0=J0[:, :n], within=alone)
 
         def sloped() -> tuple[Squares, tuple[LinearModel, np.ndarray, np.ndarray]]:
-            J = data.scaled(state.of_last(len(y)), True)[1]
+            J = data.scaled_slopes(state.of_last(len(y)))
             whole = replace(frozen, J=np.concatenate([alone.J, J], axis=1), J0=J0, within=frozen)
             return whole.squares(r, r0).profiled(n), (whole, r, r0)
 

@@ -170,6 +170,10 @@ class Poles:
         r[-1] = np.sqrt(unpaired + wide)
         return np.concatenate([r[use], R]), np.concatenate([J[use], dR])
 
+    def scaled_slopes(self, state: State) -> np.ndarray:
+        """The slopes of :meth:`scaled` alone."""
+        return self.scaled(state, True)[1]
+
     def _of_shapes(
         self, state: State, gradient: bool, test: np.ndarray, model: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, float]:

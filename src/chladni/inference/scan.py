@@ -187,14 +187,19 @@ class _Probe(Effect):
 
 def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.ndarray:
     """∂r/∂ln t, E or rho of every group, including the row of the weighing (n, n_groups)."""
-    n = len(model.groups)
-    unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in range(n))
-    probe = _Probe(unknown, field=field)
-    state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
-    _, J = data.scaled(state, True)
+    groups = range(len(model.groups))
+    unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in groups)
+    return effect_slopes(base, model, data, _Probe(unknown, field=field))
+
+
+def effect_slopes(base: Baseline, model: Reduced, data: Data, effect: Effect) -> np.ndarray:
+    """∂r/∂x of an effect at its nominal values, including the row of the weighing (n, n_p)."""
+    nominal = np.array([p.nominal for p in effect.parameters])
+    state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, nominal]))
+    J = data.scaled_slopes(state)
     if base.mass_measurement is not None:
         J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
-    return J[:, -n:]
+    return J[:, len(base.x) :]
 
 
 AT_ONCE = 64  # number of changes whose slopes are in memory at a time
@@ -220,7 +225,7 @@ def bending_slopes(
                 force[:r] += V.T @ own.reshape(len(V), -1)
 
         dK, dM = MatrixSlopes(len(chunk), [(len(chunk) - 1, bent)]), MatrixSlopes(len(chunk))
-        J = data.scaled(replace(still, dK=dK, dM=dM), True)[1]
+        J = data.scaled_slopes(replace(still, dK=dK, dM=dM))
         rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
     return np.concatenate(out, axis=1)

@@ -31,7 +31,7 @@ from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
-from .field_factors import log_fields, mass_log, multiplied
+from .field_factors import Fields, log_fields, mass_log, multiplied, stiffness_log
 from .frequency_dependent_stiffness import Rising
 from .gyroscopic import Spin, spin
 from .matrix_stack import MatrixStack, stacked
@@ -204,6 +204,26 @@ class Reduced:
         else:
             yield from self.groups.components(self.axis)
 
+    def with_fields(self, logs: Fields) -> tuple[np.ndarray, np.ndarray]:
+        """K and M (r, r) with these log fields of the groups; those of the last fields are kept.
+
+        While an effect alone is optimised that changes no field, they stay as they are.
+        """
+        key = np.concatenate(list(logs.values()))
+        known = self._last.get("fields")
+        if known is None or not np.array_equal(known[0], key):
+            K, M = self.K0.copy(), self.M0.copy()
+            for stacks, power in ((self.linear, 1), (self.cubic, 3)):
+                for name, stack in stacks.items():
+                    K += stack.weighted(np.exp(stiffness_log(logs, name, power)))
+            M += self.mass.weighted(np.exp(mass_log(logs)))
+            known = self._last["fields"] = key, K, M
+        return known[1].copy(), known[2].copy()
+
+    @cached_property
+    def _last(self) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        return {}
+
     def split_for(self, effect: Effect, x: np.ndarray) -> Self:
         """The model, split into components where the effect changes one of them."""
         split = any(change.field in COMPONENTS for change in of(FieldChange, effect.terms(x)))
@@ -255,9 +275,8 @@ def evaluate(
     logs, slopes = log_fields(acting, len(model.groups), n_p, split)
     r, n_own = len(model.K0), sum(effect.traits.own_dofs for effect in effects)
     sums = RunningSums.of_fields(
-        model.K0, model.M0, (model.linear, model.cubic), model.mass, logs, slopes,
-        n_own,
-    )  # fmt: skip
+        *model.with_fields(logs), (model.linear, model.cubic), model.mass, logs, slopes, n_own
+    )
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
     doffset: np.ndarray | None = None
@@ -335,7 +354,7 @@ def _spin(model: Reduced, acting: Acting, phi: np.ndarray) -> Spin | None:
 
 
 def _participating(
-    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], n_own: int
+    model: Reduced, logs: Fields, slopes: Fields, n_own: int
 ) -> Participating | None:
     """Base participation of the shells with these fields; None where the base does not move."""
     if model.base is None:

@@ -31,27 +31,22 @@ class RunningSums:
 
     @classmethod
     def of_fields(
-        cls, K0: np.ndarray, M0: np.ndarray, stiffness: Sequence[Mapping[str, MatrixStack]],
+        cls, K: np.ndarray, M: np.ndarray, stiffness: Sequence[Mapping[str, MatrixStack]],
         mass: MatrixStack, logs: Fields, slopes: Fields, n_own: int,
     ) -> Self:  # fmt: skip
-        """Start with K_0, M_0 and all groups of shells and beams.
+        """Start with K, M of these fields, and their slopes of all groups of shells and beams.
 
         Parameters
         ----------
         stiffness : stacks that grow with t, and with t³
         n_own : degrees of freedom that effects add
         """
-        K, M, n_p = K0.copy(), M0.copy(), slopes["t"].shape[1]
-        dK, dM = MatrixSlopes(n_p), MatrixSlopes(n_p)
-        if len(logs["t"]):
-            for stacks, power in zip(stiffness, (1, 3), strict=True):
-                for name, stack in stacks.items():
-                    w = np.exp(stiffness_log(logs, name, power))
-                    K += stack.weighted(w)
-                    dK.add_groups(stack, w[:, None] * stiffness_log(slopes, name, power))
-            w = np.exp(mass_log(logs))
-            M += mass.weighted(w)
-            dM.add_groups(mass, w[:, None] * mass_log(slopes))
+        dK, dM = (MatrixSlopes(slopes["t"].shape[1]) for _ in "KM")
+        for stacks, power in zip(stiffness, (1, 3), strict=True):
+            for name, stack in stacks.items():
+                w = np.exp(stiffness_log(logs, name, power))
+                dK.add_groups(stack, w[:, None] * stiffness_log(slopes, name, power))
+        dM.add_groups(mass, np.exp(mass_log(logs))[:, None] * mass_log(slopes))
         return cls(with_own(K, n_own), with_own(M, n_own), dK, dM)
 
     def add(self, share: TermShare, A: np.ndarray) -> None:

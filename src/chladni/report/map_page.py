@@ -10,7 +10,7 @@ from ..workflows.loaded_model import on_faces
 from ..workflows.map import MappedDeck
 from .blocks import Block, Facts, PageParts, Section, Table
 from .mesh_drawings import field, mesh_of
-from .words import number, percent
+from .words import counted, number, percent
 
 _HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
           "was [kg]", "error of t [%]")  # fmt: skip
@@ -58,8 +58,9 @@ def _lead(found: MappedDeck) -> str:
     parts, (was, now) = found.found.mapped.parts, found.mass
     errors = [p.round_trip for p in parts if np.isfinite(p.round_trip)]
     known = f"; error of the mapping {100 * max(errors):.2g} % rms at most" if errors else ""
+    onto = counted(len(parts), "part", "parts")
     return (
-        f"{found.found.source.name} mapped onto {len(parts)} parts: the sheets go from "
+        f"{found.found.source.name} mapped onto {onto}: the sheets go from "
         f"{number(was)} to {number(now)} kg ({percent(now, was)}){known}."
     )
 

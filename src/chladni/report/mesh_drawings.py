@@ -73,6 +73,33 @@ def mode_shapes(
     return [Drawing("shapes", spatial("shapes", shown, moving), TURN, {picture: still}, what)]
 
 
+def two_models(
+    shown: Shown, other: str, shapes: np.ndarray, f_other: np.ndarray, numbers_other: Sequence[int],
+    motion: np.ndarray, f: np.ndarray, numbers: Sequence[int], pairs: Sequence[tuple[int, int]],
+    mac: np.ndarray, drawn: int = 12,
+) -> list[Drawing]:  # fmt: skip
+    """Shapes (n, 3, r) of another model next to those of the model; MAC (other, model)."""
+    if not len(f_other):
+        return []
+    some, shapes = slice(drawn), shapes.copy()
+    for k, j in pairs:  # partners move the same way
+        shapes[:, :, k] *= np.sign((shapes[:, :, k] * motion[:, :, j]).sum()) or 1.0
+    still = _picture("montage", seen=shown.seen, shapes=shapes[:, :, some],
+                     frequency=f_other[some], numbers=numbers_other[some])  # fmt: skip
+
+    def moving() -> Mapping[str, Any]:
+        used, partner = shown.seen.without_joints().used, dict(pairs)
+        sides = {
+            other: live_mesh.ModeSet(f_other, shapes[used], numbers=numbers_other),
+            "model": live_mesh.ModeSet(f, motion[used], numbers=numbers),
+        }
+        rows = [[k, partner.get(k)] for k in range(len(f_other))]
+        return live_mesh.shapes(sides, rows, shown, mac={f"{other}|model": mac})
+
+    what = f"shapes of {other}"
+    return [Drawing("shapes", spatial("shapes", shown, moving), TURN, {"shapes": still}, what)]
+
+
 def shape_pairs(
     shown: Shown, found: PairedShapes | None, sensors: Sequence[str], mac: np.ndarray | None
 ) -> list[Drawing]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .blocks import Facts, PageParts, Section, Table
 from .mesh_drawings import mesh_of, mode_shapes
-from .words import hertz, number
+from .words import counted, hertz, number
 
 if TYPE_CHECKING:
     from ..workflows.loaded_model import Model
@@ -47,10 +47,12 @@ def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
 def in_words(found: NormalModes) -> PageParts:
     """The page without its pictures."""
     f, kg = found.modal.frequency, "kg" if found.in_si else "deck units"
-    lead = (
-        f"{len(f)} modes from {number(f[0])} to {number(f[-1])} Hz; "
-        f"its mass is {number(found.mass)} {kg}."
-    )
+    elastic, rigid = f[~found.rigid], int(found.rigid.sum())
+    modes = [counted(rigid, "rigid motion", "rigid motions")] * (rigid > 0)
+    if len(elastic):
+        modes.insert(0, f"{counted(len(elastic), 'elastic mode', 'elastic modes')} from "
+                        f"{number(elastic[0])} to {number(elastic[-1])} Hz")  # fmt: skip
+    lead = f"{' and '.join(modes)}; the mass is {number(found.mass)} {kg}."
     return PageParts(lead, [Section("Modes", _tables(found, kg))], found.notes)
 
 

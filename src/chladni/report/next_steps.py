@@ -112,8 +112,12 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
     if result.compared == "frequencies" and error and (error.after or 0) >= (error.before or 0):
         return [f"Do not use {deck}: its frequencies are no nearer to the test."]
     if lost:
-        return [f"Use {deck} for the structure without {named(lost)}, which no card of it holds."]
-    return [f"Use {deck}: it contains the change."]
+        use = f"Use {deck} for the structure without {named(lost)}, which no card of it holds"
+    else:
+        use = f"Use {deck}: it contains the change"
+    if result.halved:
+        use += f"; every shell of it is halved, because {result.halved}"
+    return [f"{use}."]
 
 
 def _without_card(result: DiagnosisResult) -> list[str]:

@@ -8,7 +8,7 @@ from ..view import charts
 from ..workflows.loaded_model import Model
 from ..workflows.other_modes import OtherModes
 from .blocks import Block, Drawing, PageParts, Section, Table
-from .mesh_drawings import mesh_of, mode_shapes
+from .mesh_drawings import mesh_of, two_models
 from .words import criterion, hertz, percent
 
 _SHOWN = 12  # shapes in a picture
@@ -22,23 +22,32 @@ _CAPTION = (
 
 def other_modes_page(model: Model, found: OtherModes) -> PageParts:
     """Sections of the page."""
-    blocks: list[Block] = [_table(found)]
+    p, other = found.pairs, found.source.name
+    shown = mesh_of(model.seen, model.assembly)
+    pairs = list(zip(p.test.tolist(), p.model.tolist(), strict=True))
+    notes = list(found.notes)
+    blocks: list[Block] = []
     if max(found.mac.shape) <= _MOST:
-        pairs = list(zip(found.pairs.test.tolist(), found.pairs.model.tolist(), strict=True))
         both = {"model": (found.mac.T, found.f_model, pairs)}
-        caption = f"MAC, {found.source.name} against the model; framed: the pairs."
-        chart = charts.mac(found.f_other, both, found.source.name)
-        blocks.append(Drawing("mac", chart, caption, what="MAC"))
-    sections, notes = [Section("Modes", blocks)], list(found.notes)
+        caption = f"MAC, {other} against the model; framed: the pairs."
+        caption += " Click one to see it." if found.whole else ""
+        chart = charts.mac(found.f_other, both, other, "shapes" if found.whole else "")
+        blocks.append(Drawing("mac", chart, caption, what="MAC", wide=not found.whole))
     if found.whole:
-        (shapes,) = mode_shapes(
-            mesh_of(model.seen, model.assembly), found.shapes, found.f_other, found.numbers_other,
-            _SHOWN, f"shapes of {found.source.name}",
-        )  # fmt: skip
-        sections.append(Section(f"Shapes of {found.source.name}", [shapes]))
+        blocks += two_models(shown, other, found.shapes, found.f_other, found.numbers_other,
+                             found.motion, found.f_model, found.numbers_model, pairs, found.mac.T,
+                             _SHOWN)  # fmt: skip
     else:
-        notes.append("The file does not move every grid of the model, so its shapes are not drawn.")
-    return PageParts(_lead(found), sections, notes)
+        notes.append(
+            f"{other} does not move every grid of the model, and its points cannot tell the modes "
+            "of the model apart, so its shapes are not drawn."
+        )
+    if found.expanded and found.whole:
+        notes.append(
+            f"{other} lacks {found.expanded} grids of elements: in the picture they move with the "
+            "mixture of the model's modes that fits the others best."
+        )
+    return PageParts(_lead(found), [Section("Modes", [*blocks, _table(found, True)])], notes)
 
 
 def in_words(found: OtherModes) -> PageParts:
@@ -59,7 +68,7 @@ def _lead(found: OtherModes) -> str:
     )
 
 
-def _table(found: OtherModes) -> Table:
+def _table(found: OtherModes, drawn: bool = False) -> Table:
     """Tabulate every elastic mode of the file, with its partner if it has one."""
     p = found.pairs
     found_for = zip(p.model.tolist(), p.mac.tolist(), strict=True)
@@ -71,8 +80,11 @@ def _table(found: OtherModes) -> Table:
         if i is not None:
             off = percent(found.f_model[i], f)
             own = (str(found.numbers_model[i]), hertz(found.f_model[i]), off)
-        rows.append((str(number), hertz(f), *own, criterion(value), criterion(found.in_span[j])))
-    return Table(_HEADS, rows, caption=_CAPTION)
+        rows.append(
+            (str(number), hertz(f), *own, criterion(value), criterion(found.in_span[j] or None))
+        )
+    opens = "shapes" if drawn and found.whole else ""
+    return Table(_HEADS, rows, caption=_CAPTION, opens=opens, at=range(len(rows)))
 
 
 def other_modes_json(found: OtherModes) -> dict[str, Any]:

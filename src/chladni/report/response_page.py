@@ -9,7 +9,7 @@ from ..dynamics.frf import FRF, UNIT
 from ..workflows.frf import FrequencyResponses
 from . import frf_charts
 from .blocks import Drawing, PageParts, Section, Table, still
-from .words import number
+from .words import counted, number
 
 _MOTION = {"receptance": "m", "mobility": "m/s", "accelerance": "m/s²"}  # under a deck's own loads
 _SHOWN = 12  # outputs in the table
@@ -53,7 +53,8 @@ def _words(found: FRF) -> PageParts:
     ]
     heads = ("output", "input", f"largest [{unit}]" if unit else "largest", "at [Hz]")
     f, count = found.frequency, len(found.outputs) * len(found.inputs)
-    lead = f"{count} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
+    functions = counted(count, f"{found.quantity} function", f"{found.quantity} functions")
+    lead = f"{functions} from {number(f[0])} to {number(f[-1])} Hz."
     return PageParts(lead, [Section("Responses", [Table(heads, rows, ("output", "input"))])])
 
 

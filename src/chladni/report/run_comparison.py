@@ -7,7 +7,7 @@ from typing import Any
 
 from ..output import LIST
 from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Block, Drawing, Items, PageParts, Section, Table
+from .blocks import Block, Drawing, PageParts, Section, Table
 from .drawings import drawings_of
 from .run_list import FinishedRun, contents
 from .verdict import three_numbers
@@ -18,8 +18,8 @@ _OTHERS = {"@after": "@calm", "@before": "@warn", "@neutral": "@found"}  # colou
 Json = dict[str, Any]
 
 
-def compared_runs(a: FinishedRun, b: FinishedRun) -> PageParts:
-    """Sections of the page."""
+def compared_runs(a: FinishedRun, b: FinishedRun, place: Path) -> PageParts:
+    """Sections of the page that lies in ``place``."""
     names = _names(a, b)
     first = [
         ("command", a.command, b.command),
@@ -35,12 +35,14 @@ def compared_runs(a: FinishedRun, b: FinishedRun) -> PageParts:
     every = [k for k in {**values[0], **values[1]} if alike or all(k in one for one in values)]
     rows = [(key, *(one.get(key, "–") for one in values)) for key in every]
     left = len(rows) - _MOST
+    folders = [(name, str(r.folder)) for name, r in zip(names, (a, b), strict=True)]
+    pages = Table(("page of", "folder"), folders, ("page of", "folder"),
+                  links=[r.page_from(place) for r in (a, b)])  # fmt: skip
     caption = f"The files hold {left} more." if left > 0 else ""
     sections = [
-        Section("Results", [Table(heads, first, heads)]),
+        Section("Results", [Table(heads, first, heads), pages]),
         Section("Values", [Table(heads, rows[:_MOST], heads, caption)] if rows else []),
         Section("Charts of both", _charts(a, b, names)),
-        Section("Pages", [Items([str(r.folder / "report.html") for r in (a, b)])]),
     ]
     same = a.lead == b.lead
     lead = (

@@ -52,13 +52,17 @@ class FinishedRun:
             return unescape(found[1])[:_LONGEST] if found else ""
         return ""
 
+    def page_from(self, place: Path) -> str:
+        """Link from ``place`` to the page, or to the folder of a run without one."""
+        page = self.folder / "report.html"
+        return Path(os.path.relpath(page if page.exists() else self.folder, place)).as_posix()
+
     def q(self) -> tuple[float | None, float | None]:
-        """Q before and after, held out where data were; of a correlation Q alone."""
+        """Q of the given deck and of the last, held out where data were; of a correlation one."""
         if self.diagnosis is not None:
-            scores, named = self.diagnosis.agreement or Agreement(), bool(self.diagnosis.effects)
-            sides = [tuple(s.last_step(named).values()) for s in (scores.held_out, scores.fitted)]
-            before, after = next((s for s in sides if None not in s), (None, None))
-            return before, after
+            scores = self.diagnosis.agreement or Agreement()
+            sides = [(s.nominal, s.after) for s in (scores.held_out, scores.fitted)]
+            return next((s for s in sides if None not in s), (None, None))
         held = contents(self, "correlation.json").get("Q")
         return (held["mean"] if isinstance(held, dict) else None), None
 
@@ -109,9 +113,11 @@ def index_page(folder: Path, place: Path) -> PageParts:
         date = f"{run.written:%Y-%m-%d %H:%M}"
         cells = number(before, 3), number(after, 3), percent(after, before)
         rows.append((date, run.command, run.source, run.lead, *cells))
-    pages = [Path(os.path.relpath(r.folder / "report.html", place)).as_posix() for r in runs]
-    table = Table(_HEADS, rows, _HEADS[:4], "Times are UTC. Q of held-out data, where there are "
-                  "any. A click on a head sorts.", links=pages)  # fmt: skip
+    caption = (
+        "Times are UTC. Q of the given deck and of the last, on held-out data where there are "
+        "any. A click on a head sorts."
+    )
+    table = Table(_HEADS, rows, _HEADS[:4], caption, links=[r.page_from(place) for r in runs])
     more = "chladni compare A B puts two of these folders next to each other."
     counted = f"{len(runs)} run{'s' * (len(runs) > 1)} in {folder.resolve().name}"
     return PageParts(f"{counted}.", [Section("Runs", [table, Items([more])])])

@@ -9,9 +9,10 @@ from .words import number
 
 
 def sentence(result: DiagnosisResult) -> str:
-    """State the verdict in words, with one sentence for each of several states."""
+    """State the verdict and the mesh of the decks, or the verdict of each of several states."""
     if not result.states:
-        return _sentence(result)
+        finer = f" Every shell of the written decks is halved, because {result.halved}."
+        return _sentence(result) + finer * bool(result.halved)
     return " ".join(f"{s.name or 'The first state'}: {_sentence(s.result)}" for s in result.states)
 
 

@@ -23,18 +23,11 @@ TRIES = 3  # times the basis is extended by its missing vectors
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """A hypothesis fitted again on a more accurate reduced model.
-
-    Attributes
-    ----------
-    hypothesis : HypothesisFit
-    note : sentence on the error of the reduced model
-    worst : largest remaining relative frequency error
-    """
+    """A hypothesis fitted again on a more accurate reduced model."""
 
     hypothesis: HypothesisFit
-    note: str
-    worst: float
+    note: str  # sentence on the error of the reduced model
+    worst: float  # largest remaining relative frequency error
 
     @property
     def distrust(self) -> tuple[str, ...]:

@@ -33,7 +33,6 @@ from ..reduced.reduced_model import evaluate
 from .diagnosis import (
     Diagnosis,
     best_base_fit,
-    named_by_fits,
     nominal_starts,
     without_effects,
 )
@@ -61,20 +60,12 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class CalibrationSettings:
-    """Extent of a calibration.
+    """Extent of a calibration."""
 
-    Attributes
-    ----------
-    freeze : False keeps parameters free that the data do not know; they are named all the same
-    quick : fit from the prior mean alone, without further starts, profiles and bands
-    sample : draw from the posterior
-    starts : number of starts of a Latin hypercube
-    """
-
-    freeze: bool = True
-    quick: bool = False
-    sample: bool = False
-    starts: int = STARTS
+    freeze: bool = True  # False keeps parameters free that the data do not know, and names them
+    quick: bool = False  # fit from the prior mean alone, without starts, profiles and bands
+    sample: bool = False  # draw from the posterior
+    starts: int = STARTS  # of a Latin hypercube
 
 
 FULL = CalibrationSettings()
@@ -118,7 +109,7 @@ def calibration(
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
         profiled, predicted, sample=sample,
     )  # fmt: skip
-    return Calibrated(problem, named_by_fits(problem, found), study)
+    return Calibrated(problem, found, study)
 
 
 def about_nominal(problem: UpdatingProblem, delta: float | None = None) -> UpdatingProblem:

@@ -1,6 +1,6 @@
 """The most promising of every family of effects, and the services by which families find them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -21,6 +21,7 @@ from ..inference.scan import (
     baseline,
     bending_slopes,
     direction_scores,
+    effect_slopes,
     field_slopes,
     oscillator_scores,
     point_scores,
@@ -35,14 +36,6 @@ APART = 1 / 6  # of the structure's size: effects nearer to each other are one
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
 
-@dataclass(frozen=True, eq=False)
-class Proposals:
-    """Candidates of all families, and reasons why a family has none although it acts here."""
-
-    candidates: list[Candidate]
-    lost: Mapping[str, str]
-
-
 def candidates(
     problem: UpdatingProblem, null: HypothesisFit, most: int | None = None
 ) -> list[Candidate]:
@@ -52,18 +45,19 @@ def candidates(
     ----------
     most : so many of them alone, those that score best where they begin
     """
-    context = UpdatingContext(problem, null).ready()
-    every = _proposed(context).candidates
+    context = UpdatingContext(problem, null)
+    every, _ = proposals(context)
     return every if most is None else _leading(context, every, most)
 
 
-def proposals(problem: UpdatingProblem, null: HypothesisFit) -> Proposals:
-    """The most promising of every family; one that fails numerically is lost, and no other."""
-    return _proposed(UpdatingContext(problem, null).ready())
+def proposals(context: "UpdatingContext") -> tuple[list[Candidate], dict[str, str]]:
+    """The most promising of every family, and why a family failed numerically.
 
-
-def _proposed(context: "UpdatingContext") -> Proposals:
+    A family that fails is lost, and no other.
+    """
     problem, lost = context.problem, dict[str, str]()
+    if context.scan is not None:  # most families read these: before they are tried in parallel
+        _ = context.baselines, context.flexibility, context.loosened
 
     def proposed(family: Family) -> list[Candidate]:
         try:
@@ -74,7 +68,7 @@ def _proposed(context: "UpdatingContext") -> Proposals:
 
     every = [c for some in in_parallel(proposed, problem.families) for c in some]
     every = [c for c in every if not already_there(problem, c.effect, c.start)]
-    return Proposals(every, lost)
+    return every, lost
 
 
 def already_there(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
@@ -118,16 +112,11 @@ def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> l
 
 
 def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
-    """Effects not searched on a structure of beams, and why; empty if it has shells."""
-    if problem.where.groups.sheet.any():
-        return ()
+    """Effects not searched on a structure without shells, and why; empty if it has some."""
     names = ", ".join(family.name for family in problem.families if family.on_sheets)
-    said = f"not searched, because they act on shells and the deck has none: {names}"
-    return (
-        *([said] if names else []),
-        "compliance of a joint where beams share a grid is not searched, because no element "
-        "models it; bushes between beams are searched",
-    )
+    if problem.where.groups.sheet.any() or not names:
+        return ()
+    return (f"not searched, because they act on shells and the deck has none: {names}",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,11 +183,16 @@ class UpdatingContext:
             return 0.0
         return weighed.mass - self.baselines[0].state.weight
 
-    @cached_property
-    def scan(self) -> "Scan | None":
-        """Fast scores; None where only natural frequencies are known."""
-        data = self.problem.data
-        return Scan(self, data) if isinstance(data, Responses) else None
+    @property
+    def scan(self) -> Self | None:
+        """Fast scores of responses; None where only natural frequencies are known."""
+        return self if isinstance(self.problem.data, Responses) else None
+
+    @property
+    def data(self) -> Responses:
+        """The fitted responses."""
+        assert isinstance(self.problem.data, Responses)
+        return self.problem.data
 
     @property
     def tells_places(self) -> bool:
@@ -209,18 +203,12 @@ class UpdatingContext:
     @cached_property
     def loosened(self) -> tuple[Loosened, ...]:
         """Welds and fasteners with what the sheets give where they are loaded."""
-        return singles(self.loosened_rows)
+        return singles(self.fastener_rows)
 
     @cached_property
-    def loosened_rows(self) -> tuple[LoosenedRow, ...]:
-        """Loosened joints, grouped by their lines."""
+    def fastener_rows(self) -> tuple[LoosenedRow, ...]:
+        """Adjacent fasteners, any run of which may be loosened as one."""
         return loosened_rows(self.problem.reduced)
-
-    def ready(self) -> Self:
-        """A copy with the data of most families computed, before families are tried in parallel."""
-        if self.scan is not None:
-            _ = self.baselines, self.scan.flexibility, self.loosened
-        return self
 
     @property
     def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
@@ -274,39 +262,33 @@ class UpdatingContext:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""
         return global_starts(self.problem, effect)
 
-
-@dataclass(frozen=True, eq=False)
-class Scan:
-    """Scores of many changes at once (:class:`..effects.search_context.ResponseScan`)."""
-
-    context: UpdatingContext
-    data: Responses
+    # scores of many changes at once (:class:`..effects.search_context.ResponseScan`)
 
     @cached_property
     def flexibility(self) -> np.ndarray:
         """Static response of the places beyond the basis [m/N]."""
-        return self.context.problem.reduced.flexibility(self.context.where.places)
+        return self.problem.reduced.flexibility(self.where.places)
 
     @cached_property
     def deviation(self) -> np.ndarray:
         """log10(H_model / H_test) of the best fit without any effect, on the lines in use."""
-        return self.data.deviation(self.context.null_fit.fit.state)[self.data.use.any(axis=1)]
+        data = self.data
+        return data.deviation(self.null_fit.fit.state)[data.use.any(axis=1)]
 
     def point_scores(
         self, about: int, matrix: str, strengths: np.ndarray, places: ElementGrids | None = None
     ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
-        reduced = self.context.problem.reduced
+        base, reduced = self.baselines[about], self.problem.reduced
         rest = self.flexibility if places is None else reduced.flexibility(places)
-        places = self.context.where.places if places is None else places
-        base = self.context.baselines[about]
+        places = self.where.places if places is None else places
         return point_scores(base, reduced.model, self.data, places, matrix, strengths, rest)
 
     def oscillator_scores(
         self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz)."""
-        reduced, base = self.context.problem.reduced, self.context.baselines[about]
+        base, reduced = self.baselines[about], self.problem.reduced
         rest = reduced.flexibility(places)
         return oscillator_scores(base, reduced.model, self.data, places, mass, hertz, rest)
 
@@ -314,43 +296,42 @@ class Scan:
         self, about: int, places: ElementGrids, sd: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best angular momentum of a spinning part at each place (k, 3), and the score (k,)."""
-        reduced, base = self.context.problem.reduced, self.context.baselines[about]
-        rows = self.context.where.rotations(places.grids)
-        return spin_scores(base, reduced.model, self.data, rows, sd)
+        rows, model = self.where.rotations(places.grids), self.problem.reduced.model
+        return spin_scores(self.baselines[about], model, self.data, rows, sd)
 
     def field_scores(
         self, about: int, field: str, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
-        base = self.context.baselines[about]
-        slopes = field_slopes(base, self.context.problem.reduced.model, self.data, field)
+        base, model = self.baselines[about], self.problem.reduced.model
+        return direction_scores(base, field_slopes(base, model, self.data, field) @ change)
+
+    def effect_scores(
+        self, about: int, effect: Effect, change: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of each change of an effect from its nominal values, and the score."""
+        base, model = self.baselines[about], self.problem.reduced.model
+        slopes = effect_slopes(base, model, self.data, effect)
         return direction_scores(base, slopes @ change)
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
         """Score of each fastener with some of its stiffness left (n, k)."""
-        context, base = self.context, self.context.baselines[about]
-        reduced = context.problem.reduced
-        return fastener_scores(base, reduced, self.data, context.loosened, left)
-
-    @property
-    def fastener_rows(self) -> tuple[LoosenedRow, ...]:
-        """Adjacent fasteners, any run of which may be loosened as one."""
-        return self.context.loosened_rows
+        base, reduced = self.baselines[about], self.problem.reduced
+        return fastener_scores(base, reduced, self.data, self.loosened, left)
 
     def run_scores(
         self, about: int, row: int, first: int, last: int, left: np.ndarray
     ) -> np.ndarray:
         """Score of a run of a row with some of its stiffness left (k,)."""
-        base, run = self.context.baselines[about], self.fastener_rows[row].run(first, last)
-        return fastener_scores(base, self.context.problem.reduced, self.data, [run], left[None])[0]
+        base, run = self.baselines[about], self.fastener_rows[row].run(first, last)
+        return fastener_scores(base, self.problem.reduced, self.data, [run], left[None])[0]
 
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,)."""
-        base = self.context.baselines[about]
-        slopes = bending_slopes(base, self.context.problem.reduced.model, self.data, sets)
-        return direction_scores(base, slopes)
+        base, model = self.baselines[about], self.problem.reduced.model
+        return direction_scores(base, bending_slopes(base, model, self.data, sets))
 
 
 def _prior(effect: Effect, x: np.ndarray) -> float:

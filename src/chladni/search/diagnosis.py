@@ -11,18 +11,14 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import cast
 
 import numpy as np
 
-from ..decision.decide import called
-from ..decision.decision_rules import RULES, gain_due
-from ..decision.hypotheses import Hypotheses, Numbers
 from ..effects.effect import Effect
 from ..effects.registry import families
+from ..effects.search_context import Candidate
 from ..errors import ModelError
-from ..inference.adequacy import FitTest, adequacy, of_poles
+from ..inference.adequacy import FitTest, adequacy
 from ..inference.discrepancy import MEDIAN
 from ..inference.hypothesis_fit import (
     CLOSE,
@@ -33,15 +29,14 @@ from ..inference.hypothesis_fit import (
 )
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_instead_of_spin, damping_test_along_effect
-from ..inference.pole_data import Poles
-from ..inference.rows_of_fits import hypothesis_of
 from ..inference.written_hypothesis import as_written, preferred_mesh
 from ..progress import within
 from ..reduced.accuracy import accuracy
 from ..reduced.reduced_model import evaluate
 from ..sparse.freed_memory import give_back_freed_memory
 from .basis_refinement import TRIES
-from .candidates import Proposals, proposals, unasked
+from .candidates import UpdatingContext, proposals, unasked
+from .decision_rules import fits, required_gain
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
 
@@ -61,75 +56,37 @@ class FitChances:
     p: float
     p_damping: float
 
-
-@dataclass(eq=False)
-class Tested:
-    """A fitted hypothesis with its test of fit, which is made when it is read.
-
-    Attributes
-    ----------
-    known : its test, where it was made before
-    """
-
-    problem: UpdatingProblem
-    fit: HypothesisFit
-    known: FitChances | None = None
-
-    @cached_property
-    def chances(self) -> FitChances:
-        """The test of fit."""
-        return self.known or fit_test(self.problem, self.fit)
-
     @property
-    def p(self) -> float:
-        """P of the test of fit; NaN: no test."""
-        return self.chances.p
+    def fits(self) -> bool:
+        """True if it is more probable than a cause outside the catalogue, or has no test.
 
-    @property
-    def p_damping(self) -> float:
-        """P of modal damping that follows an elastic change; NaN: no test."""
-        return self.chances.p_damping
+        Modal damping that follows an elastic change is a second test of the same hypothesis.
+        """
+        return fits(self.p) and fits(self.p_damping)
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found.
+    """Fits of a diagnosis, and the answer that a decision gave."""
 
-    Attributes
-    ----------
-    nominal, null : fits without, and with calibration parameters free, scatter allowed in both
-    plain : the null in the form of a deck: what a named effect is compared with
-    hypotheses : best hypothesis of every family, best first
-    verdict : one of the public verdicts
-    notes : what was done and why, one sentence each
-    sets : several effects together, each of which pays, in the order in which the sets grew
-    chances : of the tests of fit that were made, by name
-    written : the named effect in the form of a deck
-    halved : ``plain`` and ``written`` with every shell halved, where the data prefer that mesh
-    adequacy : whether the explanation fits at all, where that was tested
-    one_of : what the data cannot tell apart, and what would settle it
-    gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
-    refused : why the leader is not named although it gains what is due
-    shared : whether the deck's numbers are those of several states of one object
-    passed_over : names of explanations that were asked before the leader, and what refused each
-    """
-
+    # without, and with calibration parameters free; scatter is allowed in both
     nominal: HypothesisFit
     null: HypothesisFit
-    plain: HypothesisFit
-    hypotheses: tuple[HypothesisFit, ...]
-    verdict: str = ""
-    notes: tuple[str, ...] = ()
-    sets: tuple[Several, ...] = ()
-    chances: Mapping[str, FitChances] = field(default_factory=dict)
-    written: HypothesisFit | None = None
+    plain: HypothesisFit  # the null in the form of a deck, with which a named effect is compared
+    hypotheses: tuple[HypothesisFit, ...]  # the best of every family, best first
+    verdict: str = ""  # one of the public verdicts
+    notes: tuple[str, ...] = ()  # what was done and why, one sentence each
+    sets: tuple[Several, ...] = ()  # of several effects, in the order in which they grew
+    chances: Mapping[str, FitChances] = field(default_factory=dict)  # tests that were made, by name
+    written: HypothesisFit | None = None  # the named effect in the form of a deck
+    # ``plain`` and ``written`` with every shell halved, where the data prefer that mesh
     halved: tuple[HypothesisFit, ...] = ()
-    adequacy: FitTest | None = None
-    one_of: tuple[str, ...] = ()
-    gains: tuple[float, ...] = ()
-    refused: str = ""
-    shared: bool = False
-    passed_over: tuple[tuple[str, str], ...] = ()
+    adequacy: FitTest | None = None  # the absolute test of fit, where there is one
+    one_of: tuple[str, ...] = ()  # what the data cannot separate, and what would settle it
+    gains: tuple[float, ...] = ()  # in -2 ln evidence, of each named effect with the others
+    refused: str = ""  # why the leader is not named although it gains what is due
+    shared: bool = False  # whether the deck's numbers are those of several states of one object
+    passed_over: tuple[tuple[str, str], ...] = ()  # names before the leader, and their refusals
 
     @property
     def found(self) -> HypothesisFit | None:
@@ -153,10 +110,17 @@ class Diagnosis:
         first = self.hypotheses[0] if self.hypotheses else self.null
         return self.due_of(first)
 
-    def due_of(self, hypothesis: HypothesisFit) -> float:
-        """Required gain of a hypothesis."""
-        due = threshold(self.null.data, len(self.hypotheses))
-        return min(due, RULES.expected_due) if hypothesis.effect.expected else due
+    def due_of(self, hypothesis: HypothesisFit, more: bool = False) -> float:
+        """Required gain of a hypothesis; one set ``more`` than the families may have been tried."""
+        tried = (len(self.hypotheses) or len(families())) + more
+        poles = not isinstance(self.null.data, Responses)
+        return required_gain(poles, tried, hypothesis.effect.expected)
+
+    @property
+    def leading(self) -> HypothesisFit:
+        """The best hypothesis if it gains what is due by what was fitted, or calibration alone."""
+        gains = bool(self.hypotheses) and self.two_log_bayes_factor(self.hypotheses[0]) > self.due
+        return self.hypotheses[0] if gains else self.null
 
     def two_log_bayes_factor(self, hypothesis: HypothesisFit) -> float:
         """How much better than the null, in -2 ln evidence."""
@@ -169,73 +133,35 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     problem, null = without_effects(problem)
     nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
     progress("scan of the catalogue", 0.2)
-    tried = proposals(problem, null)
+    tried, lost = proposals(UpdatingContext(problem, null))
     give_back_freed_memory()
-    hypotheses = search_round(problem, null, tried.candidates, within(progress, 0.3, 0.8))
-    notes = (*unasked(problem), *could_not_be_evaluated(tried, hypotheses))
+    hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
+    notes = (*unasked(problem), *could_not_be_evaluated(tried, lost, hypotheses))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     plain = as_written(null, problem.mass_measurement)
     finer = preferred_mesh(null, plain, problem.mass_measurement)
     halved = () if finer is None else (finer,)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=notes, halved=halved)
-    found = named_by_fits(problem, found)
-    whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
-    found = _names_alone(problem, found, whole)
+    found = replace(found, chances={found.leading.name: fit_test(problem, found.leading)})
+    unfit = not found.chances[found.leading.name].fits
+    found = _names_alone(problem, found, PAIRED if unfit else 2)  # a search begins from these
     del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
     give_back_freed_memory()
     found = _with_sets_of_effects(problem, found, within(progress, 0.8, 1.0))
     return _names_alone(problem, found, 1)
 
 
-def could_not_be_evaluated(found: Proposals, hypotheses: Sequence[HypothesisFit]) -> Iterator[str]:
+def could_not_be_evaluated(
+    tried: Sequence[Candidate], lost: Mapping[str, str], hypotheses: Sequence[HypothesisFit]
+) -> Iterator[str]:
     """Sentences on families that failed numerically, where they were scanned or fitted."""
     fitted_ones = {t.effect.name for t in hypotheses}
-    proposed = dict.fromkeys(c.effect.name for c in found.candidates)
+    proposed = dict.fromkeys(c.effect.name for c in tried)
     unfit = {name: "no start of its fit is a structure" for name in proposed}
-    for name, why in {**unfit, **found.lost}.items():
+    for name, why in {**unfit, **lost}.items():
         if name not in fitted_ones:
             yield f"the hypothesis {name} could not be evaluated: {why}"
-
-
-def hypotheses_of(
-    problem: UpdatingProblem, found: Diagnosis, numbers: Callable[[HypothesisFit, bool], Numbers]
-) -> Hypotheses:
-    """All single effects as a decision reads them.
-
-    Parameters
-    ----------
-    numbers : of a fit, and whether it is behind the leader
-    """
-    singles = tuple(hypothesis_of(t, numbers(t, k > 0)) for k, t in enumerate(found.hypotheses))
-    return Hypotheses(
-        hypothesis_of(found.null, numbers(found.null, False)), singles,
-        nominal=np.inf if _misfits(found.nominal) else found.nominal.neg2_log_evidence,
-        poles=isinstance(found.null.data, Poles), families=len(problem.families),
-    )  # fmt: skip
-
-
-def _misfits(deck: HypothesisFit) -> bool:
-    """True for a given deck whose natural frequencies are farther off than those of any model.
-
-    No rule of evidence keeps such a deck: wide priors would charge its calibration more than it
-    gains on few frequencies.
-    """
-    data = deck.data
-    return isinstance(data, Poles) and not of_poles(data, deck.fit.state).passes
-
-
-def named_by_fits(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
-    """The diagnosis by what was fitted alone: the leader, or calibration, is named and tested."""
-    every: list[Tested] = []
-
-    def numbers(fit: HypothesisFit, _: bool) -> Numbers:
-        every.append(Tested(problem, fit, found.chances.get(fit.name)))
-        return cast(Numbers, every[-1])  # the test of fit is all that is read
-
-    said = called(hypotheses_of(problem, found, numbers))
-    made = {t.fit.name: t.chances for t in every if "chances" in vars(t)}
-    return replace(found, verdict=said.verdict, chances={**found.chances, **made})
 
 
 def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
@@ -251,9 +177,9 @@ def _with_sets_of_effects(
 
     Natural frequencies alone are too few numbers to bear two names.
     """
-    data, unfit = alone.null.data, alone.verdict == "not in catalogue"
+    data, unfit = alone.null.data, not alone.chances[alone.leading.name].fits
     many = isinstance(data, Responses) and data.error is not None
-    if not (many and alone.hypotheses) or (alone.found is None and not unfit):
+    if not (many and alone.hypotheses) or (alone.leading is alone.null and not unfit):
         return alone
     due = threshold(data, len(alone.hypotheses))
     search = several(problem, alone.hypotheses, due, unfit, progress)
@@ -330,9 +256,7 @@ def threshold(data: object, tried: int | None = None) -> float:
     ----------
     tried : families that proposed something; all that are known where it is not said
     """
-    known = isinstance(data, Responses)
-    chance = RULES.chance_of_responses if known else RULES.chance_of_poles
-    return gain_due(tried or len(families()), chance)
+    return required_gain(not isinstance(data, Responses), tried or len(families()))
 
 
 def best_base_fit(

@@ -54,14 +54,9 @@ class Loosened:
 
 @dataclass(frozen=True, eq=False)
 class LoosenedRow:
-    """Adjacent fasteners of one line, loosened together.
+    """Adjacent fasteners of one line, loosened together."""
 
-    Attributes
-    ----------
-    positions : of the fasteners among all that are tried
-    """
-
-    positions: tuple[int, ...]
+    positions: tuple[int, ...]  # among all that are tried
     joints: tuple[Connection, ...]
     whole: Loosened
 

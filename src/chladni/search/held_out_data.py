@@ -21,19 +21,12 @@ Band = tuple[float, float]  # [Hz]
 
 @dataclass(frozen=True, eq=False)
 class HeldOutChoice:
-    """Sensors and a band that are not fitted.
+    """Sensors and a band that are not fitted."""
 
-    Attributes
-    ----------
-    sensors : outputs that are held out (n_out,) bool
-    band : held-out band [Hz]; empty where both ends are equal
-    fitted, reach : the band that is fitted, and all that is compared [Hz]
-    """
-
-    sensors: np.ndarray
-    band: Band
+    sensors: np.ndarray  # (n_out,) bool: outputs that are held out
+    band: Band  # held out; empty where both ends are equal
     fitted: Band
-    reach: Band
+    reach: Band  # all that is compared
 
     def training(self, f: np.ndarray) -> np.ndarray:
         """Lines and channels that are fitted (n_f, n_out), at frequencies f [Hz] (n_f,)."""

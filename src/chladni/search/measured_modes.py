@@ -19,17 +19,11 @@ _LEAST = 0.02  # of its lowest: modes below are rigid motions
 
 @dataclass(frozen=True, eq=False)
 class MeasuredModes:
-    """Frequency, damping and shape of each mode, identified or given as a table.
+    """Frequency, damping and shape of each mode, identified or given as a table."""
 
-    Attributes
-    ----------
-    frequency : (r,)          [Hz]
-    damping : (r,) or None    ratios, nan where a table has none
-    shapes : (n_out, r) or None    real, of any scale; None where there are too few sensors
-    """
-
-    frequency: np.ndarray
-    damping: np.ndarray | None = None
+    frequency: np.ndarray  # (r,) [Hz]
+    damping: np.ndarray | None = None  # (r,) ratios, nan where a table has none
+    # (n_out, r) real, of any scale; None where there are too few sensors
     shapes: np.ndarray | None = None
 
     def near(self, model: Modelled) -> ModalModel:

@@ -1,10 +1,11 @@
 """Starting points of a fit of poles, whose assignment makes many local optima.
 
 The effect's prior is sampled at Sobol points, and the best distinct ones start a simplex search
-(Nelder and Mead 1965, Comput. J. 7, 308-313).  It uses no slope, because the assignment jumps.
+(Nelder and Mead 1965, Comput. J. 7, 308-313).  It uses no slope, because the assignment jumps.  A
+prior that hardly moves the modes has one optimum, so the number of points follows from its reach.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +14,10 @@ from ..effects.effect import Effect
 from ..errors import ModelError
 from ..inference.hypothesis_fit import SCALES, UpdatingProblem, neg2_log_mixture
 from ..inference.pole_data import Poles
-from ..reduced.reduced_model import evaluate
+from ..reduced.reduced_model import Reduced, evaluate
 
-DRAWS = 4096
-WALKED = 16  # distinct points from which a simplex search starts
+DRAWS, OF_A_CELL = 4096, 64  # points at most, and in a cell of the prior (:func:`cells`)
+WALKED = 16  # distinct points at most from which a simplex search starts
 APART = 0.25  # of the prior sd, in one parameter at least: points that count as distinct
 WIDE = 0.03  # standard deviation of ln f in the comparison of the Sobol points
 STEPS = 250  # evaluations of one simplex search
@@ -29,6 +30,24 @@ def draws(effect: Effect, count: int) -> np.ndarray:
     u = qmc.Sobol(len(effect.parameters), seed=1).random(count)
     mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
     return mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3))
+
+
+def cells(problem: UpdatingProblem, model: Reduced, effects: Sequence[Effect]) -> float:
+    """Π max(1, s_k / WIDE): regions of the last effect's prior with a pairing of their own.
+
+    s_k are the singular values of ∂ln f/∂x times the prior sd, rms over the poles.
+    """
+    effect, data = effects[-1], problem.data
+    assert isinstance(data, Poles)
+    x = np.concatenate([problem.begun(effects[:-1]), [p.mean for p in effect.parameters]])
+    try:
+        state = evaluate(model, effects, x)
+    except ModelError:
+        return np.inf
+    _, J = replace(data.rebased(model), scale=WIDE).scaled(state, True)
+    own = J[:, -len(effect.parameters) :] * np.array([p.sd for p in effect.parameters])
+    s = np.linalg.svd(own / np.sqrt(len(own)), compute_uv=False)
+    return float(np.prod(np.maximum(s, 1.0)))
 
 
 def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> list[np.ndarray]:
@@ -54,9 +73,11 @@ def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> li
         prior = float((((x - mean) / sd) ** 2).sum())
         return prior + min(neg2_log_mixture(replace(seen, scale=s), state) for s in scales)
 
-    points = np.vstack([effect.starts(), draws(effect, DRAWS)])
+    number = cells(problem, model, [*kept, effect])
+    count = 2 ** int(np.ceil(np.log2(min(DRAWS, OF_A_CELL * number))))
+    points = np.vstack([effect.starts(), draws(effect, count)])
     rough = np.array([cost(x, np.array([WIDE])) for x in points])
-    chosen = _distinct(points / sd, rough, WALKED)
+    chosen = _distinct(points / sd, rough, int(min(WALKED, most * number)))
     return _valleys(lambda x: cost(x, SCALES[::6]), points[chosen], sd, most)
 
 

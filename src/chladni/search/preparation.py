@@ -255,18 +255,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     notes = (*notes, *_unscored(question), *_mass_note(question, problem), *suspension_note(above))
     few = _few(problem, len(frequency), 0 if shapes is None else shapes.values.shape[1] - 1)
     return Prepared(
-        problem,
-        data,
-        left_out,
-        left_out,
-        what,
-        notes,
-        nominal,
-        None,
-        found,
-        *few,
-        ~held,
-        damping=damping,
+        problem, data, left_out, left_out, what, notes, nominal, None, found, *few, damping=damping
     )
 
 

@@ -104,16 +104,10 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Samples that are not fitted, in the shape of the ``use`` of some data.
+    """Samples that are not fitted, in the shape of the ``use`` of some data."""
 
-    Attributes
-    ----------
-    choosing : samples whose evidence supports or refuses a name
-    reporting : samples on which the gain of a name is reported, and on which nothing is decided
-    """
-
-    choosing: np.ndarray
-    reporting: np.ndarray
+    choosing: np.ndarray  # whose evidence supports or refuses a name
+    reporting: np.ndarray  # on which the gain of a name is reported, and nothing is decided
 
     @property
     def whole(self) -> np.ndarray:
@@ -123,36 +117,21 @@ class HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """An updating problem and the data that score it.
-
-    Attributes
-    ----------
-    problem : the updating problem of the diagnosis
-    score : data on which Q is reported (over the same basis), with ``use`` = fitted samples
-    held, unseen : samples held out, of ``score`` and of ``problem.data``
-    what : the data that report, in words
-    notes : sentences on how the recording is compared, and why
-    nominal : the structure of the deck, with all modes that a diagnosis needs
-    noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
-    others : recordings that are not fitted, with their modes
-    levels : the modes over levels of excitation, where there are two and more
-    """
+    """An updating problem and the data that score it."""
 
     problem: UpdatingProblem
-    score: Responses | Poles
+    score: Responses | Poles  # Q is reported on it, over the same basis; ``use``: fitted samples
+    # samples held out, of ``score`` and of ``problem.data``
     held: HeldOut
     unseen: HeldOut
-    what: str
-    notes: tuple[str, ...]
-    nominal: Modelled
-    noise: np.ndarray | None = None
+    what: str  # the data that report, in words
+    notes: tuple[str, ...]  # sentences on how the recording is compared, and why
+    nominal: Modelled  # the deck, with all modes that a diagnosis needs
+    noise: np.ndarray | None = None  # E|Δ log10 H|² from that of the recording; None for poles
     identified: Identified | None = None
     too_little: str = ""  # reason why data so few rarely separate explanations
-    numbers: float = (
-        NUMBERS  # of the fitted modes and channels, beyond those that calibration takes
-    )
-    kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
-    others: tuple[OtherTest, ...] = ()
-    levels: LevelStudy = field(default_factory=LevelStudy)
+    numbers: float = NUMBERS  # of fitted modes and channels, less those that calibration takes
+    others: tuple[OtherTest, ...] = ()  # recordings that are not fitted, with their modes
+    levels: LevelStudy = field(default_factory=LevelStudy)  # modes over levels, of two and more
     damping: np.ndarray | None = None  # of listed poles that are compared, nan where unknown
     above: float = 0.0  # [Hz]: a free deck is compared above the modes of the suspension

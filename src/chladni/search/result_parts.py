@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..decision.decision_rules import RULES, TIED
-from ..decision.tied import same
 from ..effects.effect import Effect
 from ..effects.estimate import Estimate, Location
 from ..ema.odds import evidence_in_words
@@ -24,7 +22,7 @@ from ..inference.result import (
     Remainder,
     Scores,
 )
-from ..inference.rows_of_fits import hypothesis_of
+from .decision_rules import RULES, TIED
 from .diagnosis import Diagnosis
 from .question import Prepared
 from .verdict_models import real_poles
@@ -181,7 +179,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are required "
             "to name an effect"
         )
-    if same(hypothesis_of(hypothesis), best.name):
+    if best.name in (hypothesis.remarks.becomes, hypothesis.remarks.nearly):
         return f"these data cannot distinguish its fitted form from {best.name}"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     if hypothesis.effect.name in diagnosis.one_of:

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..decision.decision_rules import TIED
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
 from ..inference.hypothesis_fit import (
@@ -23,16 +22,17 @@ from ..inference.hypothesis_fit import (
 from ..inference.likelihood import Responses
 from ..inference.map_fit import Status
 from ..inference.own_optimum import LocalOptimum, distinct
-from ..inference.rows_of_fits import simplest_first
 from ..parallel import in_parallel
 from ..reduced.reduced_model import Reduced
 from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
+from .decision_rules import TIED
 
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not; more where they are tied
 LATER = 2  # of them in later rounds
 WHOLE = 6  # that keep their model, 10 to 300 MB each on a tailgate
+FOOT = 0.01  # of the gain (a tenth of the amplitude), by which a simpler effect may fall behind
 
 Say = Callable[[str, float], None]
 
@@ -71,6 +71,30 @@ def search_round(
     best = by_family([*hypotheses, *(t for fits in closer for t in fits)])
     best = by_family([*best, *_of_the_same_lump(problem, best)])
     return simplest_first(best, null.neg2_log_evidence)
+
+
+def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[HypothesisFit]:
+    """Sort hypotheses best first; a preferred one close behind the leader takes its place.
+
+    A resonator tuned above all spectral lines acts as a point mass. The simpler effect leads,
+    unless the flank of that resonance brings more than a hundredth of the gain. If the interval of
+    the tuning merely includes such values, the simpler effect leads only if it is tied. Likewise a
+    tied row with physically possible values leads one without (a sealant as stiff as steel).
+
+    Parameters
+    ----------
+    hypotheses : best first
+    null : -2 ln evidence without any of them
+    """
+    for k, row in enumerate(hypotheses[1:], 1):
+        lead, known = hypotheses[0], hypotheses[0].remarks
+        behind = row.neg2_log_evidence - lead.neg2_log_evidence
+        foot = FOOT * (null - lead.neg2_log_evidence)
+        sounder = bool(known.implausible) and not row.remarks.implausible
+        near = behind < TIED and (sounder or row.name == known.nearly)
+        if near or (row.name == known.becomes and behind < max(TIED, foot)):
+            return [row, *hypotheses[:k], *hypotheses[k + 1 :]]
+    return list(hypotheses)
 
 
 def _in_the_running(hypotheses: Sequence[HypothesisFit]) -> int:

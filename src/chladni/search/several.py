@@ -19,8 +19,6 @@ from itertools import combinations
 
 import numpy as np
 
-from ..decision.decision_rules import GOOD_PART, TIED
-from ..decision.hypotheses import AlternativeRow
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
 from ..errors import ModelError
@@ -30,6 +28,7 @@ from ..inference.map_fit import unknowns
 from ..progress import within
 from ..reduced.reduced_model import Reduced, evaluate
 from .candidates import candidates, repeats
+from .decision_rules import GOOD_PART, TIED
 from .search_round import search_round, taken
 
 MOST_EFFECTS = 3  # effects in one answer
@@ -42,30 +41,27 @@ ATTEMPTS = 4  # rounds that may change the set
 Say = Callable[[str, float], None]
 
 
+@dataclass(frozen=True)
+class AlternativeRow:
+    """A family that could replace one member of a set."""
+
+    name: str
+    behind: float  # gap to the member, in -2 ln evidence
+    implausible: str = ""  # why its value is physically impossible; "" if it is possible
+
+
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Effects that explain the recording together, each with enough gain; largest gain first.
+    """Effects that explain the recording together, each with enough gain; largest gain first."""
 
-    Attributes
-    ----------
-    hypothesis : all of them, comparable with the effects that were tried alone
-    own : all of them, with errors of the model's form from its own state
-    gains : loss of ``own`` in -2 ln evidence without each, the others fitted again
-    without : the best fit without each, comparable with ``own``
-    rivals : for each, other families that explain as much in its place
-    due : gain that each needed
-    about : the model whose state errors of form spread from in ``own``
-    ahead : gain over the best effect alone, in -2 ln evidence
-    """
-
-    hypothesis: HypothesisFit
-    own: HypothesisFit
-    gains: tuple[float, ...]
-    without: tuple[HypothesisFit, ...]
-    alternatives: tuple[tuple[AlternativeRow, ...], ...]
-    due: float
-    about: Reduced
-    ahead: float = np.inf
+    hypothesis: HypothesisFit  # comparable with the effects that were tried alone
+    own: HypothesisFit  # all of them, with errors of the model's form from its own state
+    gains: tuple[float, ...]  # loss of ``own`` in -2 ln evidence without each, others fitted again
+    without: tuple[HypothesisFit, ...]  # the best fit without each, comparable with ``own``
+    alternatives: tuple[tuple[AlternativeRow, ...], ...]  # that explain as much in place of each
+    due: float  # gain that each needed
+    about: Reduced  # the model whose state errors of form spread from in ``own``
+    ahead: float = np.inf  # gain over the best effect alone, in -2 ln evidence
 
     @property
     def pay(self) -> bool:
@@ -87,8 +83,7 @@ def several(
 ) -> Search:  # fmt: skip
     """Sets of effects grown from the best one, where every member gains a good part of its price.
 
-    The fitted data alone suffice for sets that :attr:`Several.pay`. For other sets, held-out data
-    must supply the rest of the gain.
+    Sets that :attr:`Several.pay` can be named. The members of the others may be present too.
 
     Parameters
     ----------

@@ -21,23 +21,59 @@ from ..fem.energy import mass_properties
 from ..fem.modelled import modelled
 from ..geometry.sampling import nearest_points
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
-from ..inference.likelihood import Responses
+from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import Fit, MassMeasurement, Status
+from ..inference.sensor_errors import sensor_errors
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
 from .candidates import candidates
-from .detectable import NOISE, unmeasured
 from .diagnosis import without_effects
 from .measurement_forecasts import outlook
 from .next_measurement import Outlook
-from .preparation import SOLVED
+from .nuisances import measured_on, mesh_hidden, nuisances
+from .preparation import (
+    SOLVED,
+    ZETA,
+    equalised_lines,
+    ready_for_responses,
+    updating_problem,
+)
 from .question import Question
 from .search_round import search_round
 
+NOISE = 0.01  # of |H|, at every line that is compared
 WEIGHED_SD = 0.002  # of the mass
 LEAST = 1e-9  # probability of a rival, so that its logarithm exists
+
+
+def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
+    """The updating problem of a planned test; its responses are the deck's own.
+
+    Parameters
+    ----------
+    question : without a recording; its band is the planned band
+    noise : of |H|, at every line that is compared
+    """
+    low, f_max = question.band
+    nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
+    built = nominal.structure
+    rows = question.outputs.rows(built), question.inputs.rows(built)
+    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    reduced = ready_for_responses(question, nominal, f_max)
+    f = equalised_lines((low, f_max), question.exclude, ZETA)
+    s = 2 * np.pi * f * (ZETA + 1j)
+    shape = (len(s), len(question.outputs.labels), len(question.inputs.labels))
+    unit = Responses(
+        np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
+        noise=np.full(shape, noise / LN10),
+        direct=question.outputs.moved_with_base(question.inputs),
+        sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
+    ).rebased(reduced.model)  # fmt: skip
+    problem = updating_problem(question, reduced, unit, nuisances(reduced, nominal, mesh), f_max)
+    state = evaluate(reduced.model, problem.base, problem.mean())
+    return replace(problem, data=replace(unit, values=unit.model(state)))
 
 
 @dataclass(frozen=True, eq=False)

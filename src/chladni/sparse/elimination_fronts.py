@@ -1,10 +1,10 @@
 """Order of elimination of a symmetric sparsity pattern, and its dense fronts.
 
-Rows are first collected into nodes (six dofs, one vertex). METIS orders the vertices by nested
-dissection (Karypis and Kumar 1998, SIAM J. Sci. Comput. 20, 359). Where it has no wheel, SciPy's
-SuperLU orders them by minimum degree. The elimination tree (Liu 1990, SIAM J. Matrix Anal. Appl.
-11, 134) says which vertices are eliminated as one front. A front takes in its child where this
-stores few zeros (Ashcraft and Grimes 1989, ACM TOMS 15, 291).
+Coupled rows of a node are one vertex (six dofs of a curved shell). METIS orders the vertices by
+nested dissection (Karypis and Kumar 1998, SIAM J. Sci. Comput. 20, 359). Where it has no wheel,
+SciPy's SuperLU orders them by minimum degree. The elimination tree (Liu 1990, SIAM J. Matrix Anal.
+Appl. 11, 134) says which vertices are eliminated as one front. A front takes in its child where
+this stores few zeros (Ashcraft and Grimes 1989, ACM TOMS 15, 291).
 """
 
 from collections.abc import Iterator
@@ -14,6 +14,7 @@ from typing import Self, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..errors import ShapeError
@@ -23,7 +24,7 @@ try:
 except ImportError:
     pymetis = None  # type: ignore[assignment]
 
-_LEAF = 12  # vertices of a subtree that are eliminated as one dense block
+_LEAF = 72  # rows of a subtree that are eliminated as one dense block
 _ZEROS = 0.15  # largest share of zeros in a front that took in its child
 _HUB = 10  # times the mean degree: METIS orders such a vertex last
 
@@ -72,21 +73,41 @@ def analyse(A: sp.csr_array, nodes: np.ndarray | None = None) -> Fronts:
     n = A.shape[0]
     if nodes is not None and len(nodes) != n:
         raise ShapeError(f"{len(nodes)} nodes given, one for each of {n} rows is needed")
-    vertex = np.arange(n) if nodes is None else np.unique(nodes, return_inverse=True)[1]
+    A, vertex = sp.csr_array(A), np.arange(n)
+    if nodes is not None:
+        vertex = coupled(A, np.unique(nodes, return_inverse=True)[1])
     G = quotient(A, vertex)
     order = dissected(G) if pymetis else minimum_degree(G)
     P = G[order][:, order]
-    parent = elimination_tree(P)
-    pivots, below = _collected(parent)
-    boundary = _boundaries(P, pivots, below)
     size = np.bincount(vertex)[order]  # rows of each vertex
+    pivots, below = _collected(elimination_tree(P), size)
+    boundary = _boundaries(P, pivots, below)
     pivots, below, boundary = _merged(pivots, below, boundary, size)
     return _numbered([order[p] for p in pivots], below, [order[b] for b in boundary], vertex)
 
 
+def coupled(A: sp.csr_array, node: np.ndarray) -> np.ndarray:
+    """Vertex (n,) of each row: rows of a node, next to one another, that some row of A couples.
+
+    Membrane and bending of a flat sheet along the axes are two vertices, which halves their fill.
+    """
+    n, together = len(node), np.argsort(node, kind="stable")
+    first = np.searchsorted(node[together], node)  # of the rows of each row's node
+    place = np.argsort(together) - first
+    met = np.zeros((n, place.max(initial=0) + 1), bool)  # with the rows of its node
+    of_entry = node.astype(np.int32)[A.indices]
+    same = np.zeros(A.nnz + 1, bool)  # entries whose node is that of the one before in the row
+    same[1:-1] = of_entry[1:] == of_entry[:-1]
+    same[A.indptr] = False
+    at = np.flatnonzero(same)
+    met[A.indices[at - 1], place[A.indices[at]]] = True
+    row, k = np.nonzero(met)
+    ties = sp.coo_array((np.ones(len(row), bool), (row, together[first[row] + k])), shape=(n, n))
+    return np.asarray(connected_components(ties, directed=False)[1])
+
+
 def quotient(A: sp.csr_array, vertex: np.ndarray) -> sp.csr_array:
     """Graph of the nodes: an edge between nodes with coupled rows, and the diagonal."""
-    A = sp.csr_array(A)
     N = int(vertex.max()) + 1
     vertex = vertex.astype(np.int32)
     row = np.repeat(vertex, np.diff(A.indptr))
@@ -135,13 +156,12 @@ def elimination_tree(P: sp.csr_array) -> np.ndarray:
     return np.array(parent)
 
 
-def _collected(parent: np.ndarray) -> tuple[_Pivots, _Below]:
+def _collected(parent: np.ndarray, rows: np.ndarray) -> tuple[_Pivots, _Below]:
     """Pivots of first fronts, and the fronts below each, in postorder.
 
     Small subtrees are one front each, and so are chains in which each vertex has one child.
     """
-    N = len(parent)
-    size = np.ones(N, np.int64)
+    N, size = len(parent), rows.copy()
     for j, p in enumerate(parent.tolist()):
         if p >= 0:
             size[p] += size[j]
@@ -257,5 +277,5 @@ def _ranges(begin: np.ndarray, length: np.ndarray) -> np.ndarray:
 
 def runs(rows: np.ndarray) -> list[slice]:
     """Slices of positions over which the numbers are consecutive."""
-    cuts = np.flatnonzero(np.diff(rows) != 1) + 1
+    cuts = np.flatnonzero(rows[1:] - rows[:-1] != 1) + 1
     return [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), len(rows)])]

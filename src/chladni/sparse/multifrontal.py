@@ -251,18 +251,20 @@ def _extend_add(F: _Blocks, to: np.ndarray, update: np.ndarray) -> None:
     F11, F21, F22 = F
     a = len(F11)
     k = int(np.searchsorted(to, a))
-    _add(F11, to[:k], to[:k], update[:k, :k], lower=True)
-    _add(F21, to[k:] - a, to[:k], update[k:, :k])
-    _add(F22, to[k:] - a, to[k:] - a, update[k:, k:], lower=True)
+    own, rest = to[:k], to[k:] - a
+    of_own, of_rest = runs(own), runs(rest)
+    _add(F11, own, of_own, own, of_own, update[:k, :k], lower=True)
+    _add(F21, rest, of_rest, own, of_own, update[k:, :k])
+    _add(F22, rest, of_rest, rest, of_rest, update[k:, k:], lower=True)
 
 
 def _add(
-    F: np.ndarray, i: np.ndarray, j: np.ndarray, values: np.ndarray, *, lower: bool = False
-) -> None:
-    """Add values at rows i and columns j; of a symmetric block what lies below its columns."""
+    F: np.ndarray, i: np.ndarray, rows: list[slice], j: np.ndarray, columns: list[slice],
+    values: np.ndarray, *, lower: bool = False,
+) -> None:  # fmt: skip
+    """Add values at rows i and columns j, with their runs; of a symmetric block the lower half."""
     if not values.size:
         return
-    rows, columns = runs(i), runs(j)
     few = len(rows) <= _FEW_RUNS
     for n, c in enumerate(columns):
         block, first = F[:, j[c.start] : j[c.stop - 1] + 1], n if lower else 0

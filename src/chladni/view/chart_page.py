@@ -86,7 +86,7 @@ def _figure(panels: Sequence[Panel | None], chart: Chart, looks: Any) -> Spec:
     }
     if layout["showlegend"] and any(p.title for p in panels[: chart.columns] if p):
         layout["legend"] |= {"yref": "container", "y": 1, "yanchor": "top"}  # above the titles
-        layout["margin"] = {"l": 60, "r": 15, "t": 48, "b": 45}
+        layout["margin"] = {"l": 60, "r": 42, "t": 48, "b": 45}
     return {"data": data, "layout": layout, "narrow": _narrow(panels, chart)}
 
 

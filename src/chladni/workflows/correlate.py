@@ -17,7 +17,7 @@ from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.mac_significance import CLOSE, Likeness, likeness
 from ..ema.mode_pairing import LEAST_CHANNELS, ModePairs, pair
-from ..ema.shapes import driven_shapes, real_shapes, shape_covariance, turned
+from ..ema.shapes import driven_shapes, mixture, real_shapes, shape_covariance, turned
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..inference.channel_screening import shapes_against_model
@@ -42,7 +42,6 @@ from .unit_check import refuse_other_units
 BANDS = 6
 NEAR = 1.3  # times the highest line: as far as the partner of an identified mode is looked for
 LONG = 100_000  # values of a recording: 210 000 took 190 s on a busy machine
-SEPARATE = 1e3  # condition of Φ at the sensors from which they cannot tell modes apart
 RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid motions
 
 
@@ -212,17 +211,16 @@ def _on_the_model(
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Cross-orthogonality (m, r), and the test's shapes on the whole model (n_points, 3, r).
 
-    Both follow from q = Φ_s⁺ ψ, the best mixture of the model's modes up to ``f_max``. The model's
-    mass on the sensors is Φ_s⁺ᵀ Φ_s⁺ (SEREP; O'Callahan, Avitabile and Riemer 1989, IMAC VII,
-    29-37).
+    Both follow from the best mixture q of the model's modes up to ``f_max``. The model's mass on
+    the sensors is Φ_s⁺ᵀ Φ_s⁺ (SEREP; O'Callahan, Avitabile and Riemer 1989, IMAC VII, 29-37).
     None where the sensors cannot tell these modes apart.
     """
     modes = np.flatnonzero(near.frequency <= NEAR * f_max)
-    at = phi[:, modes]
-    if not at.size or len(at) < len(modes) or np.linalg.cond(at) > SEPARATE:
+    best = mixture(phi[:, modes], psi)
+    if best is None:
         return None, None
     q = np.zeros((phi.shape[1], psi.shape[1]), psi.dtype)
-    q[modes] = np.linalg.pinv(at) @ psi
+    q[modes] = best
     q = turned(q.T).T.real if np.iscomplexobj(q) else q
     q /= np.maximum(np.linalg.norm(q, axis=0), 1e-300)
     s = model.structure

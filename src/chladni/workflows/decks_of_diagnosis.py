@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..case import Case
-from ..decision.decision_rules import RULES, odds_of_something_else
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
@@ -20,6 +19,7 @@ from ..io.nastran import assembly
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
+from ..search.decision_rules import RULES, odds_of_something_else
 from ..search.diagnosis import Diagnosis
 from ..search.frequency_table import frequency_error, frequency_rows
 from ..search.measured_modes import MeasuredModes, measured_modes
@@ -97,11 +97,7 @@ def on_preferred_mesh(
     again = result_of(question, prepared, found, better)
     if last_step_in_words(again.agreement, bool(again.effects)):
         return stages, result
-    note = (
-        f"the mesh of the deck is too coarse to show the change: on it {worse}; the decks that "
-        "are written have every shell halved"
-    )
-    return better, replace(again, notes=(*again.notes, note))
+    return better, replace(again, halved=f"on the given mesh {worse}")
 
 
 def as_it_is(question: Question, searched: Modelled) -> Modelled:

@@ -3,7 +3,7 @@
 1. The recording is read and the held-out data are chosen (``prepare``).
 2. Hypotheses are fitted and compared by evidence (``search.diagnosis``).
 3. The reported fit is repeated if it left the reduced model's range of validity (``refined``).
-4. The decision is made on rows of numbers, and requests the fits that it needs (``decided``).
+4. The decision reads the tests, scores and decks of hypotheses, which are made then (``decide``).
 5. The result is written into the deck, and every number is taken from the decks as written.
 """
 
@@ -15,19 +15,19 @@ import numpy as np
 from ..case import Case
 from ..ema.finding import Finding, Screening
 from ..inference.calibration_result import CalibrationStudy
-from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.implausible_values import in_doubt
 from ..inference.joint_fit import Posterior, informed
 from ..progress import Progress, within
 from ..search.articles import articles_together
-from ..search.basis_refinement import Refinement, refined
+from ..search.basis_refinement import refined
 from ..search.calibration import FULL, CalibrationSettings, calibration
 from ..search.compensation import compensating
+from ..search.conclusion import concluded, open_explanations
 from ..search.damping_by_part import damping_by_part
-from ..search.deciding import decided, open_explanations
-from ..search.decision_in_words import concluded
+from ..search.decide import decide
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
+from ..search.hypotheses import Hypotheses
 from ..search.left_frequencies import left_frequencies
 from ..search.measurement_forecasts import outlook
 from ..search.next_measurement import Outlook, advised
@@ -58,10 +58,6 @@ class Explained:
     study: CalibrationStudy | None = None
     distrust: tuple[str, ...] = ()
     outlook: Outlook | None = None
-
-    def refine(self, hypothesis: HypothesisFit) -> Refinement:
-        """Fit a hypothesis again on a reduced model that can represent it."""
-        return refined(self.question, self.prepared, hypothesis)
 
 
 def searched(
@@ -186,8 +182,9 @@ def _apply_held_out(
     """Return the verdict by all data, reasons not to trust it, and what would settle a tie."""
     prepared = made.prepared
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
-    case, decision = decided(prepared, made.found, made.refine)
-    found, distrust = concluded(prepared, made.found, case, decision)
+    case = Hypotheses(made.question, prepared, made.found)
+    decision = decide(case)
+    found, distrust = concluded(case, decision)
     ahead = None
     if diagnosing:
         ahead = outlook(prepared.problem, *open_explanations(case, decision, found))

@@ -91,6 +91,7 @@ class DiagnosisResult(Result):
     searched : False where only calibration parameters were fitted
     screening : faults that the recording itself reveals; None without an FRF
     files : {what: name} of the files written with it
+    halved : why every shell of the written decks is halved; "" if they have the given mesh
     models : the structures; None if the result was read from a file
     left_where : residual of the explanation on the mesh; None if frequencies were compared
     recordings : Q of the decks on the recordings that were not fitted
@@ -119,6 +120,7 @@ class DiagnosisResult(Result):
     searched: bool = True
     screening: Screening | None = None
     files: dict[str, str | None] = field(default_factory=dict)
+    halved: str = ""
     models: UpdatedModels | None = None
     residual_localisation: ResidualLocalisation | None = None
     outlook: Outlook | None = None

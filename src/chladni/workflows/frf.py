@@ -91,7 +91,7 @@ def _responses(
     if _labels(inputs):
         if frequency is None or not _labels(outputs):
             raise FileError("--input needs at least one --output, as --output 55:+Z")
-        model = as_model(source)
+        model = as_model(source, "frf")
         refuse_unknown(model, outputs, inputs)
         progress("modes", 0.2)
         made = model.solved(REACH * float(frequency[-1]))

@@ -38,6 +38,7 @@ def distinct(
     *,
     ceiling: float = 0.15,
     rules: Rules | None = None,
+    shapes: np.ndarray | Candidates | None = None,
     max_rounds: int = 30,
 ) -> np.ndarray:
     """A layout (increasing) after exchange for log det F - 30 excess of the AutoMAC over a ceiling.
@@ -51,12 +52,13 @@ def distinct(
     phi : see :func:`candidates`; several draws are judged by their mean
     layout : positions or mask of the sensors to start from
     rules : fixed, forbidden, near, regions
+    shapes : as phi, of the AutoMAC, where phi is weighted
     """
     c = candidates(phi)
     kept = np.sort(positions_of(layout, len(c)))
     checked = (rules or Rules()).checked(len(c), len(kept))
     checked.obeyed(kept)
-    pairs = _Pairs.of(c)
+    pairs = _Pairs.of(c if shapes is None else candidates(shapes))
     now = value("D", _regular(c, kept)) - WORTH * pairs.alone(kept, ceiling)
     for _ in range(max_rounds):
         before = now

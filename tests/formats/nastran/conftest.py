@@ -79,4 +79,4 @@ def real_decks():
 
 
 def read_real(path):
-    return read_deck(path, allow=("GENEL", "CTRPLT1"))
+    return read_deck(path, allow=("CTRPLT1",))

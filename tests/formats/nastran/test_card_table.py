@@ -11,7 +11,7 @@ from chladni.io.nastran.text.cards import FIELDS, LEGACY
 from chladni.io.nastran.text.known_cards import HARMLESS, REFUSED, SELECTED
 
 SOURCE = "".join(p.read_text() for p in Path(read.__file__).parent.glob("*.py"))
-TIES = ("RBE1", "RBE2", "RBE3", "RBAR", "RROD", "RTRPLT")  # ids of their own
+TIES = ("RBE1", "RBE2", "RBE3", "RBAR", "RROD", "RSPLINE", "RTRPLT")  # ids of their own
 
 
 def test_no_card_is_read_and_said_to_be_left_out():

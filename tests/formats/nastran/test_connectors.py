@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+from tests.builders.decks import alike, rewritten
 from tests.builders.refusals import says
 
+from chladni.effects.joints import fasteners, lines, with_factor_on, with_family, without_joint
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly
 from chladni.model.assembly import Average
@@ -78,6 +81,13 @@ def test_length_of_a_weld_has_limits(bulk, gap, kind, length):
     assert k == pytest.approx(1e3 * E * np.pi * 25 / 4 / length)
 
 
+def test_a_fastener_may_lie_in_its_sheet(bulk):
+    """An axis in the plane of a patch: the weights of its square add up to four, as across it."""
+    deck = bulk(sheets("CFAST,900,31,ELEM,105,105,,300,7", gap=0.0))
+    (mean,) = (t for t in assembly(deck, "mm-t-s", loose=True).rigid if isinstance(t, Average))
+    assert sum(w for *_, w in mean.terms) == pytest.approx(4)
+
+
 def test_a_fastener_has_its_own_numbers(bulk):
     """KT1 along the axis; half of its mass lies at each end; GE is its loss."""
     made = assembly(bulk(sheets(FORMS["CFAST"])), "mm-t-s")
@@ -122,3 +132,75 @@ def test_a_bush_of_one_direction_acts_along_it(bulk):
     np.testing.assert_allclose(bushes.viscous, [[2e3, 0, 0, 0, 0, 0]] * 2)
     says("PBUSH1D 6", assembly, bulk(text.replace("CBUSH1D,8,5", "CBUSH1D,8,6")), loose=True)
     says("needs a coordinate system", assembly, bulk(text.replace("1,3,7", "1,3")), loose=True)
+
+
+def two(form):
+    """Sheets with two connectors of one property."""
+    card = FORMS[form]
+    other = card.replace("900", "901").replace("300", "301").replace("14.,16.", "26.,24.")
+    other = other.replace("7,8,13,12", "13,14,19,18").replace("32,33,38,37", "38,39,44,43")
+    other = other.replace("ALIGN,7,32", "ALIGN,13,38")
+    return sheets(f"{card}\n{other}", more="GRID,301,,26.,24.,1.")
+
+
+CHANGES = {
+    "one softer": lambda a, first: with_factor_on(a, first, 0.3),
+    "one lossy": lambda a, first: with_factor_on(a, first, 0.3, 0.25),
+    "all stiffer": lambda a, first: with_family(a, "bushes", 2.0),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("form", FORMS)
+def test_a_connector_is_a_joint_that_may_be_soft(bulk, form, change):
+    """Each joins both sheets; its new stiffness and loss are read from the changed deck again."""
+    deck = bulk(two(form))
+    before = assembly(deck, "mm-t-s")
+    found = fasteners(structure(before))
+    assert [joint.ids for joint in found] == [(900,), (901,)]
+    assert lines(found) == [(0, 1)]
+    assert all({*joint.parts} == {"PSHELL 1", "PSHELL 2"} for joint in found)
+    after = CHANGES[change](before, found[0])
+    with pytest.raises(AssertionError):
+        alike(before, after)
+    again = rewritten(deck, before, after).found
+    assert_allclose(again.bushes.stiffness, after.bushes.stiffness, rtol=1e-6)
+    assert_allclose(again.bushes.loss, after.bushes.loss, rtol=1e-6)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_connector_that_is_missing_is_a_card_less(bulk, form):
+    """The other one stays, and what a CFAST weighs goes with it."""
+    lighter = "PFAST,33,5.,,,1.+5,2.+4,3.+4,4.+5,5.+5,6.+5,.2-6,.1\nCONM2,900,1,,.4-6"
+    deck = bulk(two(form).replace("CFAST,901,31", "CFAST,901,33") + lighter)
+    before = assembly(deck, "mm-t-s")
+    after = without_joint(before, fasteners(structure(before))[0])
+    found, gone, fresh = rewritten(deck, before, after)
+    assert found.bushes.ids.tolist() == [901]
+    assert set(found.masses.ids.tolist()) <= {900, 901}
+    assert gone[0].split(",")[1] == "900"
+    assert not fresh
+
+
+def test_a_sound_weld_keeps_its_property_and_the_other_gets_one(bulk):
+    """PWELD 30 stays; 32 has a material with a tenth of E, the sheets keep theirs."""
+    deck = bulk(two("PARTPAT"))
+    before = assembly(deck, "mm-t-s")
+    after = with_factor_on(before, fasteners(structure(before))[1], 0.1)
+    _, gone, fresh = rewritten(deck, before, after)
+    assert gone == ["CWELD,901,30,301,PARTPAT"]
+    assert [line.split()[:3] for line in fresh if line.startswith(("MAT1", "PWELD"))] == [
+        ["MAT1", "6", "21000."], ["PWELD", "32", "6"]
+    ]  # fmt: skip
+
+
+def test_a_bush_of_one_direction_and_a_gap_are_written_when_they_soften(bulk):
+    """K of PBUSH1D; KA, KB and KT of PGAP by one factor."""
+    more = (
+        "CBUSH1D,910,41,7,32\nPBUSH1D,41,900.,2.\nCGAP,911,42,13,38,1.,0.,0.\n"
+        "PGAP,42,,,5.+5,,2.+4\nCGAP,912,43,19,44,1.,0.,0.\nPGAP,43,.1,,5.+5"
+    )
+    deck = bulk(sheets(FORMS["CFAST"], more=more))
+    before = assembly(deck, "mm-t-s")
+    after = with_family(before, "bushes", 0.5)
+    assert_allclose(rewritten(deck, before, after).found.bushes.stiffness, after.bushes.stiffness)

@@ -48,12 +48,12 @@ def test_a_card_for_output_or_other_analyses_is_passed_over(bulk, card):
 
 def test_all_that_is_not_known_is_said_at_once(bulk):
     """With count, meaning and line of each, and the words that allow all of them."""
-    text = f"{PLATE}CSEAM,1,2\nCSEAM,2,2\nXYZ,1\nRSPLINE,9\n"
+    text = f"{PLATE}CSEAM,1,2\nCSEAM,2,2\nXYZ,1\nRJOINT,9\n"
     before = "SOL 103\nCEND\nSTATSUB = 2\nNOSUCH = 1\n"
     said = says("5 kinds of cards and commands", bulk, text, before)
     for part in (
         "CSEAM (2 cards: spot welds, fasteners and seams, line 13)",
-        "XYZ (1 card, line 15)", "RSPLINE (1 card: ties, line 16)",
+        "XYZ (1 card, line 15)", "RJOINT (1 card: ties, line 16)",
         "the command STATSUB (stiffness of a loaded state, line 3)", "command NOSUCH (line 4)",
     ):  # fmt: skip
         assert part in said

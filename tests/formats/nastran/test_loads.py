@@ -199,8 +199,9 @@ def test_damping_and_frequencies(bulk):
 
 def test_what_is_left_out_is_said(bulk):
     """Cards without effect, and parameters but for those heeded and those of output alone."""
-    notes = analysis(bulk(PLATE + "TEMPD,1,20.\nPLOAD1,2,7,FY,FR,0.,1.,1.,1.\n")).notes
-    assert len(notes) == 2
+    left = "TEMPD,1,20.\nPLOAD1,2,7,FY,FR,0.,1.,1.,1.\nSNORM,1,,0.,0.,1.\n"
+    notes = analysis(bulk(PLATE + left)).notes
+    assert len(notes) == 3
     assert all("left out" in n and "deck.bdf:" in n for n in notes)
     text = PLATE + "PARAM,POST,-1\nPARAM,G,.02\nPARAM,SNORM,20.\nPARAM,K6ROT,1.\n"
     (note,) = analysis(bulk(text, "SOL 111\nCEND\nPARAM,LFREQ,1.\n")).notes

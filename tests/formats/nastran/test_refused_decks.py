@@ -51,7 +51,7 @@ def test_a_subcase_that_is_not_there(bulk):
     "card",
     """RBAR1,9,1,3,123456
     RBE22,9,1,123456,3 SPCC1,1,123456,1 MFLUID,1 MLIST,1 SESET,1,2 BCTABLE,1 TF,1,1,1
-    BCPROP,1 SNORM,1 XYZ,4 CSEAM,9,1 CQUAD,9,1 GENEL,9""".split(),
+    BCPROP,1 XYZ,4 CSEAM,9,1 CQUAD,9,1 RJOINT,9""".split(),
 )
 def test_a_card_not_known_is_refused_unless_allowed(bulk, card):
     name = card.partition(",")[0]

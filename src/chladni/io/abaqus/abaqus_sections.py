@@ -24,7 +24,7 @@ from ..nastran.read.beam_profiles import SHAPES
 from ..nastran.read.coordinate_systems import Frame
 from ..nastran.read.laminate import Ply, laminate_section
 from .abaqus_mesh import AbaqusMesh
-from .element_types import MEMBRANE, TRUSS, kind_of
+from .element_types import FULL, MEMBRANE, REDUCED, TRUSS, kind_of
 from .keywords import Keyword
 
 SECTIONS = (
@@ -148,13 +148,14 @@ class AbaqusParts:
         kinds: dict[str, list[int]] = {}
         for id in dict.fromkeys(self.mesh.elements.pick(key, name)):
             kinds.setdefault(self.mesh.shapes[id][0], []).append(id)
+        full = any(map(FULL.fullmatch, kinds)) and not any(map(REDUCED.fullmatch, kinds))
         dimension = {"SHELL": 2, "MEMBRANE": 2, "BEAM": 1}.get(key.name.split()[0], 3)
         for type, ids in kinds.items():
             own = 1 if TRUSS.fullmatch(type) else dimension
             if not (kind := kind_of(type)) or DIMENSION[kind] != own:
                 continue
             try:
-                self._add(key, type, kind, ids)
+                self._add(key, type, kind, ids, full)
             except _NotUnderstood as error:
                 self.left_out[f"{type} of {name}, {error}"] += len(ids)
                 self.assigned |= set(ids)
@@ -182,9 +183,11 @@ class AbaqusParts:
             self.cells.append(ForeignCells(kind, np.array(ids), nodes, part, t, up=across(ends)))
             self.assigned |= set(ids)
 
-    def _add(self, key: Keyword, type: str, kind: str, ids: list[int]) -> None:
+    def _add(self, key: Keyword, type: str, kind: str, ids: list[int], full: bool) -> None:
         nodes = np.array([self.mesh.shapes[id][1] for id in ids])
         section, offset, up = self._section(key, type)
+        if isinstance(section, SolidSection):
+            section = replace(section, full=full)
         part = self._part(key.word("ELSET"), key.scope, section)
         t: float | np.ndarray = getattr(section, "thickness", 0.0)
         if "NODAL THICKNESS" in key.words and isinstance(section, ShellSection):

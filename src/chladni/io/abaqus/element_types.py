@@ -23,6 +23,7 @@ _KINDS = (
     (r"B32.*|T3D3.*|PIPE32H?", "line3"),
 )
 TRUSS, MEMBRANE = re.compile(r"T3D.*"), re.compile(r"M3D.*")
+FULL, REDUCED = re.compile(r"C3D(8|20)H?"), re.compile(r"C3D(8|20)[RI].*")  # points of bricks
 NO_ROTATION = re.compile(r"T3D.*|M3D.*")
 # rigid and surface elements, and those that joints consist of
 READ_ELSEWHERE = re.compile(

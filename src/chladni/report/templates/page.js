@@ -43,7 +43,7 @@ function button(box, text, pressed) {
 function layout(more) {
   const axis = { gridcolor: colour("line"), zerolinecolor: colour("line"), linecolor: colour("soft") };
   const made = {
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: 15, t: 25, b: 45 },
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: more.showlegend ? 42 : 15, t: 25, b: 45 },
     font: { color: colour("ink"), size: 12, family: "system-ui, DejaVu Sans, sans-serif" },
     hoverlabel: { align: "left", bgcolor: colour("sheet"), font: { color: colour("ink") } },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("ink"), orientation: more.showlegend ? "v" : "h" },
@@ -220,7 +220,7 @@ function remainder(at, data, shared, box) {
 function shapes(at, data, shared, box) {
   const mesh = shared.mesh, names = Object.keys(data.sides), count = data.rows.length;
   const state = { row: 0, side: [names[0], names.length > 1 ? names[names.length - 1] : null], at: [null, null], size: 0.08, run: !matchMedia("(prefers-reduced-motion: reduce)").matches };
-  const called = (name) => (["test", "model"].includes(name) ? name : "deck " + name), own = (row) => names.map((n, k) => data.sides[n][row[k]]).find((m) => m);
+  const called = (name) => (["test", "model"].includes(name) || name.includes(".") ? name : "deck " + name), own = (row) => names.map((n, k) => data.sides[n][row[k]]).find((m) => m);
   const mode = (n) => data.sides[state.side[n]]?.[state.at[n]], sensed = (n) => mode(n)?.[state.side[n] === "test" ? "motion" : "sensors"];
   const list = choice(box, "mode", data.rows.map((row, k) => [k, `${own(row).number ?? k + 1}: ${hertz(own(row).hz)}`]), (v) => pair(Number(v)));
   if (count > 1) for (const [word, by] of [["previous", -1], ["next", 1]]) button(box, word, () => pair(((state.row ?? 0) + by + count) % count));

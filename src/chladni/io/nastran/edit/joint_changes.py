@@ -1,4 +1,4 @@
-"""Changed joints and masses put into their cards: PBUSH, K of PELAS and CELAS2, M of CONM2."""
+"""Changed joints and masses put into their cards: PBUSH, PFAST, PELAS, CELAS2, CONM2 and others."""
 
 from collections.abc import Iterator
 
@@ -7,23 +7,24 @@ import numpy as np
 from ....errors import ModelError
 from ....model.assembly import Assembly
 from .. import Add, Deck, SetField
+from ..text.cards import position
+from ..text.format import Value
 from ..text.table import Cards
 from .changes import Change
+from .free_ids import FreeIds
 from .split_properties import copied
 
 _SAME = 1e-9
 _ALIKE = 1e-6  # factors that are one
 
 
-def joint_changes(
-    deck: Deck, before: Assembly, after: Assembly, free: Iterator[int]
-) -> list[Change]:
+def joint_changes(deck: Deck, before: Assembly, after: Assembly, free: FreeIds) -> list[Change]:
     """Edits of the cards of springs, bushes and masses that are in both and differ.
 
     A bush has a factor for each of its six directions, a spring or a mass has one factor.
 
-    A property is changed where all its elements changed alike; bushes that changed otherwise get
-    one of their own, whose id comes from ``free``.
+    A property is changed where all its elements changed in the same way. Bushes and connectors that
+    changed otherwise get one of their own, whose id comes from ``free``.
 
     Raises
     ------
@@ -94,47 +95,107 @@ def _bush_changes(before: Assembly, after: Assembly) -> dict[int, _BushChange]:
     return out
 
 
-def _bushes(deck: Deck, changed: dict[int, _BushChange], free: Iterator[int]) -> Iterator[Change]:
-    """K and GE of the PBUSH that its CBUSH share; of those that changed otherwise one of their own.
+_BUSHES = ("CBUSH", "CBUSH1D", "CGAP", "CWELD", "CFAST")
 
-    What became of most stays with the card.
+
+def _bushes(deck: Deck, changed: dict[int, _BushChange], free: FreeIds) -> Iterator[Change]:
+    """The property that bushes or connectors share; of those that changed otherwise their own.
+
+    The card takes the change that most of them have.
     """
-    users: dict[int, dict[_BushChange, list[int]]] = {}
-    for cards in deck.present("CBUSH"):
+    for cards in deck.present(*_BUSHES):
+        users: dict[int, dict[_BushChange, list[int]]] = {}
         for id, p in zip(cards.integers(1).tolist(), cards.properties().tolist(), strict=True):
             if id in changed:  # not one that was taken out
                 kinds = users.setdefault(int(p), {})
                 same = next((c for c in kinds if _alike(c, changed[id])), changed[id])
                 kinds.setdefault(same, []).append(int(id))
-    for property, kinds in users.items():
-        common = max(kinds, key=lambda c: len(kinds[c]))
-        if np.abs(np.subtract(common[0], 1)).max() > _SAME or common[1]:
-            for j, k in _fields(deck["PBUSH"], property, common).items():
-                yield SetField("PBUSH", property, j, k)
-        for change, members in kinds.items():
-            if change != common:
-                new = next(free)
-                fields = {1: new, **_fields(deck["PBUSH"], property, change)}
-                yield Add([copied(deck["PBUSH"], property, fields)], "of bushes that changed")
-                yield from (SetField("CBUSH", id, "PID", new) for id in members)
+        known = deck["P" + cards.name[1:]]
+        for property, kinds in users.items():
+            common = max(kinds, key=lambda c: (len(kinds[c]), not _changes(c)))
+            for change, members in kinds.items():
+                if change == common and not _changes(change):
+                    continue
+                fields, more = _fields(deck, known, property, change, free)
+                yield from more
+                if change == common:
+                    for j, value in fields.items():
+                        yield SetField(known.name, property, j, value)
+                    continue
+                new = next(free.properties)
+                yield Add([copied(known, property, {1: new, **fields})], "of joints that changed")
+                yield from (SetField(cards.name, id, "PID", new) for id in members)
+
+
+def _changes(change: _BushChange) -> bool:
+    return bool(np.abs(np.subtract(change[0], 1)).max() > _SAME or change[1])
 
 
 def _alike(one: _BushChange, other: _BushChange) -> bool:
     return np.allclose(one[0], other[0], rtol=_ALIKE, atol=0) and one[1] == other[1]
 
 
-def _fields(cards: Cards, pid: int, change: _BushChange) -> dict[int, float | str]:
-    """{position: K times its factor} of a PBUSH, and GE: where it stands, or behind all else."""
+Fields = dict[int, Value]
+_STIFF = {  # fields of a property that are proportional to K1 to K6, or to all of them together
+    "PFAST": ("KT1", "KT2", "KT3", "KR1", "KR2", "KR3"),
+    "PBUSH1D": ("K",),
+    "PGAP": ("KA", "KB", "KT"),
+}
+
+
+def _fields(
+    deck: Deck, cards: Cards, pid: int, change: _BushChange, free: FreeIds
+) -> tuple[Fields, list[Change]]:
+    """{position: value} of a property with what became of its joints, and the cards it needs.
+
+    A field that is blank follows from the others or stays zero.
+    """
     one = cards.single(int(np.flatnonzero(cards.integers(1) == pid)[0]))
+    factors, loss = change
+    if cards.name == "PBUSH":
+        return _of_bush(one, change), []
+    if cards.name == "PWELD":
+        return _of_weld(deck, one, change, free)
+    if cards.name == "PGAP":
+        factors = (_common(f"PGAP {pid}", [f for f in factors if f != 1] or [1.0]),) * 6
+    at = [position(cards.name, name) for name in _STIFF[cards.name]]
+    each = zip(at, factors, strict=False)
+    fields: Fields = {j: one.real(0, j) * f for j, f in each if one.word(0, j)}
+    if loss and cards.name == "PFAST":
+        fields[position("PFAST", "GE")] = _common(f"PFAST {pid}", list(loss))
+    return fields, []
+
+
+def _of_bush(one: Cards, change: _BushChange) -> Fields:
+    """K of a PBUSH times its factor, and GE: where it stands, or behind all else."""
     words, (factors, loss) = one.fields(0), change
     keys = {words[k - 1]: k for k in range(2, len(words) + 1, 8)}
     at = range(keys["K"] + 1, min(keys["K"] + 6, len(words)) + 1) if "K" in keys else ()
     of_k = zip(at, factors, strict=False)
-    out: dict[int, float | str] = {j: float(one.reals(j)[0]) * f for j, f in of_k if words[j - 1]}
+    out: Fields = {j: one.real(0, j) * f for j, f in of_k if words[j - 1]}
     if loss:
         key = keys.get("GE", 2 + 8 * -(-(len(words) - 1) // 8))
         out |= {key: "GE", **{key + 1 + k: v for k, v in enumerate(loss)}}
     return out
+
+
+def _of_weld(
+    deck: Deck, one: Cards, change: _BushChange, free: FreeIds
+) -> tuple[Fields, list[Change]]:
+    """MID of a PWELD and a material of its own, with E and G times the factor of the weld."""
+    if not _changes(change):
+        return {}, []
+    pid, mid = one.integer(0, 1), one.integer(0, position("PWELD", "MID"))
+    factor = _common(f"PWELD {pid}", list(change[0]))
+    table = deck["MAT1"]
+    card = table.single(int(np.flatnonzero(table.integers(1) == mid)[0]))
+    moduli = {position("MAT1", name): card.word(0, position("MAT1", name)) for name in "EG"}
+    new = next(free.materials)
+    fields: Fields = {1: new, **{j: card.real(0, j) * factor for j, w in moduli.items() if w}}
+    if change[1]:
+        fields[position("MAT1", "GE")] = _common(f"PWELD {pid}", list(change[1]))
+    added = Add([copied(table, mid, fields)], "of welds that changed")
+    return {position("PWELD", "MID"): new}, [added]
 
 
 def _masses(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:

@@ -59,7 +59,7 @@ def changes(
     out += _materials(deck, before, after, units, free, split)
     out += laminate_changes(deck, before, after, units, free.materials)
     out += _thickness(deck, before, after, units)
-    out += joint_changes(deck, before, after, free.properties)
+    out += joint_changes(deck, before, after, free)
     out += tie_changes(deck, before, after, units)
     out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import ModelError
-from ....model.assembly import Assembly
+from ....model.assembly import Assembly, picked
 from ....model.properties import ShellSection
 from ....units import Units
 from .. import Add, Deck, Delete, SetField
@@ -115,7 +115,14 @@ def taken_out(deck: Deck, before: Assembly, after: Assembly) -> tuple[Assembly, 
     )
     beams = kept(before.beams, after.beams, (*BEAMS, "CONROD"))
     bushes = kept(before.bushes, after.bushes, ("CBUSH", "CBUSH1D", "CWELD", "CFAST"))
-    return replace(before, solids=solids, beams=beams, bushes=bushes), changes
+    masses, gone = before.masses, np.setdiff1d(before.bushes.ids, bushes.ids)
+    left = {*zip(after.masses.ids.tolist(), after.masses.node.tolist(), strict=True)}
+    stays = [  # the mass of a CFAST that was taken out does not
+        id not in gone or (id, node) in left
+        for id, node in zip(masses.ids.tolist(), masses.node.tolist(), strict=True)
+    ]
+    masses = picked(masses, np.array(stays, bool))
+    return replace(before, solids=solids, beams=beams, bushes=bushes, masses=masses), changes
 
 
 def section_changes(before: Assembly, after: Assembly, units: Units) -> list[Change]:

@@ -28,6 +28,7 @@ LEFT_OUT = {
     "PBUSHT": "stiffness and damping that follow the frequency",
     "PELAST": "stiffness that follows the frequency",
     "PDAMPT": "damping that follows the frequency",
+    "SNORM": "normals of shells at grids",
     **dict.fromkeys(FOLLOWS_TEMPERATURE, "materials that follow temperature"),
 }  # fmt: skip
 _HEEDED = frozenset("WTMASS COUPMASS G AUTOSPC RESVEC K6ROT".split())
@@ -38,7 +39,8 @@ _OUTPUT = frozenset(  # what is printed, plotted or written
     SPCGEN OUNIT1 OUNIT2 PDRMSG PDRG OIBULK""".split()
 )
 STRUCTURAL = (  # these change the modes: Guyan's reduction, what follows the frequency
-    "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT", "MDLPRM", *FOLLOWS_TEMPERATURE,
+    "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT", "MDLPRM", "SNORM",
+    *FOLLOWS_TEMPERATURE,
 )  # fmt: skip
 
 

@@ -15,16 +15,23 @@ from .beam_elements import beams
 from .connected import refuse_loose
 from .connectors import CONNECTORS, with_connectors
 from .context import Context, context, parameter, real_parameter
+from .curved_beams import curved_beams
 from .direct_matrices import direct
+from .general_elements import general_elements
 from .nonstructural_mass import with_nonstructural
 from .rigid_bushes import tied
 from .rigid_elements import ties
 from .sections import Parts
+from .shear_panels import shear_panels
 from .shell_elements import SHEETS, filled_thickness, shells
 from .solid_elements import SOLIDS, solids
+from .strain_springs import with_springs
 from .supports import selected, supports
 
-_STIFF = "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D CGAP".split()
+_STIFF = (
+    "CBAR CBEAM CROD CTUBE CONROD CELAS1 CELAS2 CELAS3 CELAS4 CBUSH CBUSH1D CGAP "
+    "CSHEAR CBEND GENEL".split()
+)
 _ELEMENTS = (  # those of one kind have no id in common
     (*SHEETS, *SOLIDS, *_STIFF, *CONNECTORS),
     "CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC".split(),
@@ -90,6 +97,12 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         k6rot=_k6rot(deck),
     )
     made = with_nonstructural(ctx, tied(made), selected(deck, "NSM", subcase))
+    if "CSHEAR" not in deck.allowed:
+        made = with_springs(made, *shear_panels(ctx))
+    if "CBEND" not in deck.allowed:
+        made = with_springs(made, *curved_beams(ctx))
+    if "GENEL" not in deck.allowed:
+        made = with_springs(made, general_elements(ctx))
     return with_connectors(ctx, made)
 
 

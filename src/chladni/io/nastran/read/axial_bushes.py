@@ -4,23 +4,18 @@ import numpy as np
 
 from ....model.assembly import Bushes
 from ..text.table import Cards
-from .context import Context
+from .context import Context, with_property
 
 
 def cbush1d(ctx: Context, cards: Cards) -> Bushes:
     """CBUSH1D: EID PID GA GB CID, a spring and a dashpot along x of CID or from end to end."""
-    pbush, s, n = ctx.deck["PBUSH1D"], ctx.scale, len(cards)
-    known = {int(p): i for i, p in enumerate(pbush.unique())}
+    s, n = ctx.scale, len(cards)
     first = ctx.rows(cards, cards.integers(3))
     nodes = np.stack([first, ctx.rows(cards, cards.integers(4, 0), ground=True)], axis=1)
     A = ctx.places[first]
     along = np.where((nodes[:, 1] < 0)[:, None], 0.0, ctx.places[nodes[:, 1]] - A)
     stiffness, viscous, frames = np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 3, 3))
-    for i, pid in enumerate(cards.properties().tolist()):
-        if pid not in known:
-            there = ", ".join(map(str, sorted(known)[:8])) or "none"
-            raise cards.refuse(i, f"there is no PBUSH1D {pid}; there are {there}")
-        card = pbush.single(known[pid])
+    for i, card in with_property(ctx.deck, cards):
         stiffness[i, 0], viscous[i, 0] = card.real(0, 2, 0.0), card.real(0, 3, 0.0)
         if card.real(0, 4, 0.0):
             raise card.refuse(0, "a mass M is not supported; write it as a CONM2")
@@ -47,16 +42,11 @@ def _end_to_end(x: np.ndarray) -> np.ndarray:
 
 def cvisc(ctx: Context, cards: Cards) -> Bushes:
     """CVISC: an axial and a torsional dashpot from end to end."""
-    pvisc = ctx.deck["PVISC"]
-    known = {int(p): i for i, p in enumerate(pvisc.unique())}
-    rates = np.stack([pvisc.reals(2, 0.0), pvisc.reals(3, 0.0)], axis=1)
     nodes = ctx.rows(cards, cards.ids(3, 2))
     X, s, n = ctx.places[nodes], ctx.scale, len(cards)
     viscous, frames = np.zeros((n, 6)), np.zeros((n, 3, 3))
-    for i, pid in enumerate(cards.properties().tolist()):
-        if pid not in known:
-            raise cards.refuse(i, f"there is no PVISC {pid}")
-        viscous[i, [0, 3]] = rates[known[pid]]
+    for i, card in with_property(ctx.deck, cards):
+        viscous[i, [0, 3]] = card.block(2, 2, 0.0)[0]
         x = X[i, 1] - X[i, 0]
         if not np.any(x):
             raise cards.refuse(i, "its length is zero")

@@ -21,7 +21,7 @@ from ....geometry.nearest import ShellSurface
 from ....model.added_points import with_points
 from ....model.assembly import Assembly, Average, Bushes, Masses, concatenated
 from ..text.table import Cards
-from .context import Context
+from .context import Context, with_property
 from .materials import Materials
 
 FIRST = 101_000_001
@@ -42,6 +42,7 @@ class _End:
 class _Connector:
     cards: Cards
     i: int
+    property: Cards
     ends: tuple[_End, _End]
     place: np.ndarray | None  # of GS or XS YS ZS [m]
     diameter: float
@@ -62,11 +63,7 @@ def with_connectors(ctx: Context, made: Assembly) -> Assembly:
 
 
 def _read(ctx: Context, cards: Cards, made: Assembly) -> Iterator[_Connector]:
-    known = _properties(ctx, "P" + cards.name[1:])
-    for i, pid in enumerate(cards.properties().tolist()):
-        if pid not in known:
-            there = ", ".join(map(str, sorted(known)[:8])) or "none"
-            raise cards.refuse(i, f"there is no P{cards.name[1:]} {pid}; there are {there}")
+    for i, card in with_property(ctx.deck, cards):
         reader = _weld if cards.name == "CWELD" else _fastener
         ends, at, xyz, wide = reader(ctx, cards, i, made)
         place = None
@@ -76,18 +73,10 @@ def _read(ctx: Context, cards: Cards, made: Assembly) -> Iterator[_Connector]:
             place = cards.single(i).block(xyz, 3, 0.0)[0] * ctx.scale.length
         if place is None and min(end.given for end in ends) < 0:
             raise cards.refuse(i, "neither GS, nor GA and GB, nor a place is given")
-        diameter = known[pid].real(0, 3 if cards.name == "CWELD" else 2) * ctx.scale.length
+        diameter = card.real(0, 3 if cards.name == "CWELD" else 2) * ctx.scale.length
         if not diameter > 0:
-            raise known[pid].refuse(0, f"D is {diameter:g}; it is to be positive")
-        yield _Connector(cards, i, ends, place, diameter, wide)
-
-
-def _properties(ctx: Context, name: str) -> dict[int, Cards]:
-    return {
-        int(id): cards.single(i)
-        for cards in ctx.deck.present(name)
-        for i, id in enumerate(cards.unique())
-    }
+            raise card.refuse(0, f"D is {diameter:g}; it is to be positive")
+        yield _Connector(cards, i, card, ends, place, diameter, wide)
 
 
 Ends = tuple[tuple[_End, _End], int, int, bool]  # ends, GS, field of XS, patches of four points
@@ -219,7 +208,9 @@ def _axis(made: Assembly, one: _Connector, places: np.ndarray) -> np.ndarray:
 
 def _across(axis: np.ndarray, towards: np.ndarray | None = None) -> np.ndarray:
     """Rows x, y, z of a frame along an axis; y near ``towards`` or the least component's axis."""
-    y = np.eye(3)[np.argmin(np.abs(axis))] if towards is None else towards
+    y = np.eye(3)[np.argmin(np.abs(axis))]
+    if towards is not None and np.linalg.norm(np.cross(axis, towards)) > 1e-6:
+        y = towards
     y = y - axis * (axis @ y)
     y = y / np.linalg.norm(y)
     return np.array([axis, y, np.cross(axis, y)])
@@ -254,10 +245,8 @@ def _section(
     ctx: Context, made: Assembly, one: _Connector, places: np.ndarray, axis: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float, float]:
     """(frame, stiffness (6,) [N/m, N m/rad], loss factor, mass [kg])."""
-    name = "P" + one.cards.name[1:]
-    pid = int(one.cards.single(one.i).properties()[0])
-    card = _properties(ctx, name)[pid]
-    if name == "PFAST":
+    card = one.property
+    if card.name == "PFAST":
         return _fastener_section(ctx, card, places, axis)
     material = Materials(ctx).isotropic(card, 0, card.integer(0, 2))
     E, G, D = material.E, material.shear_modulus, one.diameter

@@ -1,6 +1,7 @@
 """Unit factors, grids by row and coordinate systems, which every converter needs."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +71,18 @@ class Context:
         """Unit vectors (3, 3) of coordinate system ``cid`` at a basic place."""
         frame = self.frames.get(cid, cards, i)
         return frame.at(place[None])[0]
+
+
+def with_property(deck: Deck, cards: Cards) -> Iterator[tuple[int, Cards]]:
+    """Position of each element, and the card of its property: PGAP of a CGAP."""
+    name = "P" + cards.name[1:]
+    table = deck[name]
+    known = {int(id): i for i, id in enumerate(table.unique())}
+    for i, pid in enumerate(cards.properties().tolist()):
+        if pid not in known:
+            there = ", ".join(map(str, sorted(known)[:8])) or "none"
+            raise cards.refuse(i, f"there is no {name} {pid}; there are {there}")
+        yield i, table.single(known[pid])
 
 
 def parameter(deck: Deck, name: str) -> str:
@@ -170,13 +183,28 @@ def _axes(grid: Cards, frames: Frames, cd: np.ndarray, places: np.ndarray) -> np
 
 
 def _spoints(deck: Deck, grids: np.ndarray) -> np.ndarray:
-    """Ids of scalar points."""
+    """Ids of scalar points: of SPOINT, and of scalar elements that name what is no grid."""
     cards = deck["SPOINT"]
     found = [id for i in range(len(cards)) for id in id_list(cards, i, 1)]
     ids = np.unique(np.array(found, np.int64))
     if np.any(both := np.isin(ids, grids)):
         raise FileError(f"{deck.path}: {int(ids[both][0])} is both a GRID and an SPOINT")
-    return ids
+    return np.union1d(ids, np.setdiff1d(_of_scalar_elements(deck), np.append(grids, 0)))
+
+
+def _of_scalar_elements(deck: Deck) -> np.ndarray:
+    """Points without a component on CELAS, CDAMP and CMASS, which need no SPOINT.
+
+    MSC Nastran Quick Reference Guide, SPOINT.
+    """
+    out = [np.zeros(0, np.int64)]
+    for kind in ("CELAS", "CDAMP", "CMASS"):
+        for cards in deck.present(f"{kind}3", f"{kind}4"):
+            out += [cards.integers(3, 0), cards.integers(4, 0)]
+        for cards in deck.present(f"{kind}1", f"{kind}2"):
+            for k in (3, 5):
+                out.append(np.where(cards.integers(k + 1, 0) == 0, cards.integers(k, 0), 0))
+    return np.concatenate(out)
 
 
 _LONGEST = 1_000_000  # ids that a THRU may stand for

@@ -8,6 +8,7 @@ from ....model.assembly import Average, Equation, RigidBody
 from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context, digits, id_list
+from .splines import spline
 from .springs_and_masses import skew
 
 Tie = RigidBody | Average | Equation
@@ -19,7 +20,7 @@ def ties(ctx: Context, mpc: tuple[int, ...]) -> tuple[Tie, ...]:
     """Every rigid link, and the multi-point constraints of the selected sets."""
     out: list[Tie] = []
     for name, read in _READERS.items():
-        for cards in ctx.deck.present(name):
+        for cards in ctx.deck.present(name) if name not in ctx.deck.allowed else ():
             cards.unique()
             for i in range(len(cards)):
                 out.extend(read(ctx, cards, i))
@@ -244,7 +245,7 @@ def _rbe1(ctx: Context, cards: Cards, i: int) -> Iterator[Tie]:
     yield from _general(ctx, cards, i, lead, _pairs(ctx, cards, i, follow))
 
 
-def _motion(ctx: Context, dofs: list[Dof], about: np.ndarray) -> np.ndarray:
+def motions(ctx: Context, dofs: list[Dof], about: np.ndarray) -> np.ndarray:
     """R with q = R r: dofs in their own frames under the rigid motion r of point ``about``."""
     x = ctx.places[[row for row, _ in dofs]] - about
     R = np.zeros((len(dofs), 6))
@@ -266,7 +267,7 @@ def _general(
     about = ctx.places[lead[0][0]]
     span = float(np.abs(ctx.places[[r for r, _ in lead + follow]] - about).max()) or 1.0
     unit = np.array([1.0] * 3 + [1 / span] * 3)
-    Rn, Rm = (_motion(ctx, dofs, about) * unit for dofs in (lead, follow))
+    Rn, Rm = (motions(ctx, dofs, about) * unit for dofs in (lead, follow))
     if np.linalg.cond(Rn) > 1e8:
         raise cards.refuse(i, "the six independent components leave a rigid motion free")
     factors = Rm @ np.linalg.pinv(Rn)
@@ -311,6 +312,7 @@ _READERS = {
     "RROD": _rrod,
     "RTRPLT": _rtrplt,
     "RBE1": _rbe1,
+    "RSPLINE": spline,
     "CRIGD1": _crigd1,
     "CRIGD2": _crigd2,
     "CRIGD3": _rbe1,

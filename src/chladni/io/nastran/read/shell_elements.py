@@ -70,7 +70,7 @@ def _made(ctx: Context, parts: Parts, cards: Cards, nodes: np.ndarray, places: P
     theta, zoffs, tflag, first = places
     X = ctx.places[nodes]
     corners = 3 if cards.name.startswith("CTRIA") else 4
-    normal = _normals(ctx, cards, nodes[:, :corners])
+    normal = face_normals(ctx, cards, nodes[:, :corners])
     pid = cards.properties()
     part = parts.of("shell", cards, pid)
     offset = np.zeros(len(cards)) if zoffs is None else cards.reals(zoffs, 0.0) * ctx.scale.length
@@ -84,7 +84,7 @@ def _made(ctx: Context, parts: Parts, cards: Cards, nodes: np.ndarray, places: P
     )
 
 
-def _normals(ctx: Context, cards: Cards, corners: np.ndarray) -> np.ndarray:
+def face_normals(ctx: Context, cards: Cards, corners: np.ndarray) -> np.ndarray:
     """Unit normals (n, 3) of faces (n, 3 or 4); coincident corners and zero area are refused."""
     X = ctx.places[corners]
     same = (np.diff(np.sort(corners, axis=1), axis=1) == 0).any(axis=1)
@@ -213,7 +213,7 @@ def second_axes(ctx: Context) -> Iterator[str]:
             if not len(cards):
                 continue
             nodes = ctx.rows(cards, cards.ids(3, corners))
-            _, size = _laid(ctx, cards, ctx.places[nodes], _normals(ctx, cards, nodes), k)
+            _, size = _laid(ctx, cards, ctx.places[nodes], face_normals(ctx, cards, nodes), k)
             if len(found := np.flatnonzero(size[:, 0] < NORMAL)):
                 i = int(found[0])
                 yield (

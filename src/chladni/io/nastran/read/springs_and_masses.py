@@ -8,7 +8,7 @@ from ....model.assembly import Bushes, Masses, Scalars, concatenated
 from ..text.deck import Deck
 from ..text.table import Cards
 from .axial_bushes import cbush1d, cvisc
-from .context import Context
+from .context import Context, with_property
 
 Values = dict[int, tuple[float, float]]
 
@@ -285,16 +285,11 @@ def _cgap(ctx: Context, cards: Cards) -> Bushes:
     EID PID GA GB X1 X2 X3 CID, the fields of a CBUSH; PGAP: PID U0 F0 KA KB KT MU1 MU2. A gap
     without an initial opening U0 is closed (MSC Nastran Quick Reference Guide, PGAP).
     """
-    properties, s = ctx.deck["PGAP"], ctx.scale
-    known = {int(p): i for i, p in enumerate(properties.unique())}
+    s = ctx.scale
     nodes = np.stack([ctx.rows(cards, cards.integers(k, 0), ground=True) for k in (3, 4)], axis=1)
     nodes = np.where((nodes[:, 0] < 0)[:, None], nodes[:, ::-1], nodes)
     K = np.zeros((len(cards), 6))
-    for i, pid in enumerate(cards.properties().tolist()):
-        if pid not in known:
-            there = ", ".join(map(str, sorted(known)[:8])) or "none"
-            raise cards.refuse(i, f"there is no PGAP {pid}; there are {there}")
-        card = properties.single(known[pid])
+    for i, card in with_property(ctx.deck, cards):
         KA = card.real(0, 4, 0.0)
         K[i, 0] = card.real(0, 5, _OPEN * KA)
         if card.real(0, 2, 0.0) <= 0:

@@ -30,10 +30,11 @@ HARMLESS: Final = _by_name({  # {card: what it is for}; those that matter are no
     """OMIT OMIT1 ASET ASET1 BSET BSET1 CSET CSET1 QSET QSET1 USET USET1 BNDFIX BNDFIX1 BNDFREE
     BNDFRE1 SET1 SET2 SET3 SELABEL PARVEC GROUP BSURF BSURFS ELIST""",
     "properties and materials that no element here names":
-    """PBUSHT PELAST PDAMPT PBEND PBEAM3 PBCOMP PBMSECT PBRSECT PBUSH2D PSEAM
-    PSHEAR PRAC2D PRAC3D PLPLANE PLSOLID PCONEAX PTRPLT1 PDUM1 PAABSF PACABS PACBAR PACINF
+    """PBUSHT PELAST PDAMPT PBEAM3 PBCOMP PBMSECT PBRSECT PBUSH2D PSEAM
+    PRAC2D PRAC3D PLPLANE PLSOLID PCONEAX PTRPLT1 PDUM1 PAABSF PACABS PACBAR PACINF
     PPLANE PSHLN1 PSHLN2 PSLDN1 PCOMPLS PCOMPF PCOMPS PDAMP5 PHBDY MAT3 MAT4 MAT5 MAT10 MAT11
     MATF MATG MATHE MATHP MATS1 MATVE MATVP CREEP SWLDPRM""",
+    "normals of shells at grids": "SNORM",
     "damping, which acts where RSDAMP of the case control selects it": "DAMPING HYBDAMP",
     "settings of contact and glue, without which they are nothing":
     "BCPARA BCPARM BCTPARA BCTPARM BCRPARA BGPARM BCBMRAD BFRIC",
@@ -74,14 +75,12 @@ SELECTED: Final = _by_name({  # {card: meaning}; harmless where no command of th
 })  # fmt: skip
 REFUSED: Final = _by_name({  # {card: what of the structure it stands for}
     "quadrilaterals of plane strain": "CQUAD",
-    "shear panels": "CSHEAR",
-    "curved beams": "CBEND CBEAM3",
+    "curved beams of three grids": "CBEAM3",
     "axisymmetric structure":
     "CTRIAX CTRIAX6 CQUADX CQUADX4 CQUADX8 CTRAX3 CTRAX6 CCONEAX AXIC RINGAX FORCEAX AXIF AXSLOT",
     "spot welds, fasteners and seams": "CSEAM CBUTT CFILLET CSPOT",
     "bushings in two directions": "CBUSH2D",
-    "a matrix of stiffness": "GENEL",
-    "ties": "RSPLINE RTRPLT1 RJOINT RSSCON RBE2GS RBE2F RBAR1 MPCREIG MPCY",
+    "ties": "RTRPLT1 RJOINT RSSCON RBE2GS RBE2F RBAR1 MPCREIG MPCY",
     "bolts with a preload": "BOLT",
     "lines in contact": "BLSEG BCONP",
     "elements that absorb sound": "CHACAB CHACBR CAABSF CACINF3 CACINF4",
@@ -92,7 +91,6 @@ REFUSED: Final = _by_name({  # {card: what of the structure it stands for}
     GMSPC GMSURF""",
     "superelements": "SESET SEBSET SEBSET1 SEQSET SEQSET1 SEELT CSUPER CSUPEXT SECONCT SEBULK",
     "rotors": "ROTORD ROTORG RSPINR RSPINT RGYRO UNBALNC",
-    "normals of shells": "SNORM",
     "thickness at grids": "NTHICK",
 })  # fmt: skip
 

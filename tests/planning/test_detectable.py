@@ -11,8 +11,8 @@ from chladni.inference.map_fit import MassMeasurement
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni.model.point_masses import with_masses
-from chladni.search.detectable import detectable
 from chladni.search.question import Question
+from chladni_planning.detectable import detectable
 from chladni_specimens.plates import plate
 
 MADE = plate(0.3, 0.22, 6, 6, 1e-3)

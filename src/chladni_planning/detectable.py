@@ -8,29 +8,18 @@ also holds the errors of the mesh and of the model's form. A change that calibra
 is therefore not counted. Held-out data count like the other data.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..fem.modelled import modelled
-from ..inference.hypothesis_fit import UpdatingProblem
-from ..inference.likelihood import LN10, Responses
-from ..inference.residual_localisation import bumps
-from ..inference.scan import baseline, field_slopes, point_scores
-from ..inference.sensor_errors import sensor_errors
-from ..reduced.reduced_model import evaluate
-from .diagnosis import threshold
-from .nuisances import measured_on, mesh_hidden, nuisances
-from .preparation import (
-    SOLVED,
-    ZETA,
-    equalised_lines,
-    ready_for_responses,
-    updating_problem,
-)
-from .question import Question
+from chladni.inference.likelihood import Responses
+from chladni.inference.residual_localisation import bumps
+from chladni.inference.scan import baseline, field_slopes, point_scores
+from chladni.reduced.reduced_model import evaluate
+from chladni.search.diagnosis import threshold
+from chladni.search.question import Question
+from chladni.search.simulated_test import NOISE, unmeasured
 
-NOISE = 0.01  # of |H|, at every line that is compared
 MASSES = np.geomspace(1e-5, 0.3, 40)  # tried, of the structure's mass
 MOST_CHANGE = 0.9  # of stiffness or thickness: a change that would have to be larger is not found
 
@@ -59,34 +48,6 @@ class Detectable:
     due: float
     lines: int
     weight: float
-
-
-def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
-    """The updating problem of a planned test; its responses are the deck's own.
-
-    Parameters
-    ----------
-    question : without a recording; its band is the planned band
-    noise : of |H|, at every line that is compared
-    """
-    low, f_max = question.band
-    nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
-    built = nominal.structure
-    rows = question.outputs.rows(built), question.inputs.rows(built)
-    mesh = mesh_hidden(nominal, f_max, measured_on(question))
-    reduced = ready_for_responses(question, nominal, f_max)
-    f = equalised_lines((low, f_max), question.exclude, ZETA)
-    s = 2 * np.pi * f * (ZETA + 1j)
-    shape = (len(s), len(question.outputs.labels), len(question.inputs.labels))
-    unit = Responses(
-        np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
-        noise=np.full(shape, noise / LN10),
-        direct=question.outputs.moved_with_base(question.inputs),
-        sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
-    ).rebased(reduced.model)  # fmt: skip
-    problem = updating_problem(question, reduced, unit, nuisances(reduced, nominal, mesh), f_max)
-    state = evaluate(reduced.model, problem.base, problem.mean())
-    return replace(problem, data=replace(unit, values=unit.model(state)))
 
 
 def detectable(question: Question, noise: float = NOISE) -> Detectable:

@@ -65,3 +65,21 @@ def gain_due(tried: int, chance: float) -> float:
     (Markov). The families that were tried share the chance of a false alarm.
     """
     return 2 * math.log(tried / chance)
+
+
+def required_gain(poles: bool, tried: int, expected: bool = False) -> float:
+    """Gain in -2 ln evidence required to name one of so many families, from poles or responses.
+
+    A property that a material usually has is no false alarm (wood is stiffer along its grain). It
+    only has to be separated from calibration, as two explanations are.
+    """
+    due = gain_due(tried, RULES.chance_of_poles if poles else RULES.chance_of_responses)
+    return min(due, RULES.expected_due) if expected else due
+
+
+def fits(p: float) -> bool:
+    """True if a test of fit with this p leaves a cause outside the catalogue less than even odds.
+
+    NaN is no test.
+    """
+    return odds_of_something_else(p, RULES.something_else) < 1

@@ -1,20 +1,19 @@
 """What follows from rows of numbers: names, ties, doubts and refusals, each at its limit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from chladni.decision.decide import decide
-from chladni.decision.decision_rules import RULES, TIED, gain_due, odds_of_something_else
-from chladni.decision.hypotheses import AlternativeRow, Left, fits
-from chladni.decision.reasons import ALONE, BEYOND, Reason
-from chladni.decision.tied import leading, tied
+from chladni.search.decide import decide, tied
+from chladni.search.decision_in_words import BEYOND, Reason
+from chladni.search.decision_rules import RULES, TIED, fits, gain_due, odds_of_something_else
+from chladni.search.hypotheses import ALONE
+from chladni.search.search_round import simplest_first
+from chladni.search.several import AlternativeRow
 
-from .tables import FOR, SERVES, named, over, row, table, together
+from .decision_tables import FOR, SERVES, Row, named, over, row, table, together
 
 DUE = gain_due(1, RULES.chance_of_responses)  # of one family
 FOUR = gain_due(4, RULES.chance_of_responses)
@@ -22,19 +21,19 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
 R = Reason
 
 
-def one(gain, news=FOR, left=SERVES, **more):
-    return table(row("crack", gain, news=news, left=left), **more)
+def one(gain, news=FOR, Q=SERVES, **more):
+    return table(row("crack", gain, news=news, Q=Q), **more)
 
 
-def with_left(fitted, held_out):
-    return Left((1.0, fitted), (1.0, held_out))
+def with_Q(fitted, held_out):
+    return (1.0, fitted), (1.0, held_out)
 
 
 OPEN = (ALONE, "crack", BEYOND)
 
 
 @pytest.mark.parametrize(
-    ("gain", "news", "left", "why", "one_of"),
+    ("gain", "news", "Q", "why", "one_of"),
     [
         (1000.0, 0.0, (0.1, 1.0), R.NAMED, ()),  # data that cannot feel it, or none
         (1000.0, -DUE - 1, (0.1, 1.0), R.NAMED, ()),  # all data together
@@ -46,20 +45,20 @@ OPEN = (ALONE, "crack", BEYOND)
         (1.9 * DUE, -2 * DUE, (0.1, 1.0), R.AGAINST, ()),
     ],
 )
-def test_data_no_fit_saw_can_refuse_a_name(gain, news, left, why, one_of):
+def test_data_no_fit_saw_can_refuse_a_name(gain, news, Q, why, one_of):
     """What is refused refutes nothing: calibration fits, and all data together leave it open."""
-    found = decide(one(gain, news, with_left(*left)))
+    found = decide(one(gain, news, with_Q(*Q)))
     assert (found.reason, found.one_of) == (why, one_of)
     assert found.verdict == (NAMED if found.named else LITTLE)
     assert found.named == (why is R.NAMED)
-    unfit = decide(one(gain, news, with_left(*left), null=row("", 0.0, p=0.005)))
+    unfit = decide(one(gain, news, with_Q(*Q), null=row("", 0.0, p=0.005)))
     assert unfit.verdict == (NAMED if found.named else REST)
     assert unfit.one_of == (("crack", BEYOND) if why is R.WORSE else ())
 
 
 def test_a_leader_that_cannot_be_fitted_again_leaves_the_name_to_the_next():
     """It is one hypothesis lost, and the answer is that of the others."""
-    lost = {"crack": {"fitted": False}}
+    lost = {"crack": {"lost": "it is no structure"}}
     assert named(table(row("crack", 100.0), row("point-mass", 99.0), then=lost)) == "point-mass"
     found = decide(table(row("crack", 100.0), then=lost))
     assert (found.verdict, found.reason, found.named) == (REST, R.NOT_FITTED, False)
@@ -68,22 +67,24 @@ def test_a_leader_that_cannot_be_fitted_again_leaves_the_name_to_the_next():
 def test_a_set_that_cannot_be_fitted_again_is_refused():
     made = together((80.0, 80.0), DUE)
     singles = [row("crack", 100.0), row("point-mass", 90.0)]
-    assert decide(table(*singles, sets=[made])).whole is not None
-    found = decide(table(*singles, sets=[made], then={"crack and point-mass": {"fitted": False}}))
-    assert found.whole is None
-    assert R.SET_REFUSED in {s.reason for s in found.steps}
+    assert decide(table(*singles, sets=[made])).order[0].together
+    found = decide(
+        table(*singles, sets=[made], then={"crack and point-mass": {"lost": "it is no structure"}})
+    )
+    assert not found.order[0].together
+    assert "they could not be fitted again: it is no structure" in "".join(found.sentences)
 
 
 def test_a_renewed_fit_that_lost_its_gain_is_not_named():
-    made = one(1.2 * DUE, 0.0, then={"crack": {"neg2_log_evidence": -0.9 * DUE}})
+    made = one(1.2 * DUE, 0.0, then={"crack": {"gain": 0.9 * DUE}})
     assert decide(made).reason is R.TOO_LITTLE
 
 
 def test_a_fault_of_a_channel_is_asked_of_what_that_recorded_and_no_fit_saw():
     """Of all that was fitted it explains little."""
-    fault = {"physics": False, "channels": True}
+    fault = {"physics": False}
     for held_out, verdict in ((0.9, "measurement fault"), (1.1, LITTLE)):
-        made = table(row("sensor-fault", 1e3, left=with_left(1.1, held_out), **fault))
+        made = table(row("sensor-fault", 1e3, Q=with_Q(1.1, held_out), **fault))
         assert decide(made).verdict == verdict
 
 
@@ -95,7 +96,7 @@ def test_all_poles_together_may_bear_a_name(gain, news, name):
     due = gain_due(1, RULES.chance_of_poles)
     made = one(gain * due, news * due, poles=True)
     assert named(made) == name
-    assert named(replace(made, enough=False)) == name  # odds, not a number of modes, bear a name
+    assert named(made.but(enough=False)) == name  # odds, not a number of modes, bear a name
 
 
 @pytest.mark.parametrize(
@@ -124,7 +125,7 @@ def test_too_few_data_list_what_explains_them():
         assert (found.verdict, found.reason, found.one_of) == (REST, R.TOO_FEW, one_of)
     apart = table(row("point-mass", 90.0), row("crack", 90.0 - 1.1 * tied), enough=False)
     assert named(apart) == "point-mass"
-    assert named(replace(apart, contradicted=False)) == ""
+    assert named(apart.but(contradicted=False)) == ""
 
 
 def test_what_a_material_has_as_a_rule_needs_less():
@@ -144,8 +145,8 @@ def test_something_else_wins_from_its_own_odds():
     assert odds[2] < 1 < odds[3]
     assert fits(0.02)
     assert not fits(0.009)
-    assert row("crack", 0.0, p=0.02).fits
-    assert not row("crack", 0.0, p=0.02, p_damping=1e-4).fits
+    assert row("crack", 0.0, p=0.02).chances.fits
+    assert not row("crack", 0.0, p=0.02, p_damping=1e-4).chances.fits
 
 
 def test_what_leaves_more_than_its_own_draws_is_not_named():
@@ -160,10 +161,8 @@ def test_what_leaves_more_than_its_own_draws_is_not_named():
 
 def behind(gains, sound=("point-mass",), **more):
     """mass-patch leads and is refused: its deck is worse."""
-    worse, names = with_left(0.1, 2.0), ("mass-patch", "point-mass", "crack", "suspension")
-    rows = (
-        row(n, g, left=SERVES if n in sound else worse) for n, g in zip(names, gains, strict=True)
-    )
+    worse, names = with_Q(0.1, 2.0), ("mass-patch", "point-mass", "crack", "suspension")
+    rows = (row(n, g, Q=SERVES if n in sound else worse) for n, g in zip(names, gains, strict=True))
     return table(*rows, **more)
 
 
@@ -182,7 +181,7 @@ def test_a_rival_that_nothing_refuses_is_the_answer():
 def test_the_next_is_asked_where_a_rival_is_refused_too():
     found = decide(behind((GAIN, GAIN - 1, GAIN - 2, 0.0), sound=("crack",)))
     assert over(found) == (("mass-patch", R.WORSE), ("point-mass", R.WORSE))
-    lost = {"point-mass": {"fitted": False}}
+    lost = {"point-mass": {"lost": "it is no structure"}}
     made = behind((GAIN, GAIN - 1, GAIN - 2, 0.0), sound=("point-mass", "crack"), then=lost)
     assert over(decide(made))[1] == ("point-mass", R.NOT_FITTED)
 
@@ -219,8 +218,7 @@ def test_a_set_that_pays_comes_before_one_effect():
     made = table(*SINGLES, sets=[together(PAID, TWO)])
     found = decide(made)
     assert (named(made), found.reason) == ("crack and point-mass", R.TOGETHER)
-    assert found.whole is not None
-    assert found.whole.gains == PAID
+    assert found.order[0].together.gains == PAID
 
 
 @pytest.mark.parametrize(
@@ -228,7 +226,7 @@ def test_a_set_that_pays_comes_before_one_effect():
     [
         {"news": (FOR, -2 * TWO)},  # of one of them
         {"p": 0.005},  # together they do not fit
-        {"left": with_left(0.1, 2.0)},  # the deck with both is worse
+        {"Q": with_Q(0.1, 2.0)},  # the deck with both is worse
         {"ahead": 0.9 * TWO},  # hardly ahead of one alone
     ],
 )
@@ -240,7 +238,7 @@ def test_all_must_be_supported_by_data_that_no_fit_saw(more):
 
 
 def test_a_set_whose_renewed_fit_lost_the_gain_is_not_named():
-    lost = {"crack and point-mass": {"neg2_log_evidence": -1e3 + 1.5 * TWO}}
+    lost = {"crack and point-mass": {"gain": 1e3 - 1.5 * TWO}}
     none = (0.0, 0.0)
     made = table(*SINGLES, sets=[together(PAID, TWO, none)], then=lost)
     assert named(made) == "crack"
@@ -256,10 +254,10 @@ def test_what_may_stand_in_the_place_of_one_is_one_of_several():
 
 
 def test_an_effect_that_pays_a_part_is_perhaps_there_as_well():
-    other = replace(together(PART, TWO), hypothesis=row("crack and suspension", 1e3))
-    steps = decide(table(*SINGLES, sets=[other, together(PAID, TWO)])).steps
-    perhaps = [s.whole.members[s.member] for s in steps if s.reason is R.PERHAPS_PRESENT]
-    assert perhaps == ["suspension"]
+    other = together(PART, TWO, names="crack and suspension")
+    said = decide(table(*SINGLES, sets=[other, together(PAID, TWO)])).sentences
+    (perhaps,) = (s for s in said if "may be present too" in s)
+    assert "with crack and point-mass in place suspension gains" in perhaps
 
 
 # ties and doubts
@@ -302,7 +300,7 @@ def test_what_leads_without_a_name_leaves_calibration_in_doubt(gains, one_of):
 @pytest.mark.parametrize(("vote", "one_of"), [(1.0, ("crack", BEYOND)), (-1.0, ())])
 def test_where_calibration_does_not_fit_a_leader_that_gains_little_is_one_of(vote, one_of):
     """It, or what the catalogue does not hold; not where other data are against it."""
-    lost = {"crack": {"neg2_log_evidence": -0.6 * DUE, "news": vote}}
+    lost = {"crack": {"gain": 0.6 * DUE, "news": vote}}
     made = table(row("crack", DUE + 1, news=0.0), null=row("", 0.0, p=0.005), then=lost)
     found = decide(made)
     assert (found.verdict, found.one_of) == (REST, one_of)
@@ -324,40 +322,44 @@ def test_what_relieves_strained_joints_is_one_of_both():
 # the leader of a round
 
 
+def leads(rows, null):
+    """Position of the row that leads."""
+    fits = [one.fit for one in rows]
+    return fits.index(simplest_first(fits, null)[0])
+
+
 def test_a_leader_that_is_a_simpler_effect_lets_it_lead():
     lump, mass = row("local-resonator", 0.0, becomes="point-mass"), row("point-mass", 1 - TIED)
     far, foot = row("point-mass", -TIED - 1), 100 * (TIED + 1)
-    assert leading([lump, mass], 500.0) == 1
-    assert leading([lump, far], 500.0) == 0
-    assert leading([lump, far], foot + 1) == 1  # its foot is a hundredth of what was gained
-    assert leading([row("local-resonator", 0.0), mass], 500.0) == 0
-    assert leading([replace(lump, becomes="", nearly="point-mass"), mass], 200.0) == 1
+    assert leads([lump, mass], 500.0) == 1
+    assert leads([lump, far], 500.0) == 0
+    assert leads([lump, far], foot + 1) == 1  # its foot is a hundredth of what was gained
+    assert leads([row("local-resonator", 0.0), mass], 500.0) == 0
+    assert leads([row("local-resonator", 0.0, nearly="point-mass"), mass], 200.0) == 1
 
 
 def test_a_value_a_thing_cannot_have_yields_to_one_it_can():
-    string, hem = row("adhesive-stiffness", 0.0, sound=False), row("hem-contact", 1 - TIED)
-    assert leading([string, hem], 500.0) == 1
-    assert leading([string, row("hem-contact", -TIED - 1)], 500.0) == 0
-    assert leading([replace(string, sound=True), hem], 500.0) == 0
+    string, hem = row("adhesive-stiffness", 0.0), row("hem-contact", 1 - TIED)
+    assert leads([string, hem], 500.0) == 1
+    assert leads([string, row("hem-contact", -TIED - 1)], 500.0) == 0
+    assert leads([row("adhesive-stiffness", 0.0, implausible=""), hem], 500.0) == 0
 
 
 # the function itself
 
 
-class Unread:
-    """Numbers that nobody may read."""
-
-    def __getattr__(self, name):
-        raise AssertionError(f"{name} was read")
-
-
 def test_no_number_is_read_that_the_decision_does_not_need():
     """A leader that is named says nothing of its rivals, nor of calibration alone."""
-    null, rival = (replace(h, costly=Unread()) for h in (row("", 0.0), row("point-mass", 950.0)))
+    unread = {"p", "p_damping", "news", "Q", "then"}
+
+    def quiet(one):
+        return Row(**{k: v for k, v in one.given.items() if k not in unread})
+
     made = table(row("crack", 1e3))
-    assert decide(replace(made, null=null, singles=(*made.singles, rival))).named
+    null, rival = quiet(row("", 0.0)), quiet(row("point-mass", 950.0))
+    assert decide(made.but(null=null, singles=(*made.singles, rival))).named
     with pytest.raises(AssertionError, match="p was read"):
-        decide(replace(table(), null=null))
+        decide(table().but(null=null))
 
 
 ROWS = st.builds(
@@ -366,7 +368,7 @@ ROWS = st.builds(
     st.floats(-20, 200),
     st.sampled_from((0.001, 0.03, 0.5, 0.95)),
     st.floats(-60, 60),
-    st.builds(with_left, st.floats(0, 2), st.floats(0, 2)),
+    st.builds(with_Q, st.floats(0, 2), st.floats(0, 2)),
     strained=st.booleans(),
 )
 
@@ -375,16 +377,16 @@ ROWS = st.builds(
 @given(st.lists(ROWS, max_size=4, unique_by=lambda h: h.name), st.booleans())
 def test_every_table_has_a_verdict_with_its_reason(rows, enough):
     """A name gained what is due of all data, was tested, and is the first in order."""
-    made = table(*sorted(rows, key=lambda r: r.neg2_log_evidence), enough=enough)
+    made = table(*sorted(rows, key=lambda r: r.fit.neg2_log_evidence), enough=enough)
     found = decide(made)
     again = decide(made)  # nothing is remembered
     assert (again.verdict, again.order, again.one_of) == (found.verdict, found.order, found.one_of)
     assert found.named == (found.verdict in (NAMED, "measurement fault"))
     if found.named:
         lead = found.order[0]
-        assert made.gain(lead) + lead.numbers.news > found.due
+        assert made.gain(lead) + lead.news > found.due
         assert enough or len(found.one_of) < 2
-        assert lead.fits
+        assert lead.chances.fits
     else:
         assert found.reason is not R.NAMED
 

@@ -1,0 +1,231 @@
+"""Hypotheses of a diagnosis: the tests, scores and decks of each are made when they are read."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from ..effects.effect import Effect
+from ..errors import ModelError
+from ..inference.adequacy import FitTest, of_poles
+from ..inference.held_out_evidence import held_out_evidence
+from ..inference.hypothesis_fit import HypothesisFit
+from ..inference.implausible_values import strained
+from ..inference.least_data import CONTRADICTED
+from ..inference.likelihood import Responses
+from ..inference.local_damping_test import damping_test_along_effect
+from ..inference.pole_data import Poles
+from ..inference.written_hypothesis import as_written
+from .basis_refinement import refined
+from .decision_rules import RULES
+from .diagnosis import Diagnosis, FitChances, fit_test
+from .question import Prepared, Question
+from .search_round import on_common_basis, taken
+from .several import Several
+from .verdict_models import scores_of
+
+ALONE = "calibration alone"
+
+
+@dataclass(eq=False)
+class Explanation:
+    """One explanation; every test, score and deck of it is made once, and when it is read."""
+
+    case: "Hypotheses"
+    fit: HypothesisFit
+    rival: bool = False  # whether it is behind the leader, and has lost the model of its own
+    together: Several | None = None  # its members and what each gains, of several effects
+    known: FitChances | None = None  # its test of fit, where it was made before
+    # of the refinement that made its fit
+    note: str = ""
+    distrust: tuple[str, ...] = ()
+    lost: str = ""  # why it could not be fitted again
+    after: FitTest | None = None  # of the damping it leaves along the change of a leader
+    forgotten: bool = False  # whether its model is gone
+
+    @property
+    def name(self) -> str:
+        """Names of its effects in words."""
+        return ALONE if type(self.fit.effect) is Effect else self.fit.name
+
+    @cached_property
+    def strained(self) -> bool:
+        """True if the factor of a joint family exceeds the usual scatter of joints."""
+        return bool(strained(self.fit.fit))
+
+    @cached_property
+    def chances(self) -> FitChances:
+        """The test of fit."""
+        return self.known or fit_test(self.case.prepared.problem, self.fit)
+
+    @cached_property
+    def news(self) -> float:
+        """Gain over calibration on the held-out data, in 2 ln predictive density; 0 without any."""
+        prepared, null = self.case.prepared, self.case.found.null
+        return held_out_evidence(prepared.problem, prepared.unseen.choosing, null, self.fit)
+
+    def news_of(self, member: int) -> float:
+        """Gain of one of several effects on the held-out data, with the others in place."""
+        prepared, s = self.case.prepared, self.together
+        assert s is not None
+        unseen, without = prepared.unseen.choosing, s.without[member]
+        return held_out_evidence(prepared.problem, unseen, without, s.own, s.about)
+
+    @cached_property
+    def written(self) -> HypothesisFit:
+        """The hypothesis in the form of a deck."""
+        return as_written(self.fit, self.case.prepared.problem.mass_measurement)
+
+    @cached_property
+    def halved(self) -> HypothesisFit:
+        """The hypothesis in the form of a deck with every shell halved."""
+        return as_written(self.fit, self.case.prepared.problem.mass_measurement, halved=True)
+
+    @cached_property
+    def Q(self) -> tuple[tuple[float, float], ...]:
+        """Q of the calibrated deck and of its own, on the fitted and on the choosing data.
+
+        Both have the mesh that the data prefer: an effect may be smaller than the error of a mesh.
+        """
+        prepared, found = self.case.prepared, self.case.found
+        decks = (found.halved[0], self.halved) if found.halved else (found.plain, self.written)
+        stages = [(deck, deck.fit.state) for deck in decks]
+        return tuple(
+            (a, b) for a, b in scores_of(prepared, self.fit, stages, prepared.held.choosing)
+        )
+
+    @property
+    def worse(self) -> bool:
+        """True if the deck with an effect has a larger Q than the calibrated deck.
+
+        Physics must not worsen the fitted data either, and physics that no card holds has no deck
+        to compare. A fault of a few channels is compared on the held-out data of these channels.
+        """
+        physics = self.fit.physics
+        if physics and not any(e.traits.writable for e in self.fit.effects):
+            return False
+        compared = self.Q if physics else self.Q[1:]
+        return any(with_it > calibrated for calibrated, with_it in compared)
+
+    @cached_property
+    def refined(self) -> "Explanation":
+        """The hypothesis fitted again on an accurate model; a rival first gets its own basis."""
+        case = self.case
+        try:
+            made = refined(case.question, case.prepared, self.whole)
+        except ModelError as error:
+            return Explanation(case, self.fit, together=self.together, lost=str(error))
+        again = Explanation(
+            case, made.hypothesis, together=self.together, note=made.note, distrust=made.distrust
+        )
+        if self.rival:
+            if case.spare is not None:
+                case.spare.forget_model()
+            case.spare = again
+        return again
+
+    @property
+    def whole(self) -> HypothesisFit:
+        """The fit with a model of its own: a diagnosis keeps only its leader's."""
+        if not (self.rival or self.forgotten):
+            return self.fit
+        null, problem, effect = (
+            self.case.found.null.data,
+            self.case.prepared.problem,
+            self.fit.effect,
+        )
+        assert isinstance(null, (Responses, Poles))
+        problem = replace(problem, data=null.rebased(problem.reduced.model))
+        base = taken(problem, self.fit, ("calibration", "nuisance"))
+        return problem.fitted_with(effect, self.fit.fit.of(effect), base)
+
+    def p_after(self, leader: "Explanation") -> float:
+        """P of the test that the damping it leaves follows the change by a leader."""
+        damping, test = self.case.prepared.problem.damping, self.chances.test
+        if test is None or damping is None:
+            return 1.0
+        left = damping.beyond(self.fit.fit.state)
+        self.after = damping_test_along_effect(test, leader.fit, left)
+        return self.after.p
+
+    def forget_model(self) -> None:
+        """Keep the fit, not the vectors that were added to the basis for it."""
+        self.fit = on_common_basis(self.case.prepared.problem, self.fit)
+        for form in ("written", "halved"):
+            vars(self).pop(form, None)
+        self.forgotten = True
+
+
+@dataclass(eq=False)
+class Hypotheses:
+    """All hypotheses of a diagnosis, and the problem on which one of them is fitted again."""
+
+    question: Question
+    prepared: Prepared
+    found: Diagnosis
+    # the last rival that was fitted again; it keeps its model, 10 to 300 MB on a tailgate, until
+    # the next one is
+    spare: Explanation | None = None
+
+    @cached_property
+    def null(self) -> Explanation:
+        """Calibration alone."""
+        return self._of(self.found.null)
+
+    @cached_property
+    def singles(self) -> tuple[Explanation, ...]:
+        """The best of every family, best first."""
+        return tuple(self._of(t, k > 0) for k, t in enumerate(self.found.hypotheses))
+
+    @cached_property
+    def sets(self) -> tuple[Explanation, ...]:
+        """Several effects together, in the order in which the sets grew."""
+        return tuple(Explanation(self, s.hypothesis, together=s) for s in self.found.sets)
+
+    def _of(self, fit: HypothesisFit, rival: bool = False) -> Explanation:
+        return Explanation(self, fit, rival, known=self.found.chances.get(fit.name))
+
+    @cached_property
+    def poles(self) -> bool:
+        """True if natural frequencies are compared."""
+        return isinstance(self.found.null.data, Poles)
+
+    @cached_property
+    def enough(self) -> bool:
+        """True if there are data enough to separate explanations as a rule."""
+        return not self.prepared.too_little
+
+    @cached_property
+    def contradicted(self) -> bool:
+        """True if there are more numbers than any effect has unknowns."""
+        return self.prepared.numbers >= CONTRADICTED
+
+    def gain(self, one: Explanation) -> float:
+        """Gain over calibration alone, in -2 ln evidence."""
+        return self.found.two_log_bayes_factor(one.fit)
+
+    def due(self, one: Explanation) -> float:
+        """Gain required to name one; a set counts in addition to the families tried."""
+        return self.found.due_of(one.fit, more=one.together is not None)
+
+    @property
+    def calibrated(self) -> str:
+        """The verdict where nothing is named; joints beyond their usual scatter are calibrated.
+
+        No rule of evidence keeps a deck whose natural frequencies are farther off than those of any
+        model. Wide priors would charge its calibration more than it gains on few frequencies.
+        """
+        deck = self.found.nominal
+        data = deck.data
+        misfits = isinstance(data, Poles) and not of_poles(data, deck.fit.state).passes
+        changed = misfits or -self.found.two_log_bayes_factor(deck) > RULES.changed
+        return "calibration only" if changed or self.null.strained else "nothing missing"
+
+    def suffices(self, gain: float, due: float, news: Callable[[], float]) -> bool:
+        """True if fitted and held-out data together bring the required gain ``due``.
+
+        P(fitted) P(held out | fitted) = P(both): the evidence of all data is the sum of both gains.
+        Fitted responses must bring ``good_part`` of it. Natural frequencies are few, and any part
+        will do.
+        """
+        part = 0.0 if self.poles else RULES.good_part
+        return gain > part * due and gain + news() > due
