@@ -4,6 +4,7 @@
 first time); ``-t quick`` leaves the tutorials' results out.
 """
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ numpydoc_xref_param_type = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "chladni"
+html_context = {"default_mode": "auto"}  # light or dark as the browser says
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
@@ -52,7 +54,7 @@ html_math_renderer = "mathml"
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,
-    "navigation_depth": 2,  # the sidebar lists pages, and no Python names
+    "navigation_depth": 2,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],
@@ -63,6 +65,19 @@ html_theme_options = {
 def _bars(app: Any, what: str, name: str, value: object, options: object, lines: list[str]) -> None:
     """Escape the bars of formulas, |φ|², which reStructuredText takes for substitutions."""
     lines[:] = [x if x.lstrip().startswith(">>>") else x.replace("|", r"\|") for x in lines]
+
+
+def _described(
+    app: Any, what: str, name: str, value: object, options: object, lines: list[str]
+) -> None:
+    """Take ``name : meaning`` of parameters and attributes as their meaning, not as a type."""
+    section, out = "", []
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        section = line if re.fullmatch("-{3,}", below) else section
+        found = re.fullmatch(r"(\*{0,2}\w+(?:, \w+)*) : (.+)", line)
+        listed = found is not None and section in ("Parameters", "Attributes")
+        out += [found[1], f"    {found[2]}"] if listed else [line]
+    lines[:] = out
 
 
 def setup(app: Any) -> None:
@@ -88,4 +103,5 @@ def setup(app: Any) -> None:
     reference_pages.write(DOCS / "reference")
     app.connect("builder-inited", run)
     app.connect("source-read", show)
+    app.connect("autodoc-process-docstring", _described, priority=400)  # before numpydoc
     app.connect("autodoc-process-docstring", _bars, priority=600)  # after numpydoc
