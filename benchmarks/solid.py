@@ -1,7 +1,7 @@
 """Twenty modes of a free solid of CTETRA10: this package against its peers.
 
     python benchmarks/solid.py             # 300 thousand dofs
-    python benchmarks/solid.py 30          # a tenth of that, a minute
+    python benchmarks/solid.py 30          # a tenth of that, two minutes
     python benchmarks/solid.py 300 --without superlu
 
 Every figure is the processor time of one thread in a process of its own, from matrices in memory to

@@ -1,5 +1,7 @@
 """Problems of an environment from a case folder or deck."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -9,9 +11,11 @@ import numpy as np
 from chladni.arguments import settings_of
 from chladni.case import Case, load_case
 from chladni.effects.effect import Effect, Parameter
-from chladni.errors import FileError
+from chladni.errors import FileError, ShapeError
 from chladni.inference.likelihood import Responses
 from chladni.reduced.reduced_model import State, evaluate
+from chladni.search.next_measurement import Outlook, with_common_candidates
+from chladni.workflows.before_any_test import before_any_test
 from chladni.workflows.given_case import Source
 from chladni.workflows.loaded_model import is_case, model_in_si, opened
 from chladni.workflows.question_of_case import prepared
@@ -19,9 +23,11 @@ from chladni_planning import (
     Linearised,
     PlanSettings,
     find_sensor_candidates,
+    labels_not_allowed,
     motion,
     mounts_at,
     openings,
+    plan,
     seen_at,
     target_modes,
     with_places_of,
@@ -75,6 +81,44 @@ def specimen(
         cost=found.cost,
         notes=(said, *model.notes) if said else model.notes,
     )
+
+
+def outlooks(
+    case: Source,
+    effects: tuple[str, ...],
+    *,
+    sensors: Any = None,
+    units: str | None = None,
+    regions: Sequence[str] = (),
+    fixed: Sequence[str] = (),
+    forbidden: Sequence[str] = (),
+    **words: Any,
+) -> tuple[Outlook, ...]:
+    """Outlooks of a planned test, with candidates at allowed places.
+
+    Parameters
+    ----------
+    sensors : number, plan or file of the planned test; default those of the case
+    words : of :func:`chladni.workflows.before_any_test.before_any_test`
+    """
+    given = opened(case, units)
+    places = PlanSettings(regions=regions, fixed=fixed, forbidden=forbidden, draws=0)
+    settings = with_places_of(given, places)
+    model, _ = model_in_si(given, "next")
+    if isinstance(sensors, int):
+        modes = max(1, 4 * sensors // 5)
+        sensors = plan(model, replace(settings, sensors=sensors, modes=modes))
+    elif isinstance(sensors, str):
+        sensors = Path(sensors)
+    source = given if isinstance(given, Case) else model
+    tests = before_any_test(source, effects, sensors, **words).open
+    if not tests:
+        raise ShapeError("the planned test leaves nothing open; give fewer sensors")
+    every = with_common_candidates([t.outlook for t in tests])
+    labels = [c.label for o in every for c in o.candidates if c.label]
+    rules = settings.rules(model.assembly, model.seen)
+    barred = labels_not_allowed(model.assembly, rules, labels)
+    return tuple(o.without(barred) for o in every)
 
 
 class Recorded:

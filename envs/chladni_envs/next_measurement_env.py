@@ -52,10 +52,12 @@ class NextMeasurementEnv(gym.Env[np.ndarray, np.int64]):
     price : bits that a unit of cost takes
     without : kinds or dofs that are no candidates; with drive, mass, band and weighing, sensors
         are placed so that they separate the explanations
-    case : a deck or case; with ``effects`` it gives outlooks, as ``chladni next`` does before any
-        test
+    case : a deck, a model or a case; with ``effects`` it gives outlooks, as ``chladni next`` does
+        before any test
     effects : names of effects, two and more
-    words : ``sensors``, ``top``, ``articles``, ``seed``, ``units`` as ``before_any_test`` has them
+    words : ``top``, ``articles``, ``seed``, ``units`` as ``before_any_test`` has them; ``sensors``
+        may be a number too. ``regions``, ``fixed`` and ``forbidden`` as ``chladni.plan`` has them:
+        no candidate is elsewhere.
 
     ``info`` holds the ``names`` of the explanations and their ``probability``, the ``labels`` of
     the candidates, ``kept``: those that were made, and ``truth``, the position of the true name.
@@ -76,7 +78,7 @@ class NextMeasurementEnv(gym.Env[np.ndarray, np.int64]):
         render_mode: str | None = None,
         **words: Any,
     ) -> None:
-        every = _outlooks(outlook, case, effects, words)
+        every = _outlooks(outlook, case, effects, odds, words)
         self.outlooks = tuple(o.without(without) for o in every)
         first = self.outlooks[0]
         if len(first.names) < 2:
@@ -165,16 +167,13 @@ class NextMeasurementEnv(gym.Env[np.ndarray, np.int64]):
 
 def _outlooks(
     outlook: "Outlook | Sequence[Outlook] | str | Path | None", case: Any, effects: Sequence[str],
-    words: dict[str, Any],
+    odds: float, words: dict[str, Any],
 ) -> tuple[Outlook, ...]:  # fmt: skip
     """The outlooks of an environment, with the same candidates."""
     if case is not None:
-        from chladni.workflows.before_any_test import before_any_test
+        from .environment_cases import outlooks
 
-        tests = before_any_test(case, tuple(effects), **words).open
-        if not tests:
-            raise ShapeError("the planned test leaves nothing open; give fewer sensors")
-        return with_common_candidates([t.outlook for t in tests])
+        return outlooks(case, tuple(effects), odds=odds, **words)
     if words or effects:
         raise ShapeError(f"{', '.join([*words, *effects])}: only a case takes these; give case=")
     if outlook is None:

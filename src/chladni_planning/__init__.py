@@ -61,6 +61,7 @@ from .measurement_lines import transient_left as transient_left
 from .mounts import mounts_at as mounts_at
 from .mounts import seen_at as seen_at
 from .parameter_information import Linearised as Linearised
+from .place_words import labels_not_allowed as labels_not_allowed
 from .plan_summary import sensors_csv as sensors_csv
 from .plan_summary import summary as summary
 from .plan_workflow import plan as plan
@@ -117,6 +118,7 @@ __all__ = [
     "independence",
     "information_entropy",
     "kinetic_energy",
+    "labels_not_allowed",
     "likeness",
     "lines_for_poles",
     "lines_per_bandwidth",

@@ -34,6 +34,18 @@ class PlaceRules:
     fixed: MeasuredDofs  # sensors of every layout, wherever they are
 
 
+def labels_not_allowed(
+    assembly: Assembly, rules: PlaceRules, labels: Iterable[str]
+) -> tuple[str, ...]:
+    """Labels of grids and of centres of shells at which nothing may be; others are left out."""
+    ids = np.concatenate([assembly.ids, centre_ids(assembly)])
+    known = len(assembly.points), len(assembly.shells)
+    allowed = np.concatenate([rules.allowed[: known[0]], rules.allowed[known[0] :][: known[1]]])
+    barred = set(ids[~allowed].tolist())
+    number = {label: label.partition(":")[0] for label in labels}
+    return tuple(n for n, text in number.items() if text.isdecimal() and int(text) in barred)
+
+
 @dataclass(frozen=True)
 class _Word:
     """One word, or one row of a file of words."""

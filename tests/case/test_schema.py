@@ -102,7 +102,7 @@ OTHER = {  # another accepted value of every word
     ("model", "thickness_units"): '"SI"',
     ("model", "thickness_place"): '"aligned"',
     ("model", "damping"): "0.02",
-    ("model", "allow"): '["CSEAM"]',
+    ("model", "allow"): '["RJOINT"]',
     ("model", "outside"): "true",
     ("test", "recordings"): '["b.npz"]',
     ("test", "use"): '"b.npz"',

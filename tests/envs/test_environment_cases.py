@@ -8,17 +8,20 @@ from numpy.testing import assert_array_equal
 from tests.builders.environments import story
 from tests.builders.structures import stiffer
 
+import chladni
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
 from chladni.errors import ChladniError, ShapeError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
+from chladni.report import identification_page
+from chladni.search import measurement_forecasts
 from chladni.workflows.working_model import load
 from chladni_envs import IDS, agents
 from chladni_envs import environment_cases as cases
 from chladni_envs.parameter_selection import ParameterSelectionEnv
-from chladni_specimens.plates import folded_panel
+from chladni_specimens.plates import folded_panel, plate
 
 OF_A_CASE = tuple(i for i in IDS if i != "chladni/NextMeasurement-v0")  # it needs effects as well
 SOFT = 0.98  # of the panel's modulus in the article: its peaks move by half a half-bandwidth
@@ -102,6 +105,20 @@ def test_info_names_what_is_kept(ready, case):
     assert len(env.reset(seed=0)[1]["labels"]) == 5
 
 
+def test_identify_moves_the_test_on_the_mesh_of_its_case(case, tmp_path):
+    """As its sensors do; a recording alone, and a mesh that takes long, move sensors only."""
+    page = identification_page.identification_page
+    (drawing, *_), *_ = (s.blocks for s in page(tmp_path, chladni.identify(case)).sections)
+    sides = drawing.content.data["sides"]
+    assert list(sides) == ["expanded", "test"]
+    seen = folded_panel()
+    used = np.unique(seen.shells.nodes)
+    at = [int(np.searchsorted(used, seen.rows([int(n.partition(":")[0])])[0])) for n in SENSORS]
+    for whole, test in zip(sides["expanded"], sides["test"], strict=True):
+        z, known = np.array(whole["motion"])[2, at], np.array(test["motion"])
+        assert z @ known > 0.99 * np.linalg.norm(z) * np.linalg.norm(known)
+
+
 def test_vectors_with_a_case_are_identical(case):
     id, options = "chladni/SensorPlacement-v0", {"case": case, "modes": 8}
     assert_array_equal(story("sync", 5, id, **options), story("async", 5, id, **options))
@@ -160,6 +177,23 @@ def test_shakers_obey_the_words_of_a_plan(case):
     for id in ("chladni/SensorPlacement-v0", "chladni/ActuatorPlacement-v0"):
         with pytest.raises(ShapeError, match=r"regions, forbidden: .* give case="):
             gym.make(id, **PLACES)
+
+
+def test_further_measurements_of_a_mesh_obey_the_words_of_a_plan():
+    """A model alone is planned with a number of sensors; no candidate is elsewhere."""
+    id, made = "chladni/NextMeasurement-v0", plate(0.4, 0.3, 6, 5, 2e-3)
+    words = {"effects": ("point-mass", "extra-support"), "top": 200.0, "odds": 1e9}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, n in (("PLACES", 6), ("MASSES", 2), ("LINES", 8)):
+            patch.setattr(measurement_forecasts, name, n)
+        env = gym.make(id, case=made, sensors=1, regions=["box 0 0 0 0.2 0.3 0"], **words)
+    candidates = [c for o in env.unwrapped.outlooks for c in o.candidates]
+    at = {c.label.partition(":")[0] for c in candidates if c.label}
+    assert at
+    assert made.points[made.rows([int(n) for n in at]), 0].max() <= 0.2
+    assert env.reset(seed=0)[1]["labels"] is not None
+    with pytest.raises(ChladniError, match=r"sensors is 3.5; give a plan"):
+        gym.make(id, case=made, sensors=3.5, **words)
 
 
 def test_selection_of_a_case(ready, case):

@@ -42,6 +42,9 @@ class Offsets:
         r = (state.offset.real - self.y) / NOISE
         return r, state.doffset.real / NOISE[:, None] if gradient else np.zeros((len(r), 0))
 
+    def scaled_slopes(self, state):
+        return self.scaled(state, True)[1]
+
     def rebased(self, model):
         return self
 

@@ -54,6 +54,14 @@ def test_outside_the_catalogue_the_place_that_does_not_fit_comes_first():
     assert "hem" in found[0]
 
 
+def test_a_misfit_of_all_modes_is_at_no_place():
+    spot = {"text": "over all modes", "grid": None, "parts": []}
+    test = {"passes": False, "p": 0.0, "what": "misfit", "where": [spot]}
+    found = steps(verdict="not in catalogue", adequate=test)
+    assert found[0] == "Look at the structure for physics that the deck lacks: over all modes."
+    assert not any("there" in s for s in found)
+
+
 def test_a_calibration_measures_what_moved_most():
     moved = [
         {"where": f"t of {part}", "name": "t", "value": v, "unit": "m", "deck_value": 1e-3}

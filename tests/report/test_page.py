@@ -20,6 +20,7 @@ from chladni.report.states_table import states_table
 from chladni.report.verdict import HEADING, sections
 from chladni.view import charts
 from chladni.view.chart_png import png
+from chladni.workflows.diagnosis_pipeline import without_calibration
 from chladni.workflows.diagnosis_result import StateResult
 
 EVIL = '<script>alert("x")</script>'
@@ -264,6 +265,23 @@ def test_a_quiet_verdict_that_is_not_trusted_says_so(verdict):
     assert "physics may still be missing" in sentence(doubted)
     tied = replace(doubted, one_of=(("calibration alone", "hem-contact"),))
     assert "hem-contact explains the recording better" in sentence(tied)
+
+
+def test_a_deck_of_frequencies_that_is_not_trusted_explains_nothing():
+    """The reason says how far it is off; the headline does not say the opposite."""
+    doubted = replace(RESULT, verdict="calibration only", one_of=(), distrust=("7.6 % off",))
+    assert sentence(doubted).startswith("Calibration explains the recording")
+    assert sentence(replace(doubted, compared="frequencies")).startswith("No effect is named")
+
+
+def test_a_deck_far_from_the_frequencies_is_no_explanation_of_them():
+    groups = (("calibration alone", "extra-support"), ("calibration alone",))
+    left = without_calibration(groups)
+    assert left == (("extra-support",),)
+    said = sentence(replace(RESULT, verdict="not in catalogue", one_of=left))
+    assert said == "No effect is named; extra-support is the closest explanation."
+    several = replace(RESULT, verdict="not in catalogue", one_of=(("crack", "extra-support"),))
+    assert "cannot distinguish crack, extra-support" in sentence(several)
 
 
 def test_agreement_says_how_near():

@@ -50,6 +50,9 @@ class Offsets:
         r = (state.offset.real - self.y) / NOISE
         return r, state.doffset.real / NOISE if gradient else np.zeros((len(r), 0))
 
+    def scaled_slopes(self, state):
+        return self.scaled(state, True)[1]
+
     def rebased(self, model):
         return self
 
@@ -148,8 +151,7 @@ SCALES = MassMeasurement(1.4, 0.004)
 
 def test_a_calibration_that_foretells_keeps_the_mass_and_its_priors_is_no_compensation(reduced):
     mass = MassComparison(1.4, 1.405)
-    result = SimpleNamespace(agreement=AGREES, mass=mass, residual_localisation=None)
-    assert compensating(calibrated_plate(reduced, 0.05), result, SCALES) == ()
+    assert compensating(calibrated_plate(reduced, 0.05), AGREES, mass, SCALES, None) == ()
 
 
 @pytest.mark.parametrize(
@@ -163,8 +165,7 @@ def test_a_calibration_that_foretells_keeps_the_mass_and_its_priors_is_no_compen
 def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
     agreement = replace(AGREES, held_out=Scores(1.0, held))
     mass, spot = MassComparison(1.4, model), SimpleNamespace(parts=("top",))
-    result = SimpleNamespace(agreement=agreement, mass=mass, residual_localisation=spot)
-    *reasons, stands = compensating(calibrated_plate(reduced, x), result, SCALES)
+    *reasons, stands = compensating(calibrated_plate(reduced, x), agreement, mass, SCALES, spot)
     assert len(reasons) == 1
     assert said in reasons[0]
     assert f"plate {100 * np.expm1(x):.1f} % stiffer" in stands
@@ -173,10 +174,8 @@ def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
 
 def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
     """Where the mesh errs by more than any value, nothing changes, and the weighing says so."""
-    result = SimpleNamespace(
-        agreement=AGREES, mass=MassComparison(1.4, 1.5), residual_localisation=None
-    )
-    first, last = compensating(calibrated_plate(reduced, 0.0), result, SCALES)
+    mass = MassComparison(1.4, 1.5)
+    first, last = compensating(calibrated_plate(reduced, 0.0), AGREES, mass, SCALES, None)
     assert "weighs 1.5 kg" in first
     assert "the deck keeps its values" in last
 

@@ -297,11 +297,11 @@ def test_what_is_written_holds_all_that_was_found(found):
 
 def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monkeypatch):
     """A null costs nothing and stays one."""
-    null = SimpleNamespace(data=SimpleNamespace(error=1), name="", neg2_log_evidence=0.0)
+    null = SimpleNamespace(data=SimpleNamespace(error=1), neg2_log_evidence=0.0)
     effect = SimpleNamespace(name="point-mass", expected=False)
     lead = SimpleNamespace(effect=effect, neg2_log_evidence=-1.0)
     monkeypatch.setattr(diagnosing, "several", lambda *given: 1 / 0)
-    quiet = Diagnosis(null, null, null, (lead,), chances={"": FitChances(None, 0.5, 1.0)})
+    quiet = Diagnosis(null, null, null, (lead,), test=FitChances(None, 0.5, 1.0))
     assert diagnosing._with_sets_of_effects(None, quiet, None) is quiet
 
 

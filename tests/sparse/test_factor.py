@@ -50,6 +50,12 @@ def test_every_backend_solves_the_same(backend):
     assert factor.nnz >= sp.tril(A).nnz
 
 
+def test_a_factor_stores_its_lower_triangle_alone():
+    A, nodes = grid(23, 19, dofs=3)
+    factor = Multifrontal(A, nodes)
+    assert sum(part.L11.size + part.L21.size for part in factor._parts) == factor.nnz
+
+
 @pytest.mark.parametrize("backend", ["multifrontal", "superlu"])
 def test_flexibility_between_few_loads_is_that_of_the_solution(backend):
     """Bᵀ A⁻¹ B, with fronts left out that no load reaches."""

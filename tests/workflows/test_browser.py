@@ -612,7 +612,7 @@ PAGES = {  # words of a command after which its case or deck comes: names of its
     "identify": "automac circles fit indicators shapes stabilisation",
     "correlate": "frf ladder mac shapes where",
     "map --units SI": "change thickness",
-    "plan --sensors 6": "mac shaker shapes where",
+    "plan --sensors 6 --forbidden 16:n": "allowed mac shaker shapes where",
     f"{VARIED} --vary E=80%:120% --samples 6": "parallel responses slopes",
     f"{VARIED} --sampler morris --samples 8 --frf": "frf indices_mu_star parallel responses slopes",
     f"{BENCH} stepped-sine --resolution 2 --sweeps 2": "frf schedule",

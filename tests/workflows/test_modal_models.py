@@ -7,10 +7,16 @@ import pytest
 from tests.builders.tube_frames import frame_deck, recorded_shapes
 
 import chladni
+from chladni.case import load_case
+from chladni.dynamics.modes import rigid_modes
 from chladni.ema.setup import Recording, Shapes
 from chladni.errors import FileError
+from chladni.fem.modelled import modelled
 from chladni.io.tables.read_tables import read_recordings
+from chladni.report.mesh_drawings import mesh_of, shape_pairs
+from chladni.view.surface import surface
 from chladni.workflows.case_draft import draft, sensors_text
+from chladni.workflows.correlate import NEAR, on_whole_mesh
 from chladni.workflows.states import each_state, states_compared
 
 CASE = '[model]\ndeck = "frame.bdf"\nunits = "mm-t-s"\n[test]\nrecordings = [{}]\n'
@@ -56,6 +62,42 @@ def test_correlate_compares_shapes(frame: Path) -> None:
     for k, j in enumerate(p.test):
         a, b = found.expanded[:, :, j].ravel(), found.shapes.motion[:, :, k].ravel()
         assert (a @ b) ** 2 / (a @ a) / (b @ b) > 0.98
+
+
+def test_the_page_moves_the_test_on_the_whole_frame(frame: Path) -> None:
+    """Beside its sensors alone, and the way its partner moves; MAC is that of both."""
+    found = chladni.correlate(frame)
+    case, p = found.origin, found.pairs
+    assert found.mac is not None
+    (drawing,) = shape_pairs(mesh_of(surface(case.assembly), case.assembly), found.shapes,
+                             found.sensors, found.mac.T, found.expanded)  # fmt: skip
+    data = drawing.content.data
+    assert list(data["sides"]) == ["expanded", "test", "model"]
+    assert data["mac"]["expanded|model"] == data["mac"]["test|model"]
+    assert data["rows"][int(p.test[0])] == [p.test[0], p.test[0], p.model[0]]
+    for i, j in zip(p.model, p.test, strict=True):
+        test, model = (data["sides"][name][k] for name, k in (("expanded", j), ("model", i)))
+        assert np.sum(np.array(test["motion"]) * np.array(model["motion"])) > 0
+        assert np.sum(np.array(test["sensors"]) * np.array(model["sensors"])) > 0
+
+
+def test_shapes_at_outputs_move_the_whole_mesh(frame: Path) -> None:
+    """A mixture of the model's modes is recovered from its motion at the outputs, sign and all.
+
+    Fewer outputs than modes cannot tell them apart.
+    """
+    case = load_case(frame)
+    model = modelled(case.tested(case.assembly), 300.0)
+    modes = model.modes.sel(np.flatnonzero(~rigid_modes(model.modes))[:4])
+    due = model.structure.T @ (modes.shapes @ np.array([1.0, 0.5, -0.3, 0.2]))
+    whole = due.reshape(len(case.assembly.points), 6)[:, :3]
+    psi = (case.outputs.rows(model.structure) @ modes.shapes) @ np.array(
+        [[1.0], [0.5], [-0.3], [0.2]]
+    )
+    outputs, f_max = case.outputs.labels, float(modes.frequency[-1]) / NEAR
+    found = on_whole_mesh(case, outputs, psi, 1.001 * f_max)
+    np.testing.assert_allclose(found[:, :, 0], whole / np.abs(whole).max(), atol=1e-6)
+    assert on_whole_mesh(case, outputs[:2], psi[:2], f_max) is None
 
 
 def test_formats_and_set_ups_agree(frame: Path, tmp_path: Path) -> None:

@@ -221,7 +221,7 @@ def _all_that_have(
     }
     if deck is not None:
         for family in lumps.keys() & _HELD_BY.keys():
-            own = sum(map(len, deck.present(*_HELD_BY[family])))
+            own = sum(len(cards) for cards in deck.present(*_HELD_BY[family]))
             lumps[family] = [row for row in lumps[family] if row < own]
     if "bushes" in lumps:
         lumps["bushes"] = np.flatnonzero(made.bushes.stiffness.any(axis=1)).tolist()

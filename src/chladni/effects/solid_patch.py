@@ -34,7 +34,7 @@ SD = 0.6  # prior of ln of both factors: from half to twice the deck's
 STARTS = (-0.7, 0.0, 0.7)
 RADII = (0.1, 0.18, 0.3)  # of the root of half of the surface of the part, as on a sheet
 PLACES, FEW = 80, 16  # middles that are tried with responses, and with natural frequencies alone
-PIECES = 128  # of all bodies, in whose E and rho the responses are linearised
+PIECES = 64  # of all bodies, in whose E and rho the responses are linearised
 WAYS = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])  # E, rho or both are scanned
 FOLLOWED = 2  # regions that are fitted, for each baseline
 MOST = 1.0  # largest ln of a factor from which a fit starts
@@ -299,6 +299,6 @@ FAMILY = Family(
     candidates=candidates,
     closer=closer,
     cards=("MAT1", "MAT9", "PSOLID", "CHEXA", "CPENTA", "CPYRAM", "CTETRA"),
-    settled_by="look into the solid there by X-ray or ultrasound, and weigh it in pieces",
+    settled_by="tap the solid there and next to it, and look into it by ultrasound or X-ray",
     needs="solids",
 )

@@ -140,27 +140,37 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     return Structure(assembly, T, system, congruence(T, loss))
 
 
-def over_all_motions(assembly: Assembly, residual_bending: bool = True) -> list[sp.csr_array]:
-    """M, V, K and the imaginary K of all elements over the 6 n motions of points, basic frame."""
+def mass_over_all_motions(assembly: Assembly) -> sp.csr_array:
+    """M of all elements over the 6 n motions of points, basic frame."""
+    return over_all_motions(assembly, stiff=False)[0]
+
+
+def over_all_motions(
+    assembly: Assembly, residual_bending: bool = True, *, stiff: bool = True
+) -> list[sp.csr_array]:
+    """M, V, K and the imaginary K of all elements over the 6 n motions of points, basic frame.
+
+    Without ``stiff`` shells, which are most elements, give M alone.
+    """
     n = 6 * len(assembly.points)
     total = [sp.csr_array((n, n)) for _ in range(4)]
-    for M, V, K, loss in _each_family(assembly, residual_bending):
+    for M, V, K, loss in _each_family(assembly, residual_bending, stiff):
         for k, A in enumerate((M, V, K, loss)):
             if A is not None and A.nnz:
                 total[k] = A if not total[k].nnz else sp.csr_array(total[k] + A)
     return total
 
 
-Matrices = tuple[sp.csr_array, sp.csr_array | None, sp.csr_array, sp.csr_array | None]
+Matrices = tuple[sp.csr_array | None, ...]
 
 
-def _each_family(assembly: Assembly, residual_bending: bool) -> Iterator[Matrices]:
+def _each_family(assembly: Assembly, residual_bending: bool, stiff: bool) -> Iterator[Matrices]:
     """(M, V, K, loss) of each family that has members."""
     n = len(assembly.points)
     for which in (~assembly.shells.curved, assembly.shells.curved):
         if which.any():
             some = assembly.shells if which.all() else picked(assembly.shells, which)
-            yield _shells(replace(assembly, shells=some), residual_bending)
+            yield _shells(replace(assembly, shells=some), residual_bending, stiff)
     for group in assembly.solids:
         if len(group):
             yield _solids(replace(assembly, solids=(group,)))
@@ -184,28 +194,31 @@ def _lossy(eta: np.ndarray, K: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_
     return blocks(eta[at, None, None] * K[at], nodes[at], n) if len(at) else None
 
 
-def _shells(assembly: Assembly, residual_bending: bool) -> Matrices:
+def _shells(assembly: Assembly, residual_bending: bool, stiff: bool) -> Matrices:
     """Matrices of shells, computed in pieces; the mass is lumped unless ``coupled_mass``."""
     geo = shell.geometry(assembly.points, assembly.shells)
     sections = section_arrays(assembly, geo, residual_bending=residual_bending)
-    lossy = bool(sections.loss.any())
-    parts = _pieces(assembly, geo, sections, lossy)
+    kinds = 1 + stiff * (1 + bool(sections.loss.any()))  # of matrices
+    parts = _pieces(assembly, geo, sections, kinds)
     inertia = EVERY if geo.offset.any() else INERTIA
-    masks = (inertia, EVERY, EVERY)[: 3 if lossy else 2]
-    found = accumulate(geo.nodes, len(assembly.points), parts, masks)
-    return found[0], None, found[1], found[2] if lossy else None
+    found = accumulate(geo.nodes, len(assembly.points), parts, (inertia, EVERY, EVERY)[:kinds])
+    M, K, loss = (*found, None, None)[:3]
+    return M, None, K, loss
 
 
 def _pieces(
-    assembly: Assembly, geo: shell.ShellGeometry, sections: SectionArrays, lossy: bool
+    assembly: Assembly, geo: shell.ShellGeometry, sections: SectionArrays, kinds: int
 ) -> Iterator[tuple[slice, tuple[np.ndarray, ...]]]:
-    """(rows, (M, K[, loss K])) of each piece."""
+    """(rows, (M[, K[, loss K]])) of each piece."""
     for start in range(0, len(geo), PIECE):
         rows = slice(start, start + PIECE)
         part, s, t = geo[rows], sections[rows], assembly.shells.thickness[rows]
-        K = shell.stiffness(part, t, **s.stiffness)
-        M = shell.mass(part, t, s.rho, s.nsm, coupled=assembly.coupled_mass)
-        yield rows, (M, K, s.loss[:, None, None] * K)[: 3 if lossy else 2]
+        made = [shell.mass(part, t, s.rho, s.nsm, coupled=assembly.coupled_mass)]
+        if kinds > 1:
+            made.append(shell.stiffness(part, t, **s.stiffness))
+        if kinds > 2:
+            made.append(s.loss[:, None, None] * made[1])
+        yield rows, tuple(made)
 
 
 def _solids(assembly: Assembly) -> Matrices:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .assemble import Structure, over_all_motions
+from .assemble import Structure, mass_over_all_motions
 from .energy import rigid_motions
 from .solve import inertia_load
 
@@ -28,7 +28,7 @@ class BaseMotion:
     def extended_to(self, built: Structure) -> "BaseMotion":
         """Extend to a structure with additional dofs, whose motion is relative to the base too."""
         more = built.T.shape[1] - len(self.free)
-        force = built.T.T @ (over_all_motions(built.assembly)[0] @ self.whole)
+        force = built.T.T @ (mass_over_all_motions(built.assembly) @ self.whole)
         return BaseMotion(self.whole, np.pad(self.free, ((0, more), (0, 0))), np.asarray(force))
 
     def moved_with_base(self, rows: sp.csr_array) -> np.ndarray:

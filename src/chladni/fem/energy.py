@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from ..geometry.facets import cell_areas
 from ..model.assembly import Assembly, Beams, Bushes, Masses, Rotors, Scalars, Shells, picked
 from . import shell
-from .assemble import PIECE, Structure, over_all_motions
+from .assemble import PIECE, Structure, mass_over_all_motions
 from .shell_section import section_arrays
 
 
@@ -31,7 +31,7 @@ def mass_properties(assembly: Assembly) -> tuple[float, np.ndarray]:
 
     The coupling of translation and rotation is m [e_j x c]; a massless structure has c = nan.
     """
-    M = over_all_motions(assembly)[0]
+    M = mass_over_all_motions(assembly)
     R = rigid_motions(assembly)
     total = R.T @ (M @ R)
     m = float(np.trace(total[:3, :3]) / 3)
@@ -51,7 +51,11 @@ def part_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
     -------
     (parts, r); the rest to 1 is in springs and bushes; nan where φᵀ K φ is zero
     """
-    return _shares(structure, phi, 2, structure.system.K)
+    a, energy = structure.assembly, element_energies(structure, phi)
+    part = np.concatenate([a.shells.part, *(group.part for group in a.solids), a.beams.part])
+    share = np.zeros((len(a.parts), phi.shape[1]))
+    np.add.at(share, part, 2 * energy)
+    return _shares(share, phi, structure.system.K)
 
 
 def kinetic_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
@@ -59,7 +63,10 @@ def kinetic_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
 
     The rest to 1 is in point masses.
     """
-    return _shares(structure, phi, 0, structure.system.M)
+    u, made = np.asarray(structure.T @ phi), structure.assembly
+    every = (mass_over_all_motions(only(made, k)) for k in range(len(made.parts)))
+    share = np.array([np.einsum("nr,nr->r", u, M @ u) for M in every])
+    return _shares(share.reshape(len(made.parts), -1), phi, structure.system.M)
 
 
 def effective_masses(structure: Structure, phi: np.ndarray, about: np.ndarray) -> np.ndarray:
@@ -76,20 +83,15 @@ def effective_masses(structure: Structure, phi: np.ndarray, about: np.ndarray) -
     """
     made = structure.assembly
     R = rigid_motions(replace(made, points=made.points - about))
-    load = np.asarray(structure.T.T @ (over_all_motions(made)[0] @ R))
+    load = np.asarray(structure.T.T @ (mass_over_all_motions(made) @ R))
     mass = np.einsum("nr,nr->r", phi, structure.system.M @ phi)
     return np.asarray((load.T @ phi) ** 2 / mass)
 
 
-def _shares(structure: Structure, phi: np.ndarray, which: int, whole: sp.csr_array) -> np.ndarray:
-    """φᵀ A_p φ / φᵀ A φ, A the M (0) or K (2) of every part."""
-    u = np.asarray(structure.T @ phi)
+def _shares(each: np.ndarray, phi: np.ndarray, whole: sp.csr_array) -> np.ndarray:
+    """φᵀ A_p φ of every part (parts, r) over φᵀ A φ."""
     total = np.einsum("nr,nr->r", phi, whole @ phi)
-    share = np.zeros((len(structure.assembly.parts), phi.shape[1]))
-    for k in range(len(share)):
-        A = over_all_motions(only(structure.assembly, k))[which]
-        share[k] = np.einsum("nr,nr->r", u, A @ u)
-    return np.divide(share, total, out=np.full_like(share, np.nan), where=total > 0)
+    return np.divide(each, total, out=np.full_like(each, np.nan), where=total > 0)
 
 
 def bare(assembly: Assembly) -> Assembly:

@@ -15,7 +15,7 @@ from ..dynamics.modes import ModalModel
 from ..errors import LabelError
 from ..model.assembly import Assembly
 from ..sparse.factor import factorise
-from .assemble import Structure, over_all_motions, structure
+from .assemble import Structure, mass_over_all_motions, structure
 from .energy import rigid_motions
 
 
@@ -27,7 +27,7 @@ def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
     """
     a = np.asarray(acceleration, dtype=float)
     field = rigid_motions(assembly)[:, : len(a)] @ a
-    return over_all_motions(assembly)[0] @ field
+    return mass_over_all_motions(assembly) @ field
 
 
 def _split(assembly: Assembly, dofs: np.ndarray) -> tuple[Structure, np.ndarray, np.ndarray]:

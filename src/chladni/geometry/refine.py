@@ -1,8 +1,8 @@
 """Refinement of a structure, every shell split in four and every beam in two, to find mesh error.
 
 New nodes of shells lie on the smooth surface through the old ones, and on the deck's own facets at
-folds (:mod:`.smooth_sides`). Those of a shell with nodes on its edges lie on its own surface
-x = Σ N_i x_i, and its quarters have nodes on their edges too.
+folds (:mod:`.smooth_sides`). A shell with nodes on its edges has its own surface x = Σ N_i x_i for
+them, and its quarters have nodes on their edges too.
 """
 
 from collections.abc import Callable

@@ -64,9 +64,8 @@ def correlation_page(case: Case, found: Correlation, folder: Path | None = None)
         matrix = {"model": (found.mac.T, found.f_model, pairs)}
         chart = charts.mac(found.f_test, matrix, opens="shapes" if found.shapes else "")
         drawn.append(Drawing("mac", chart, _MAC, wide=found.shapes is None))
-    drawn += shape_pairs(
-        shown, found.shapes, found.sensors, None if found.mac is None else found.mac.T
-    )
+    mac = None if found.mac is None else found.mac.T
+    drawn += shape_pairs(shown, found.shapes, found.sensors, mac, found.expanded)
     partner = dict(zip(p.test.tolist(), found.f_model[p.model].tolist(), strict=True))
     rows = [(f, partner.get(j), None) for j, f in enumerate(found.f_test.tolist())]
     responses, at = _responses(case, found)

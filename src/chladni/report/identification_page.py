@@ -19,20 +19,21 @@ from ..ema.identification import evaluate
 from ..ema.level_table import level_tables
 from ..ema.mode_indicators import cmif, mif
 from ..ema.shapes import driven_shapes, real_shapes, shape_spread, shapes
-from ..errors import LabelError
+from ..errors import ChladniError, LabelError
 from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_levels, write_poles
 from ..view import charts
 from ..view.chart import Chart, ChartAxis, Mark, Panel, Series
 from ..view.surface import Surface, surface
 from ..workflows.case_model import markers
+from ..workflows.correlate import on_whole_mesh
 from ..workflows.identify import Identification, RecordingModes
 from . import frf_charts
 from .blocks import Block, Drawing, PageParts, Section, Table, still
 from .level_blocks import level_drawings, level_section
 from .live_mesh import ModeSet
 from .live_mesh import shapes as live_shapes
-from .mesh_drawings import TURN, mesh_of, spatial
+from .mesh_drawings import EXPANDED, ON_MESH, TURN, mesh_of, spatial
 from .screening_blocks import SEVERAL, screening_json, screening_section
 from .shown import Shown
 from .typed_fields import as_data
@@ -45,6 +46,7 @@ _SHOWN = 6  # channels in the picture of the fit
 _CIRCLES = 30  # modes drawn
 _MATRIX = 40  # modes of an AutoMAC that can still be read
 _MOST_POLES = 5000
+_QUICK = 20_000  # grids of a model that is solved to draw shapes on it
 _CLASSES = {  # letter of a pole: (mark, tint, size, meaning)
     "o": ("dot", "line", 3.0, "new"),
     "f": ("cross", "soft", 3.5, "frequency"),
@@ -72,7 +74,7 @@ def identification_page(folder: Path, found: Identification, command: str = "") 
         stem, name = "" if len(found.recordings) == 1 else f"_{k + 1}", r.recording.name
         write_poles(folder / f"poles{stem}.csv", r.poles)
         files.append((f"poles{stem}.csv", f"poles of {name}"))
-        shapes = _shapes(f"shapes{stem}", r, shown, sensors)
+        shapes = _shapes(f"shapes{stem}", r, shown, sensors, found.origin)
         table = replace(_table(r), opens=f"shapes{stem}" if shapes else "")
         sections.append(Section(name, [*shapes, table, *_drawings(stem, r, share, command)]))
         files += _modal_files(folder, stem, r)
@@ -183,20 +185,41 @@ def _places(found: Identification) -> tuple[Shown | None, dict[str, "Marker"]]:
 
 
 def _shapes(
-    name: str, r: RecordingModes, shown: Shown | None, sensors: Mapping[str, "Marker"]
-) -> list[Drawing]:
-    """The identified modes, which move at their sensors."""
+    name: str, r: RecordingModes, shown: Shown | None, sensors: Mapping[str, "Marker"],
+    origin: Any = None,
+) -> list[Drawing]:  # fmt: skip
+    """The identified modes, which move at their sensors, and on the mesh of a case."""
     m = r.modes.sel(r.firm)
     held = [k for k, output in enumerate(m.outputs) if output in sensors]
     if shown is None or not held or not m.order:
         return []
-    side = ModeSet(m.frequency, sensors=real_shapes(m)[held], damping=m.damping.tolist())
-    auto = {"test|test": auto_mac(driven_shapes(m))} if 1 < m.order <= _MATRIX else {}
+    psi, damping = real_shapes(m)[held], m.damping.tolist()
+    sides = {"test": ModeSet(m.frequency, sensors=psi, damping=damping)}
+    outputs = [m.outputs[k] for k in held]
+    whole = _expanded(origin, outputs, psi, float(m.frequency.max()))
+    said = f"{TURN} Click a row of the table for its mode."
+    if whole is not None:
+        used = shown.seen.without_joints().used
+        sides = {EXPANDED: ModeSet(m.frequency, whole[used], psi, damping=damping), **sides}
+        said += f" {ON_MESH}"
+    auto = auto_mac(driven_shapes(m)) if 1 < m.order <= _MATRIX else None
+    alike = {} if auto is None else {f"{name}|{name}": auto for name in sides}
     content = spatial("shapes", shown, lambda: live_shapes(
-        {"test": side}, [[k] for k in range(m.order)], shown,
-        [sensors[m.outputs[k]] for k in held], auto,
+        sides, [[k] * len(sides) for k in range(m.order)], shown,
+        [sensors[label] for label in outputs], alike,
     ))  # fmt: skip
-    return [Drawing(name, content, f"{TURN} Click a row of the table for its mode.", {})]
+    return [Drawing(name, content, said, {})]
+
+
+def _expanded(
+    case: Any, outputs: Sequence[str], psi: np.ndarray, f_max: float
+) -> np.ndarray | None:
+    """Shapes on the mesh of a case (n_points, 3, r); None without one, or where it takes long."""
+    if not isinstance(case, Case) or len(case.assembly.points) > _QUICK:
+        return None
+    with suppress(ChladniError):  # a model that cannot be solved is no fault of a recording
+        return on_whole_mesh(case, outputs, psi, f_max)
+    return None
 
 
 def _drawings(stem: str, r: RecordingModes, share: int, command: str) -> list[Block]:

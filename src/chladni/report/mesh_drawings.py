@@ -21,7 +21,12 @@ if TYPE_CHECKING:
     from .blocks import Still
 
 TURN = "Drag to turn; click, then scroll to zoom."
+EXPANDED = "expanded"  # side of the test on the whole mesh, as the page calls it
 _PAIRED = "The test moves at its sensors, the model as a whole."
+ON_MESH = (
+    "The test is expanded to the whole mesh by the mixture of the model's modes that fits it best "
+    "(SEREP); choose the test to see it at its sensors alone."
+)
 _PAIRS = 8  # in a picture
 _OUTSIDE = 0.02  # of the structure's size: as far from a wall a place is looked at
 
@@ -101,9 +106,10 @@ def two_models(
 
 
 def shape_pairs(
-    shown: Shown, found: PairedShapes | None, sensors: Sequence[str], mac: np.ndarray | None
-) -> list[Drawing]:
-    """Draw test next to model; MAC (test, model)."""
+    shown: Shown, found: PairedShapes | None, sensors: Sequence[str], mac: np.ndarray | None,
+    expanded: np.ndarray | None = None,
+) -> list[Drawing]:  # fmt: skip
+    """Draw test next to model; MAC (test, model), and the test ``expanded`` (n, 3, r) if it is."""
     if found is None or not len(found.f_test):
         return []
 
@@ -113,15 +119,17 @@ def shape_pairs(
         at = zip(found.points.tolist(), found.directions.tolist(), sensors, strict=True)
         used = shown.seen.without_joints().used
         partner = dict(found.pairs)
-        sides = {
-            "test": live_mesh.ModeSet(found.f_test, sensors=found.test),
-            "model": live_mesh.ModeSet(found.f_model, found.motion[used], found.model,
-                                       found.numbers),
-        }  # fmt: skip
-        rows = [[k, partner.get(k)] for k in range(len(found.f_test))]
+        model = live_mesh.ModeSet(found.f_model, found.motion[used], found.model, found.numbers)
+        tests = {"test": live_mesh.ModeSet(found.f_test, sensors=found.test)}
+        if expanded is not None:
+            whole = expanded.copy()
+            for k, j in found.pairs:  # as the sensors, whose sign is that of their partner
+                whole[:, :, k] *= np.sign((whole[:, :, k] * found.motion[:, :, j]).sum()) or 1.0
+            tests = {EXPANDED: live_mesh.ModeSet(found.f_test, whole[used], found.test), **tests}
+        rows = [[*[k] * len(tests), partner.get(k)] for k in range(len(found.f_test))]
         places = [Marker(x, n, label) for x, n, label in at]
-        return live_mesh.shapes(sides, rows, shown, places, {} if mac is None else
-                                {"test|model": mac})  # fmt: skip
+        alike = {} if mac is None else {f"{name}|model": mac for name in tests}
+        return live_mesh.shapes({**tests, "model": model}, rows, shown, places, alike)
 
     def draw(path: Path) -> object:
         from ..view.shape_pairs import shape_pairs as picture
@@ -129,7 +137,8 @@ def shape_pairs(
         return picture(path, shown.seen, found, _PAIRS)
 
     stills: dict[str, Still] = {"shapes": draw} if len(found.pairs) else {}
-    return [Drawing("shapes", spatial("shapes", shown, moving), f"{TURN} {_PAIRED}", stills,
+    said = _PAIRED if expanded is None else ON_MESH
+    return [Drawing("shapes", spatial("shapes", shown, moving), f"{TURN} {said}", stills,
                     "shapes", wide=mac is None)]  # fmt: skip
 
 

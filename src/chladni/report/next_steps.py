@@ -162,10 +162,10 @@ def _look(result: DiagnosisResult) -> list[str]:
     spots = [w for w in (result.adequate.where if result.adequate else ())]
     steps = [result.adequate.step] if result.adequate and result.adequate.step else []
     for w in spots:
-        place = f"near grid {w.grid}" if w.grid else "there"
+        place = f" near grid {w.grid}" if w.grid else ""
         parts = f" on {named(w.parts, 3)}" if w.parts else ""
         steps.append(
-            f"Look at the structure {place}{parts} for physics that the deck lacks: {w.text}."
+            f"Look at the structure{place}{parts} for physics that the deck lacks: {w.text}."
         )
     steps += _odd_checks(result)
     if not result.levels:
@@ -185,8 +185,9 @@ def _look(result: DiagnosisResult) -> list[str]:
         for a in near
         if known.get(a.name)
     ]
+    there = " there" * any(w.grid or w.parts for w in spots)
     steps.append(
-        "Check the idealisation of the structure there: mesh, ties, supports. You can add your "
+        f"Check the idealisation of the structure{there}: mesh, ties, supports. You can add your "
         "own effects (docs/extending.md)."
     )
     return steps

@@ -39,7 +39,8 @@ def _sentence(result: DiagnosisResult) -> str:
             f"but the evidence does not decide{gain}."
         )
     if verdict in ("calibration only", "nothing missing") and result.distrust:
-        known = "Calibration explains the recording" * (verdict == "calibration only")
+        sure = verdict == "calibration only" and result.compared == "responses"
+        known = "Calibration explains the recording" * sure
         return f"{known or 'No effect is named'}, but physics may still be missing{gain}."
     if verdict == "calibration only":
         return f"Calibration explains the recording; no physics is missing{gain}."
@@ -49,7 +50,10 @@ def _sentence(result: DiagnosisResult) -> str:
             "explain this as well as any effect tried."
         )
     if verdict == "not in catalogue" and result.one_of:
-        return f"No effect is named; the data cannot distinguish {', '.join(result.one_of[0])}."
+        tied = result.one_of[0]
+        if len(tied) == 1:
+            return f"No effect is named; {tied[0]} is the closest explanation."
+        return f"No effect is named; the data cannot distinguish {', '.join(tied)}."
     if verdict == "not in catalogue":
         near = f": {what}" if what else ""
         return f"The model lacks physics that is not in the catalogue{near}."

@@ -5,7 +5,6 @@ by more than the error of the weighing; it ends on a bound of what a value can b
 """
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 
@@ -24,35 +23,22 @@ LEAST = 0.005  # smaller changes of ln mass and stiffness are not named
 BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0}  # powers in the bending stiffness of a part
 
 
-class Scored(Protocol):
-    """A result with its scores, its mass and the place of what it leaves."""
-
-    @property
-    def agreement(self) -> Agreement | None:
-        """Scores on fitted and held-out data."""
-
-    @property
-    def mass(self) -> MassComparison | None:
-        """Weighed and calibrated mass."""
-
-    @property
-    def residual_localisation(self) -> ResidualLocalisation | None:
-        """Where a local change would still gain."""
-
-
-def compensating(fit: Fit, result: Scored, weighed: MassMeasurement | None) -> tuple[str, ...]:
+def compensating(
+    fit: Fit, agreement: Agreement | None, mass: MassComparison | None,
+    weighed: MassMeasurement | None, spot: ResidualLocalisation | None,
+) -> tuple[str, ...]:  # fmt: skip
     """Reasons why a calibration compensates, and what it stands for; empty where it does not.
 
     Parameters
     ----------
     fit : of the deck that is written
+    spot : where a local change would still gain
     """
     reasons = (
-        *(f"{why}; {CURES}" for why in foretells_worse(result.agreement)),
-        *_leaves_the_scales(result.mass, weighed),
+        *(f"{why}; {CURES}" for why in foretells_worse(agreement)),
+        *_leaves_the_scales(mass, weighed),
         *implausible_values(fit),
     )  # fmt: skip
-    spot = result.residual_localisation
     place = "" if spot is None or not spot.parts else f"on {', '.join(spot.parts[:2])}"
     return (*reasons, _stands_for(fit, place)) if reasons else ()
 

@@ -10,7 +10,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class Diagnosis:
     verdict: str = ""  # one of the public verdicts
     notes: tuple[str, ...] = ()  # what was done and why, one sentence each
     sets: tuple[Several, ...] = ()  # of several effects, in the order in which they grew
-    chances: Mapping[str, FitChances] = field(default_factory=dict)  # tests that were made, by name
+    test: FitChances | None = None  # of fit of :attr:`leading`, where it was made
     written: HypothesisFit | None = None  # the named effect in the form of a deck
     # ``plain`` and ``written`` with every shell halved, where the data prefer that mesh
     halved: tuple[HypothesisFit, ...] = ()
@@ -143,9 +143,9 @@ def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: 
     finer = preferred_mesh(null, plain, problem.mass_measurement)
     halved = () if finer is None else (finer,)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=notes, halved=halved)
-    found = replace(found, chances={found.leading.name: fit_test(problem, found.leading)})
-    unfit = not found.chances[found.leading.name].fits
-    found = _names_alone(problem, found, PAIRED if unfit else 2)  # a search begins from these
+    test = fit_test(problem, found.leading)
+    whole = 2 if test.fits else PAIRED  # a search begins from these
+    found = _names_alone(problem, replace(found, test=test), whole)
     del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
     give_back_freed_memory()
     found = _with_sets_of_effects(problem, found, within(progress, 0.8, 1.0))
@@ -177,7 +177,7 @@ def _with_sets_of_effects(
 
     Natural frequencies alone are too few numbers to bear two names.
     """
-    data, unfit = alone.null.data, not alone.chances[alone.leading.name].fits
+    data, unfit = alone.null.data, alone.test is not None and not alone.test.fits
     many = isinstance(data, Responses) and data.error is not None
     if not (many and alone.hypotheses) or (alone.leading is alone.null and not unfit):
         return alone

@@ -182,7 +182,8 @@ class Hypotheses:
         return tuple(Explanation(self, s.hypothesis, together=s) for s in self.found.sets)
 
     def _of(self, fit: HypothesisFit, rival: bool = False) -> Explanation:
-        return Explanation(self, fit, rival, known=self.found.chances.get(fit.name))
+        known = self.found.test if fit is self.found.leading else None
+        return Explanation(self, fit, rival, known=known)
 
     @cached_property
     def poles(self) -> bool:

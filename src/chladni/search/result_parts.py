@@ -327,7 +327,7 @@ def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
     lead = diagnosis.hypotheses[0]
     if diagnosis.two_log_bayes_factor(lead) > TIED:
         return f"{lead.effect.name} accounts for more of it than mesh error and scatter"
-    return "mesh error and scatter within the parts account for it as well as any effect tried"
+    return "no effect tried accounts for more of it than mesh error and scatter within the parts"
 
 
 def blind_note(spot: ResidualLocalisation | None) -> tuple[str, ...]:

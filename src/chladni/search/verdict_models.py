@@ -1,7 +1,6 @@
 """The structures that a verdict speaks of, and how well they agree with the recording."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,25 +13,14 @@ from .diagnosis import Diagnosis
 from .question import Prepared, Question
 
 
-@dataclass(frozen=True, eq=False)
-class Models:
-    """The structure as the deck has it, calibrated without new physics, and with the effect."""
-
-    nominal: Assembly
-    calibrated: Assembly
-    final: Assembly
-
-
-def models(question: Question, diagnosis: Diagnosis) -> Models:
-    """The assemblies of all stages of a diagnosis."""
+def assemblies(question: Question, diagnosis: Diagnosis) -> tuple[Assembly, Assembly]:
+    """The structure calibrated without new physics, and with the effect: one if none is named."""
     found = diagnosis.found
     nothing = diagnosis.verdict == "nothing missing"
     calibrated = question.assembly if nothing else applied(question.assembly, diagnosis.plain)
     if found is None or not found.physics:
-        return Models(question.assembly, calibrated, calibrated)
-    return Models(
-        question.assembly, calibrated, applied(question.assembly, diagnosis.as_deck or found)
-    )
+        return calibrated, calibrated
+    return calibrated, applied(question.assembly, diagnosis.as_deck or found)
 
 
 def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:

@@ -21,25 +21,29 @@ _FEW_RUNS = 40  # number of runs up to which slices are faster than index arrays
 
 @dataclass(frozen=True, eq=False)
 class _Cholesky:
-    """F = [[L11 L11ᵀ, .], [L21 L11ᵀ, .]]."""
+    """F = [[L11 L11ᵀ, .], [L21 L11ᵀ, .]].
 
-    L11: np.ndarray
+    L11 is packed without the half of zeros (Gustavson et al. 2010, ACM TOMS 37, 18).
+    """
+
+    L11: np.ndarray  # (a (a + 1) / 2,)
     L21: np.ndarray
     negative: ClassVar[int] = 0  # pivots
 
     def forward(self, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forward substitution: the part at the pivots and the update of the boundary."""
-        y = blas.dtrsm(1.0, self.L11, b.T, side=1, lower=1, trans_a=1)
+        y = lapack.dtfsm(1.0, self.L11, b.T, side="R", uplo="L", trans="T")
         return y.T, (y @ self.L21.T).T
 
     def backward(self, y: np.ndarray, x2: np.ndarray) -> np.ndarray:
         """x_1 = L11⁻ᵀ (y - L21ᵀ x_2)."""
-        return blas.dtrsm(1.0, self.L11, y.T - x2.T @ self.L21, side=1, lower=1).T
+        return lapack.dtfsm(1.0, self.L11, y.T - x2.T @ self.L21, side="R", uplo="L").T
 
     def product(self, v1: np.ndarray, v2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Contribution of this front to A v, at its pivots and at its boundary."""
-        y = self.L11.T @ v1 + self.L21.T @ v2
-        return self.L11 @ y, self.L21 @ y
+        L = np.tril(lapack.dtfttr(len(v1), self.L11, uplo="L")[0])
+        y = L.T @ v1 + self.L21.T @ v2
+        return L @ y, self.L21 @ y
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,12 +281,11 @@ def _add(
 
 
 def _cholesky(L11: np.ndarray, F: _Blocks) -> _Cholesky:
-    _, F21, F22 = F
-    if not len(F21):
-        return _Cholesky(L11, F21)
-    L21 = blas.dtrsm(1.0, L11, F21, side=1, lower=1, trans_a=1, overwrite_b=1)
-    blas.dsyrk(-1.0, L21, beta=1.0, c=F22, lower=1, overwrite_c=1)
-    return _Cholesky(L11, L21)
+    _, L21, F22 = F
+    if len(L21):
+        L21 = blas.dtrsm(1.0, L11, L21, side=1, lower=1, trans_a=1, overwrite_b=1)
+        blas.dsyrk(-1.0, L21, beta=1.0, c=F22, lower=1, overwrite_c=1)
+    return _Cholesky(lapack.dtrttf(L11, uplo="L")[0], L21)
 
 
 def _ldl(F: _Blocks) -> _Ldl:

@@ -11,7 +11,7 @@ from ..case import Case
 from ..case.sensor_places import sensor_masses
 from ..dynamics.modes import rigid_modes
 from ..effects.registry import family
-from ..errors import FileError
+from ..errors import ArgumentError, FileError
 from ..fem.measured_dofs import MeasuredDofs
 from ..inference.result import NextMeasurement
 from ..parallel import one_blas_thread
@@ -110,6 +110,11 @@ def _places(
                 "sensors or a plan.json"
             )
         return case.outputs, case.inputs
+    if not hasattr(sensors, "layout"):
+        raise ArgumentError(
+            f"sensors is {sensors!r}; give a plan of chladni.plan, or the path of a table of "
+            "sensors or of a plan.json"
+        )
     return (
         _mounted(sensors, sensors.layout, sensors.settings.mass),
         _mounted(sensors, sensors.together[:1], 0.0),

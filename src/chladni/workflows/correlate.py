@@ -121,12 +121,9 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     model = modelled(case.tested(case.assembly), REACH * f_max)
     case = with_sign_of_gain(case, model)
     test = case.frfs[0] if case.frfs else None
-    f = model.modes.frequency
-    inside = (
-        ~rigid_modes(model.modes) & (f > RIGID * f_max) & (f <= (NEAR if test else ABOVE) * f_max)
-    )
-    near = model.modes.sel(np.flatnonzero(inside))
-    numbers = tuple((np.flatnonzero(inside) + 1).tolist())
+    inside = _elastic(model.modes, f_max, NEAR if test else ABOVE)
+    near = model.modes.sel(inside)
+    numbers = tuple((inside + 1).tolist())
     if test is None:
         by_shapes = bool(case.recordings) and case.recordings[0].modal is not None
         made = _by_shapes(case, model, near, numbers) if by_shapes else _by_poles(case, near)
@@ -153,6 +150,26 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
             real_shapes(found), shape_covariance(found), phi, near.frequency, pairs),
         *_on_the_model(model, near, phi, psi, f_max),
     )  # fmt: skip
+
+
+def _elastic(modes: ModalModel, f_max: float, above: float) -> np.ndarray:
+    """Positions of the elastic modes up to ``above`` times the highest frequency of the test."""
+    f = modes.frequency
+    return np.flatnonzero(~rigid_modes(modes) & (f > RIGID * f_max) & (f <= above * f_max))
+
+
+def on_whole_mesh(
+    case: Case, outputs: Sequence[str], psi: np.ndarray, f_max: float
+) -> np.ndarray | None:
+    """Shapes at some outputs (n, r) on the whole model of a case (n_points, 3, r), basic frame.
+
+    None where the outputs cannot tell the model's modes up to ``f_max`` [Hz] apart.
+    """
+    model = modelled(case.tested(case.assembly), NEAR * f_max)
+    near = model.modes.sel(_elastic(model.modes, f_max, NEAR))
+    rows = case.outputs.rows(model.structure) @ near.shapes
+    phi = rows[[case.outputs.labels.index(label) for label in outputs]]
+    return _on_the_model(model, near, phi, psi, f_max)[1]
 
 
 @dataclass(frozen=True, eq=False)

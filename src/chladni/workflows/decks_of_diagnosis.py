@@ -37,7 +37,7 @@ from ..search.result_parts import (
     remainder,
     values_kept,
 )
-from ..search.verdict_models import models, of_channels, real_poles, scores_of
+from ..search.verdict_models import assemblies, of_channels, real_poles, scores_of
 from ..search.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
 from .deck_comments import with_mended, with_remarks
@@ -52,11 +52,12 @@ def updated_models(
 
     Comments of a changed deck say what of the recording was ``mended``.
     """
-    stages, nominal = models(question, found), as_it_is(question, prepared.nominal)
-    calibrated, lost = _deck(case, question, nominal, stages.calibrated)
+    nominal = as_it_is(question, prepared.nominal)
+    plain, named = assemblies(question, found)
+    calibrated, lost = _deck(case, question, nominal, plain)
     final = calibrated
-    if stages.final is not stages.calibrated:
-        final, lost = _deck(case, question, nominal, stages.final)
+    if named is not plain:
+        final, lost = _deck(case, question, nominal, named)
         final = with_remarks(final, found.as_deck)
     final = with_mended(final, mended)
     test = measured_modes(prepared)
@@ -77,7 +78,7 @@ def on_preferred_mesh(
         return stages, result
     plain, *named = found.halved
     found = replace(found, plain=plain, written=named[0] if named else None)
-    made = models(question, found)
+    before, after = assemblies(question, found)
 
     def deck(changed: Assembly) -> ChangedDeck:
         source = exported_deck(halved(changed), case.units)
@@ -85,10 +86,10 @@ def on_preferred_mesh(
         return ChangedDeck(modelled(finer, stages.nominal.band), (), source)
 
     try:
-        calibrated = deck(made.calibrated)
+        calibrated = deck(before)
         final = calibrated
-        if made.final is not made.calibrated:
-            final = with_remarks(deck(made.final), found.as_deck)
+        if after is not before:
+            final = with_remarks(deck(after), found.as_deck)
     except (FileError, ModelError):  # no card holds what changed
         return stages, result
     final = with_mended(final, mended)

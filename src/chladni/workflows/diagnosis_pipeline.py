@@ -27,7 +27,7 @@ from ..search.damping_by_part import damping_by_part
 from ..search.decide import decide
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
-from ..search.hypotheses import Hypotheses
+from ..search.hypotheses import ALONE, Hypotheses
 from ..search.left_frequencies import left_frequencies
 from ..search.measurement_forecasts import outlook
 from ..search.next_measurement import Outlook, advised
@@ -136,7 +136,10 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit))
     study = known.study
     if not diagnosing:
-        reasons = compensating(found.plain.fit, result, question.mass_measurement)
+        reasons = compensating(
+            found.plain.fit, result.agreement, result.mass, question.mass_measurement,
+            result.residual_localisation,
+        )  # fmt: skip
         distrust = (*distrust, *reasons)
         if study is not None:
             rows, fit = result.frequencies, found.plain.fit
@@ -148,7 +151,10 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     if result.compared != "responses":
-        distrust = (*left_frequencies(result.frequencies, stages.final.model), *distrust)
+        left = tuple(left_frequencies(result.frequencies, stages.final.model))
+        distrust = (*left, *distrust)
+        if left and result.verdict == "not in catalogue":
+            result = replace(result, one_of=without_calibration(result.one_of))
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
@@ -160,6 +166,12 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
         outlook=ahead, next_measurements=() if ahead is None else advised([ahead]),
     )  # fmt: skip
+
+
+def without_calibration(groups: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+    """Tied explanations less calibration alone, whose deck leaves too much of the frequencies."""
+    each = (tuple(name for name in group if name != ALONE) for group in groups)
+    return tuple(group for group in each if group)
 
 
 FAR_OFF = 1.0  # Q of a deck whose responses are tenfold or a tenth of the recording's

@@ -220,7 +220,7 @@ function remainder(at, data, shared, box) {
 function shapes(at, data, shared, box) {
   const mesh = shared.mesh, names = Object.keys(data.sides), count = data.rows.length;
   const state = { row: 0, side: [names[0], names.length > 1 ? names[names.length - 1] : null], at: [null, null], size: 0.08, run: !matchMedia("(prefers-reduced-motion: reduce)").matches };
-  const called = (name) => (["test", "model"].includes(name) || name.includes(".") ? name : "deck " + name), own = (row) => names.map((n, k) => data.sides[n][row[k]]).find((m) => m);
+  const called = (name) => (name === "expanded" ? "test on the mesh" : ["test", "model"].includes(name) || name.includes(".") ? name : "deck " + name), own = (row) => names.map((n, k) => data.sides[n][row[k]]).find((m) => m);
   const mode = (n) => data.sides[state.side[n]]?.[state.at[n]], sensed = (n) => mode(n)?.[state.side[n] === "test" ? "motion" : "sensors"];
   const list = choice(box, "mode", data.rows.map((row, k) => [k, `${own(row).number ?? k + 1}: ${hertz(own(row).hz)}`]), (v) => pair(Number(v)));
   if (count > 1) for (const [word, by] of [["previous", -1], ["next", 1]]) button(box, word, () => pair(((state.row ?? 0) + by + count) % count));
@@ -293,7 +293,8 @@ function shapes(at, data, shared, box) {
   at.redraw = () => show();
   at.open = (to) => {  // a row, or a mode of each side
     if (typeof to === "number") return pair(to);
-    Object.assign(state, { side: to.map(([name]) => name), at: to.map(([, k]) => k) });
+    const whole = state.side.includes("expanded");  // the test stays on the mesh
+    Object.assign(state, { side: to.map(([name]) => (whole && name === "test" ? "expanded" : name)), at: to.map(([, k]) => k) });
     const row = data.rows.findIndex((r) => to.every(([name, k]) => r[names.indexOf(name)] === k));
     state.row = row < 0 ? null : row;
     return show();

@@ -44,8 +44,8 @@ def _element(ctx: Context, cards: Cards, i: int) -> Iterator[StrainSpring]:
         value = np.linalg.eigvalsh(A * np.outer(size, size) / np.outer(size, size).max())
         if not abs(value).min() > _SINGULAR * abs(value).max():
             raise cards.refuse(i, "its flexibility Z has no inverse")
-        A = np.linalg.inv(A)
-    K = A * ctx.scale.force * ctx.scale.length / np.outer(size, size)
+    stiff = np.linalg.inv(A) if kind == "Z" else A
+    K = stiff * ctx.scale.force * ctx.scale.length / np.outer(size, size)
     if "S" in lists:
         S = _numbers(cards, i, "S", lists["S"], m * n).reshape(m, n)
         S = S * size[:, None] / _sizes(ctx, u_d)
