@@ -28,6 +28,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.githubpages",  # that host serves folders such as _static with its mark alone
     "numpydoc",
 ]
 myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
