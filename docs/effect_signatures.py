@@ -82,10 +82,13 @@ def draw(path: Path, one: Signature) -> Path:
     """Plot the response without and with the effect, and the shift of every frequency."""
     from matplotlib.figure import Figure
 
-    from chladni.view.paper import AFTER, LEGEND, TEST, save
+    from chladni.view.paper import AFTER, LEGEND, TEST
 
-    figure = Figure(figsize=(8.2, 2.7), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1.7, 1))
+    figure = Figure(figsize=(8.2, 2.7))
+    left, right = figure.subplots(
+        1, 2, width_ratios=(1.7, 1),
+        gridspec_kw={"left": 0.08, "right": 0.99, "bottom": 0.22, "top": 0.9, "wspace": 0.14},
+    )  # fmt: skip
     left.semilogy(one.frequency, np.abs(one.before), color=TEST, lw=1.0, label="without")
     left.semilogy(one.frequency, np.abs(one.after), color=AFTER, lw=1.3, label="with the effect")
     left.set(xlabel="frequency [Hz]", ylabel="|H| [m/s²/N]", xlim=(0, TOP))
@@ -103,4 +106,6 @@ def draw(path: Path, one: Signature) -> Path:
     for ax in (left, right):
         ax.grid(lw=0.3, alpha=0.5)
         ax.tick_params(labelsize=8)
-    return save(figure, path, dpi=110)
+        ax.minorticks_off()
+    figure.savefig(path, dpi=110)
+    return path

@@ -1,7 +1,7 @@
 """The reference, written from the program as it is: nothing on these pages is kept by hand.
 
-``write`` fills a folder with one page each on commands, exit codes, ``diagnosis.json``, the cards
-of a deck, the effects, the environments and the Python interface.
+``write`` fills a folder with one page each on exit codes, ``diagnosis.json``, the cards of a deck,
+the effects, the environments, and each command and public object.
 """
 
 import dataclasses
@@ -10,26 +10,31 @@ import json
 import re
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import command_pages
 import effect_signatures
 import error_sentences
 import numpy as np
+import object_pages
+import tutorial_blocks
+from page_parts import BY, plain, table
 
+from chladni.search.candidates import UpdatingContext
 from chladni_contract.effect_ground import GROUNDS, EffectGround, usual_grounds
 
 ROOT = Path(__file__).parents[1]
 SIGNATURES = "signatures"  # folder of the pictures of the effects
 BLIND_SCORE = ROOT / "docs" / "blind_score.json"  # rows of the last blind report of each set
-BY = "*This page is written by the program itself, from {}.*\n"
 
 
 def pages() -> dict[str, Callable[[], str]]:
     """Name of every generated page, and the function that writes it."""
     return {
-        "commands": commands,
+        "commands": command_pages.commands,
         "exit-codes": exit_codes,
         "error-sentences": refusals,
         "diagnosis-json": diagnosis_page,
@@ -37,85 +42,41 @@ def pages() -> dict[str, Callable[[], str]]:
         "effects": effects,
         "decision-rules": decision_rules,
         "environments": environments,
-        "python": python_interface,
+        "python": object_pages.python_interface,
+        **{
+            f"commands/{name}": partial(command_pages.command_page, name)
+            for name in command_pages.groups()
+        },
+        **{
+            f"python/{name}": partial(object_pages.object_page, one)
+            for name, one in object_pages.public_objects().items()
+        },
     }
 
 
 def write(folder: Path) -> None:
-    """Write all pages; a page that is as it was keeps its time, so that Sphinx passes it over."""
-    for name, page in pages().items():
-        path, text = folder / f"{name}.md", page()
+    """Write all pages, unless they are there and neither the program nor these scripts changed.
+
+    A page that is as it was keeps its time, so that Sphinx passes it over.
+    """
+    kept, sources = folder / SIGNATURES / "key", [ROOT / n for n in ("src", "envs", "evidence")]
+    pages_read = (BLIND_SCORE, command_pages.GALLERY, object_pages.EXAMPLES)
+    key = tutorial_blocks.key_of("", *sources, *pages_read, *sorted((ROOT / "docs").glob("*.py")))
+    made = {folder / f"{name}.md": page for name, page in pages().items()}
+    there = {*folder.glob("commands/*.md"), *folder.glob("python/*.md")}
+    if kept.is_file() and kept.read_text() == key and all(path.is_file() for path in made):
+        return
+    for gone in there - made.keys():
+        gone.unlink()
+    for path, page in made.items():
+        text = page()
+        path.parent.mkdir(exist_ok=True)
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
-    (folder / SIGNATURES).mkdir(exist_ok=True)
+    kept.parent.mkdir(exist_ok=True)
     for name, one in signatures().items():
         effect_signatures.draw(folder / SIGNATURES / f"{name}.png", one)
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A Markdown table; a bar in a cell is escaped, a line break becomes a space."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    cells = ([re.sub(r"\s+", " ", str(c)).replace("|", r"\|") for c in row] for row in lines)
-    return "\n".join(f"| {' | '.join(row)} |" for row in cells) + "\n"
-
-
-def plain(text: str | None) -> str:
-    """A docstring as Markdown: double back quotes become single ones, roles their last name."""
-    text = inspect.cleandoc(text or "").replace("``", "`")
-    return re.sub(r":(?:class|func|meth|mod):`~?([^`]+)`", r"`\1`", text)
-
-
-# --- commands -----------------------------------------------------------------------------------
-
-
-def commands() -> str:
-    """Every command with its arguments and options, from the parser."""
-    import typer
-
-    from chladni.cli.app import application
-
-    group: Any = typer.main.get_command(application())
-    out = ["# Commands\n", BY.format("its command line")]
-    for name, command in group.commands.items():
-        steps = getattr(command, "commands", None)
-        if steps is None:
-            out.append(_command(f"chladni {name}", command, "##"))
-            continue
-        out.append(f"## chladni {name}\n\n{_prose(command.help)}\n")
-        out += [_command(f"chladni {name} {step}", c, "###") for step, c in steps.items()]
-    return "\n".join(out)
-
-
-def _command(name: str, command: Any, level: str) -> str:
-    arguments = [p for p in command.params if p.param_type_name == "argument"]
-    options = [p for p in command.params if p.param_type_name == "option"]
-    words = [
-        (p.metavar or p.name.upper()) if p.required else f"[{p.metavar or p.name.upper()}]"
-        for p in arguments
-    ]
-    words = [f"{w}..." if p.nargs == -1 else w for w, p in zip(words, arguments, strict=True)]
-    usage = " ".join([name, "[OPTIONS]", *words])
-    rows = [(f"`{w}`", p.help or "", "") for w, p in zip(words, arguments, strict=True)]
-    rows += [(_option(p), p.help or "", _default(p)) for p in options if not p.hidden]
-    body = table(("word", "meaning", "default"), rows)
-    return f"{level} {name}\n\n{_prose(command.help)}\n\n```text\n{usage}\n```\n\n{body}"
-
-
-def _prose(text: str | None) -> str:
-    return plain((text or "").replace("\b", ""))
-
-
-def _option(p: Any) -> str:
-    if p.is_flag:
-        return ", ".join(f"`{o}`" for o in [*p.opts, *p.secondary_opts])
-    kind = re.sub(r"<class '|'>|pathlib\.|list\[|\]", "", str(p.type_descriptor.annotation))
-    named = {"Path": "FILE", "int": "N", "float": "X", "str": "TEXT"}.get(kind, "TEXT")
-    return f"`{p.opts[0]} {p.metavar or named}`" + (" (may be repeated)" if p.multiple else "")
-
-
-def _default(p: Any) -> str:
-    none = p.default is None or p.default is False or callable(p.default)
-    return "" if none else f"`{p.default}`"
+    kept.write_text(key)
 
 
 # --- exit codes ---------------------------------------------------------------------------------
@@ -570,6 +531,14 @@ def _prior(effect: Any) -> list[tuple[str, ...]]:
     ]
 
 
+class _AtMean(UpdatingContext):
+    """A search with natural frequencies that starts each effect at its mean: what is proposed."""
+
+    def optima(self, effect: Any) -> list[np.ndarray]:
+        """The mean of the prior alone."""
+        return [np.array([p.mean for p in effect.parameters])]
+
+
 class _Grounds:
     """The structures on which the contract of the effects is checked, each built when needed."""
 
@@ -579,7 +548,8 @@ class _Grounds:
     def proposed(self, family: Any) -> tuple[bool, Any]:
         """True if natural frequencies alone suffice; and an example of the effect."""
         ground = self.of(family)
-        by_poles = family.proposed(ground.by_poles)
+        given = ground.by_poles
+        by_poles = family.proposed(_AtMean(given.problem, given.null_fit))
         found = [*family.proposed(ground.by_responses), *by_poles]
         return bool(by_poles), found[0].effect if found else None
 
@@ -640,51 +610,3 @@ def _sections(text: str) -> str:
 
 def _definition(found: re.Match[str]) -> str:
     return f"**{found[1]}.** {' '.join(found[2].split())}\n\n"
-
-
-# --- Python -------------------------------------------------------------------------------------
-
-_EXPORTS = {
-    "chladni": "The names a script starts from",
-    "chladni_planning": "Planning a test",
-    "chladni_bench": "The virtual bench",
-    "chladni_studies": "Parameter studies",
-    "chladni.errors": "Errors",
-    "chladni.effects.effect": "To write an effect: the base class",
-    "chladni.effects.family": "To write an effect: its family",
-    "chladni.effects.registry": "To write an effect: the registry",
-    "chladni.io.nastran": "Nastran decks and results",
-    "chladni_specimens.plates": "Generated plates",
-    "chladni_envs.agents": "Agents that play the known methods",
-}
-
-
-def python_interface() -> str:
-    """Exports of the packages, by autodoc."""
-    from importlib import import_module
-
-    out, shown = ["# Python interface\n", BY.format("its docstrings")], set[int]()
-    for name, title in _EXPORTS.items():
-        module = import_module(name)
-        out.append(f"## {title}: `{name}`\n\n{plain(module.__doc__)}\n\n```{{eval-rst}}")
-        out += [f"{directive}\n" for directive in _directives(module, shown)]
-        out.append("```\n")
-    return "\n".join(out)
-
-
-def _directives(module: Any, shown: set[int]) -> Iterable[str]:
-    """Directives of a module's exports; what another module has shown already is left out."""
-    own = [n for n, v in vars(module).items() if getattr(v, "__module__", "") == module.__name__]
-    package = hasattr(module, "__path__")
-    names = getattr(module, "__all__", None) or [
-        n for n in (vars(module) if package else own) if not n.startswith("_")
-    ]
-    for name in names:
-        value = getattr(module, name)
-        if id(value) in shown:
-            continue
-        shown.add(id(value))
-        if inspect.isclass(value):
-            yield f".. autoclass:: {module.__name__}.{name}\n   :members:"
-        elif callable(value):
-            yield f".. autofunction:: {module.__name__}.{name}"

@@ -4,11 +4,13 @@
 - A block with the word ``file=NAME`` is written to that file.
 - Every other block is only shown.
 
-A picture whose path begins with the folder of the runs is made by a block above it. A page that
-needs data from outside of the repository names their folder in its first line, as
-``<!-- needs: spruce_plates -->``; it lies in ``../shared/recordings``.
+A picture whose path begins with the folder of the runs is made by a block above it; one that ends
+with ``.html.png`` is a photograph of a page. A build that has not run the blocks shows the small
+pictures of ``docs/pictures``. A page that needs data from outside of the repository names their
+folder in its first line, as ``<!-- needs: spruce_plates -->``; it lies in ``../shared/recordings``.
 
-``python docs/tutorial_blocks.py docs/tutorials/first_day.md`` runs one page.
+``python docs/tutorial_blocks.py docs/tutorials/first_day.md`` runs one page and makes its small
+pictures anew.
 """
 
 import hashlib
@@ -26,9 +28,12 @@ DOCS = Path(__file__).parent
 RUNS = DOCS / "_build" / "tutorials"
 RECORDINGS = DOCS.parents[1] / "shared" / "recordings"
 FENCE = re.compile(r"^```(\w+)?([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-PICTURE = re.compile(r"^!\[([^\]]*)\]\(\.\./_build/tutorials/([^)]*)\)$", re.MULTILINE)
+PICTURE = re.compile(r"^!\[([^\]]*)\]\(((?:\.\./)+)_build/tutorials/([^)]*)\)$", re.MULTILINE)
+SMALL = DOCS / "pictures"
+WIDE = 480  # of a small picture [px]
 PROGRESS = re.compile(r"^(?:\[\d+ s\] .*|\d+ of \d+ samples(?:, .* left)?)\n?", re.MULTILINE)
 SHOWN = 60  # lines of an output
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 
 
 @dataclass(frozen=True)
@@ -85,8 +90,40 @@ def run(page: Path) -> list[str] | None:
     folder.mkdir(parents=True)
     outputs = [_run(page, b, folder) for b in blocks(page.read_text(encoding="utf-8")) if _acts(b)]
     shown = [output for output in outputs if output is not None]
+    for made in pictures(page):
+        if made.name.endswith(".html.png") and CHROMIUM:
+            _photograph(made.with_suffix(""), made)
     kept.write_text(json.dumps({"key": key, "outputs": shown}))
     return shown
+
+
+def pictures(page: Path) -> list[Path]:
+    """Pictures that the blocks of a page make."""
+    text = page.read_text(encoding="utf-8")
+    return [RUNS / found[3] for found in PICTURE.finditer(text)]
+
+
+def _photograph(page: Path, path: Path) -> None:
+    """The upper part of a page, as a browser shows it."""
+    options = "--headless --no-sandbox --hide-scrollbars --window-size=800,600"
+    options += " --timeout=5000"
+    command = [str(CHROMIUM), *options.split(), f"--screenshot={path}", page.as_uri()]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+
+
+def small(picture: Path) -> Path:
+    """Place of the small picture of a picture."""
+    return SMALL / "-".join(picture.relative_to(RUNS).with_suffix(".webp").parts)
+
+
+def make_small(picture: Path) -> None:
+    """Keep a small picture."""
+    from PIL import Image
+
+    with Image.open(picture) as given:
+        made = given.convert("RGB")
+        made.thumbnail((WIDE, WIDE))
+        made.save(small(picture), quality=50, method=6)
 
 
 def _acts(block: Block) -> bool:
@@ -131,8 +168,12 @@ def shown(page: Path, outputs: list[str] | None) -> str:
     why = missing(page) or "this build has not run the tutorials"
 
     def picture(found: re.Match[str]) -> str:
-        there = (RUNS / found[2]).is_file()
-        return found[0] if there else f"*(No picture: {why}.)* {found[1]}"
+        made = RUNS / found[3]
+        if made.is_file():
+            return found[0]
+        if small(made).is_file():
+            return f"![{found[1]}]({found[2]}pictures/{small(made).name})"
+        return f"*(No picture: {why}.)* {found[1]}"
 
     return PICTURE.sub(picture, text)
 
@@ -159,10 +200,15 @@ def _short(output: str) -> str:
 def _key(page: Path) -> str:
     """Changes with the blocks of a page and with any file of the program."""
     acting = [b for b in blocks(page.read_text(encoding="utf-8")) if _acts(b)]
-    hashed = hashlib.sha256(repr([(b.words, b.text) for b in acting]).encode())
-    root = DOCS.parent
-    for folder in ("src", "envs", "meshes"):
-        for path in sorted((root / folder).rglob("*")):
+    words = repr([(b.words, b.text) for b in acting])
+    return key_of(words, *(DOCS.parent / folder for folder in ("src", "envs", "meshes")))
+
+
+def key_of(words: str, *places: Path) -> str:
+    """Changes with the words and with any file in these places."""
+    hashed = hashlib.sha256(words.encode())
+    for place in places:
+        for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
             if path.is_file() and "__pycache__" not in path.parts:
                 hashed.update(f"{path} {path.stat().st_size} {path.stat().st_mtime_ns}".encode())
     return hashed.hexdigest()
@@ -172,3 +218,5 @@ if __name__ == "__main__":
     for name in sys.argv[1:]:
         page = Path(name).resolve()
         sys.stdout.write(shown(page, run(page)))
+        for picture in filter(Path.is_file, pictures(page)):
+            make_small(picture)

@@ -1,5 +1,6 @@
 """The documents hang together, and what is written from the program is whole; without Sphinx."""
 
+import doctest
 import importlib.util
 import json
 import re
@@ -15,6 +16,9 @@ from chladni.effects import registry
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+EXAMPLES = DOCS / "examples.md"
+GALLERY = DOCS / "guide" / "gallery.md"
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 LINK = re.compile(r"(?<!`)\[[^\]\[]*\]\(([^)\s]+)\)")
 
 
@@ -45,7 +49,10 @@ def tutorial_blocks():
 def pages(reference):
     """Every page of the site by its path, with its text; "" for those that the build writes."""
     kept = [p for p in DOCS.rglob("*.md") if "_build" not in p.parts]
-    made = {DOCS / "reference" / f"{name}.md": "" for name in reference.pages()}
+    made = {
+        DOCS / "reference" / f"{name}.md": page() if name in ("commands", "python") else ""
+        for name, page in reference.pages().items()
+    }
     return {**{p: p.read_text(encoding="utf-8") for p in kept}, **made}
 
 
@@ -99,16 +106,121 @@ def test_a_key_that_no_class_documents_is_refused(reference, monkeypatch):
         reference.json_keys()
 
 
-def test_every_command_is_on_its_page(reference):
-    page = reference.commands()
-    assert [name for name in app.commands() if f"# chladni {name}" not in page] == []
-    assert "`--detect`" in page
+def test_every_command_has_a_page_with_an_example_of_it(reference):
+    commands = reference.command_pages
+    assert set(commands.groups()) == set(app.commands())
+    index = commands.commands()
+    for name in app.commands():
+        assert f"**[{name}](commands/{name}.md)**" in index
+        page = commands.command_page(name)
+        assert page.startswith(f"# chladni {name}\n")
+        assert re.search(rf"```sh\n(.*\n)*?chladni {name}\b", commands.example(name)), name
+    assert "`--detect`" in commands.command_page("plan")
 
 
 def test_every_word_and_option_has_a_meaning(reference):
-    rows = re.findall(r"^\| (`[^|]*) \| ([^|]*) \|", reference.commands(), re.MULTILINE)
+    pages = map(reference.command_pages.command_page, reference.command_pages.groups())
+    rows = re.findall(r"^\| (`[^|]*) \| ([^|]*) \|", "\n".join(pages), re.MULTILINE)
     assert rows
     assert not [word for word, meaning in rows if not meaning.strip()]
+
+
+def test_small_pictures_are_those_of_the_pages_and_light(tutorial_blocks):
+    """The gallery has all of its pictures, so that a quick build shows them."""
+    gallery = {tutorial_blocks.small(p) for p in tutorial_blocks.pictures(GALLERY)}
+    used = gallery.union(
+        *(map(tutorial_blocks.small, tutorial_blocks.pictures(page)) for page in TUTORIALS)
+    )
+    kept = set((DOCS / "pictures").iterdir())
+    assert not gallery - kept
+    assert not kept - used
+    assert sum(path.stat().st_size for path in kept) < 400e3
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        pytest.param(title, marks=[pytest.mark.slow] if slow else [])
+        for title, slow in re.findall(
+            r"^## (.*)\n\n(<!-- slow -->)?", EXAMPLES.read_text(encoding="utf-8"), re.MULTILINE
+        )
+    ],
+)
+def test_an_example_prints_what_it_says(reference, title, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (one,) = (e for e in reference.object_pages.examples() if e.title == title)
+    text = re.sub(r"^```.*$", "", one.text, flags=re.MULTILINE)
+    given = doctest.DocTestParser().get_doctest(text, {}, title, str(EXAMPLES), 0)
+    said = []
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert runner.run(given, out=said.append).failed == 0, "".join(said)
+
+
+def test_every_name_a_script_starts_from_has_an_example(reference):
+    pages = reference.object_pages
+    bare = [
+        one.full
+        for one in pages.public_objects().values()
+        if one.package == "chladni" and not pages.of_object(one)
+        and ">>>" not in (one.value.__doc__ or "")
+    ]  # fmt: skip
+    assert bare == []
+
+
+def test_names_of_pages_differ_by_more_than_case(reference):
+    names = [name.lower() for name in reference.object_pages.public_objects()]
+    assert len(set(names)) == len(names) > 150
+
+
+@pytest.mark.parametrize(
+    ("text", "page"),
+    [
+        ("chladni.diagnose", "reference/python/chladni.diagnose"),
+        ('chladni.diagnose("deck.bdf")', "reference/python/chladni.diagnose"),
+        ("chladni.exchange.to_xarray", "reference/python/chladni.to_xarray"),
+        ("FRF", "reference/python/chladni.FRF"),
+        ("chladni plan deck.bdf --units mm-t-s", "reference/commands/plan"),
+        ("CQUAD4", "reference/cards#card-cquad4"),
+        ("point-mass", "reference/effects#point-mass"),
+        ("chladni/SensorPlacement-v0", "reference/environments#chladnisensorplacement-v0"),
+        ("point-mass at 412=1e-5:2e-4", None),
+        ("chladni.nothing", None),
+        ("frequency", None),
+    ],
+)
+def test_names_in_text_lead_to_their_page(text, page):
+    place = module("name_links").place(text)
+    assert (place and "".join(place)) == page
+
+
+def test_literal_blocks_of_docstrings_are_blocks(reference):
+    text = reference.plain("Three lines::\n\n    a = 1\n\n    b = ``2``\n\nEnd.")
+    assert text.startswith("Three lines:\n\n~~~python\na = 1\n\nb =")
+    assert text.endswith("~~~\n\nEnd.")
+
+
+def test_brackets_about_a_fraction_are_stretched():
+    """Those about a symbol are not; a bar has no space; ln has."""
+    formula = module("mathml").formula
+    high = formula(r"\left(\frac{a}{b}\right)^2 + \left(c\right)")
+    assert high.count("stretched") == 2
+    assert "<mo>(</mo>" in high
+    assert 'lspace="0" rspace="0">|' in formula("|x|")
+    assert "mspace" in formula(r"2 \ln p")
+
+
+def test_a_link_that_leads_nowhere_is_named(tmp_path):
+    (tmp_path / "there").mkdir()
+    (tmp_path / "a.html").write_text(
+        '<p id="x"><a href="#x"></a><a href="#y"></a><a href="there/b.html#z"></a>'
+        '<a href="there/b.html#w%20v"></a><img src="c.png"><a href="https://nowhere.invalid/"></a>'
+    )
+    (tmp_path / "there/b.html").write_text('<p id="w v"><a href="../a.html?q=1"></a>')
+    assert list(module("links").broken(tmp_path)) == [
+        "a.html: #y",
+        "a.html: there/b.html#z",
+        "a.html: c.png",
+    ]
 
 
 def test_every_exit_code_has_a_meaning(reference):
@@ -233,7 +345,7 @@ def test_a_page_without_its_data_is_shown_without_pictures(tutorial_blocks, tmp_
     assert "a.png" not in tutorial_blocks.shown(page, None)
 
 
-@pytest.mark.parametrize("page", sorted((DOCS / "tutorials").glob("*.md")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("page", [*TUTORIALS, GALLERY], ids=lambda p: p.stem)
 def test_every_picture_of_a_tutorial_comes_from_its_own_run(page):
     for path in re.findall(r"!\[[^\]]*\]\(([^)]*)\)", page.read_text(encoding="utf-8")):
         assert path.startswith(f"../_build/tutorials/{page.stem}/"), path

@@ -22,3 +22,7 @@ def test_the_site_builds_and_its_tutorials_run(tmp_path):
     page = (tmp_path / "tutorials/first_day.html").read_text(encoding="utf-8")
     assert "The model lacks point-mass" in page
     assert (tmp_path / "searchindex.js").is_file()
+    links = subprocess.run(
+        [sys.executable, "docs/links.py", str(tmp_path)], cwd=ROOT, capture_output=True, text=True
+    )
+    assert links.returncode == 0, links.stdout

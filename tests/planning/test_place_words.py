@@ -15,6 +15,7 @@ from chladni_planning import PlanSettings, find_sensor_candidates, mounts_at, pl
 from chladni_planning.place_words import centre_ids, place_rules
 from chladni_planning.plan_page import in_words
 from chladni_planning.plan_summary import summary
+from chladni_specimens.forms import FORMS
 from chladni_specimens.plates import folded_panel
 
 PANEL = folded_panel()
@@ -182,3 +183,21 @@ def test_the_page_draws_allowed_places(tmp_path):
     assert "Grey: not allowed" in page
     sensors = json.loads((tmp_path / "out" / "plan.json").read_text())["sensors"]
     assert {s["label"]: s["cost"] for s in sensors}["513:n"] == 2
+
+
+def test_a_frame_of_beams_obeys_the_same_words():
+    """Two directions a grid, in the box or elsewhere as fixed; a part is that of the beams."""
+    made = FORMS["tube frame"].made(520)
+    x = made.points[:, 0]
+    half = f"box {x.min()} -9 -9 {np.median(x)} 9 9"
+    far = int(made.ids[made.beams.nodes.ravel()][np.argmax(x[made.beams.nodes.ravel()])])
+    fixed = [f"{far}:{axis}" for axis in ("+X", "+Y", "+Z")]
+    words = {"regions": [half], "fixed": fixed, "cost": {made.parts[0].name: 2.0}}
+    found = plan_test(made, PlanSettings(sensors=8, modes=4, draws=0, alike=1.0, **words))
+    labels = [found.mounts.labels[k] for k in found.layout]
+    assert set(fixed) <= set(labels)
+    rest = [found.mounts.points[k] for k in found.layout if found.mounts.labels[k] not in fixed]
+    assert np.max(rest, axis=0)[0] <= np.median(x) + 1e-9
+    assert len(set(found.mounts.labels)) == len(found.mounts.labels)
+    with pytest.raises(ChladniError, match=r"leave no place|no beam has an allowed place"):
+        plan_test(made, PlanSettings(forbidden=["box -9 -9 -9 9 9 9"]))

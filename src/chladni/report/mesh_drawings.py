@@ -25,7 +25,7 @@ EXPANDED = "expanded"  # side of the test on the whole mesh, as the page calls i
 _PAIRED = "The test moves at its sensors, the model as a whole."
 ON_MESH = (
     "The test is expanded to the whole mesh by the mixture of the model's modes that fits it best "
-    "(SEREP); choose the test to see it at its sensors alone."
+    "(SEREP). Choose the test to see it at its sensors alone."
 )
 _PAIRS = 8  # in a picture
 _OUTSIDE = 0.02  # of the structure's size: as far from a wall a place is looked at
