@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium as gym
@@ -15,6 +16,7 @@ from .reset_first import refuse_before_reset
 from .small_specimens import ModalSpecimen, plate
 
 if TYPE_CHECKING:
+    from chladni.search.next_measurement import Outlook
     from chladni.workflows.given_case import Source
 
 Reset = tuple[np.ndarray, dict[str, Any]]
@@ -50,6 +52,22 @@ def of_case(
     return specimen(case, modes, units=units, **words)
 
 
+def _of_outlook(
+    outlook: "Outlook | Sequence[Outlook] | str | Path",
+) -> tuple[Candidates, np.ndarray | None, tuple[str, ...]]:
+    """Candidates, places and labels of the sensors of an outlook."""
+    from chladni.search.next_measurement import Outlook, read_outlook, with_common_candidates
+    from chladni_planning import separating
+
+    known = read_outlook(Path(outlook)) if isinstance(outlook, str | Path) else outlook
+    every = with_common_candidates([known] if isinstance(known, Outlook) else known)
+    made = separating(every)
+    sensors = [c for c in every[0].candidates if c.kind == "sensor"]
+    places = [c.point_m for c in sensors if c.point_m is not None]
+    points = np.array(places) if len(places) == len(sensors) else None
+    return made, points, tuple(c.label for c in sensors)
+
+
 def kept_labels(labels: tuple[str, ...], kept: np.ndarray) -> tuple[str, ...]:
     """Labels of the kept candidates; their positions from 0 where candidates have no labels."""
     at = np.flatnonzero(kept).tolist()
@@ -62,7 +80,7 @@ def with_notes(info: dict[str, Any], notes: tuple[str, ...]) -> dict[str, Any]:
 
 
 class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
-    """Reach a layout of ``n_sensors`` that distinguishes the modes (or parameters).
+    """Reach a layout of ``n_sensors`` that distinguishes modes, parameters or explanations.
 
     Observation
         (n,) in [0, 1]. With moves = "delete" it is the effective independence of the remaining
@@ -96,6 +114,10 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     unusable : float              share of candidates that are unusable, drawn at each reset
     case : folder, deck or model  its mesh gives candidates and modes (phi is then None)
     modes : int                   number of target modes of a case
+    outlook : Outlook or several, or the folder of a diagnosis; its sensors are candidates, and the
+                                  layout separates the tied explanations. ``log_det`` is then
+                                  ln(1 + d²), the mean over pairs of explanations, with their
+                                  distance d in units of all that is not known; sensors are added
     units : str                   unit system of a bare deck, as mm-t-s; a case states its own.
                                   Where it is missing, the materials show it, and ``notes`` and the
                                   info of a reset name it.
@@ -120,6 +142,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         rules: Rules | None = None,
         unusable: float = 0.0,
         case: "Source | None" = None,
+        outlook: "Outlook | Sequence[Outlook] | str | Path | None" = None,
         modes: int = 24,
         units: str | None = None,
         regions: Sequence[str] = (),
@@ -130,6 +153,9 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     ) -> None:
         self.outline: np.ndarray | None = None
         self.notes: tuple[str, ...] = ()
+        self.criterion: Literal["D", "S"] = "D" if outlook is None else "S"
+        if outlook is not None:
+            moves, (phi, points, labels) = "add", _of_outlook(outlook)
         places = {"regions": regions, "fixed": fixed, "forbidden": forbidden, "cost": cost}
         specimen = of_case(case, modes, units, places, plate())
         price = specimen.cost if phi is None else None
@@ -148,7 +174,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             self.cost, self.candidates = price, replace(self.candidates, rows=rows)
         if self.labels and len(self.labels) != n:
             raise LabelError(f"{len(self.labels)} labels were given for {n} candidates")
-        usual = min(n, -(-5 * self.candidates.unknowns // 4))
+        usual = min(n, -(-5 * self.candidates.unknowns // 4)) if outlook is None else min(n, 3)
         self.n_sensors = usual if n_sensors is None else n_sensors
         if moves not in ("delete", "add"):
             raise LabelError(f"moves {moves!r}; there are delete and add")
@@ -199,7 +225,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         rules = self.rules
         if broken.any():
             rules = replace(rules, forbidden=rules.masks(len(broken))[1] | broken)
-        return Walk(self.candidates, self.n_sensors, rules, self.grow)
+        return Walk(self.candidates, self.n_sensors, rules, self.grow, self.criterion)
 
     def _info(self) -> dict[str, Any]:
         self.mask = np.zeros(len(self.candidates), bool) if self.walk.done() else self.walk.may()

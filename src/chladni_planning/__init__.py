@@ -49,6 +49,7 @@ from .layouts.layout_rules import Rules as Rules
 from .layouts.layout_rules import too_near as too_near
 from .layouts.layout_search import evolved as evolved
 from .layouts.layout_walk import Walk as Walk
+from .layouts.separation import separating as separating
 from .measurement_lines import burst_random_time as burst_random_time
 from .measurement_lines import delay_at as delay_at
 from .measurement_lines import delay_cycles as delay_cycles
@@ -139,6 +140,7 @@ __all__ = [
     "seen_at",
     "sensitivity_rows",
     "sensors_csv",
+    "separating",
     "shaking",
     "summary",
     "target_modes",

@@ -117,6 +117,7 @@ def test_json_of_a_diagnosis_is_the_result_of_its_function(
         "report": "report.html",
         "diagnosis": "diagnosis.json",
         "outlook": "outlook.npz",
+        "posterior": "posterior.json",
     }
     due = plain(to_json(diagnosed))
     assert due.pop("files") == {}

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tests.builders.cases import changed_case
-from tests.builders.commands import ran
-from tests.builders.plate_recordings import MASS, PLACE, SHAKERS, T, a_case, record
+from tests.builders.commands import ran, refused
+from tests.builders.plate_recordings import MASS, PLACE, SENSORS, SHAKERS, T, a_case, record
 
 import chladni
 from chladni.ema.setup import PoleTable
@@ -63,6 +63,40 @@ def test_what_is_common_is_one_number(diagnosed):
     assert shared["t"].low < T < shared["t"].high
     assert all("was fitted together with" in s.result.notes[0] for s in diagnosed.states)
     assert "point-mass is in 'with 20 g' only" in diagnosed.notes
+
+
+def test_a_later_recording_builds_on_an_answer(changed, diagnosed, tmp_path):
+    """A repeat of the loaded plate has the odds of both, and a narrower interval of the mass.
+
+    The same recordings are refused, that of another state too.
+    """
+    write_diagnosis(tmp_path / "run", changed, diagnosed)
+    earlier = tmp_path / "run" / "state-2-with-20-g"
+    mass = record(tmp_path / "later.npz", mass=MASS, seed=2)
+    later = a_case(tmp_path, mass, {"file": "later.npz"}, tried=TRIED)
+    found = chladni.diagnose(later, earlier=earlier)
+    (effect,) = found.effects
+    assert effect.name == "point-mass"
+    assert any(n.startswith(f"this answer builds on that of {earlier}") for n in found.notes)
+    before = diagnosed.states[1].result
+    assert found.agreement.two_log_bayes_factor > before.agreement.two_log_bayes_factor
+    wide, narrow = (_mass(r) for r in (before, found))
+    assert narrow.high - narrow.low < wide.high - wide.low
+    assert len(found.posterior.data) == len(before.posterior.data) + len(SENSORS)
+    used = tmp_path / "used"
+    used.mkdir()
+    for name in ("bare", "loaded"):
+        (used / "frf.npz").write_bytes((changed.path.parent / f"{name}.npz").read_bytes())
+        a_case(used, mass, {"file": "frf.npz"}, tried=TRIED)
+        words = ("diagnose", used, "--earlier", earlier, "--out", tmp_path / "out")
+        assert "so they would count twice" in refused(*words)
+    words = ("diagnose", changed.path, "--earlier", earlier, "--out", tmp_path / "out")
+    assert "choose one by [test] use" in refused(*words)
+
+
+def _mass(result):
+    """The estimate of the mass of the named effect."""
+    return next(p for p in result.effects[0].parameters if p.name == "M")
 
 
 def test_every_state_has_its_deck_and_its_place_on_the_page(changed, diagnosed, tmp_path):

@@ -11,10 +11,23 @@ from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..inference.result import NextMeasurement
 from ..output import run_folder, write_json, write_text
+from ..report.blocks import Section
+from ..report.information_map import information_map, shown_of_run
 from ..report.measurement_table import next_measurements
+from ..report.mesh_drawings import mesh_of
+from ..report.page import write_sections
+from ..report.shown import Shown
 from ..report.typed_fields import as_data
 from ..report.words import odds_of
-from ..search.next_measurement import ADVISED, FILE, ODDS, Outlook, advised, read_outlook
+from ..search.next_measurement import (
+    ADVISED,
+    FILE,
+    ODDS,
+    Outlook,
+    advised,
+    read_outlook,
+    with_common_candidates,
+)
 from ..workflows.before_any_test import PlannedTests, before_any_test
 from ..workflows.loaded_model import model_in_si
 from .console import say, say_results, say_table, watched
@@ -60,7 +73,7 @@ def run(
         Path | None,
         typer.Option(
             "--out",
-            help="Folder for next.json, sensors.csv and plan.json (chladni bench --add).",
+            help="Folder for the page, next.json, sensors.csv and plan.json (chladni bench --add).",
             metavar="DIR",
             parser=folder_named,
         ),
@@ -85,7 +98,8 @@ def run(
         _known([known], barred)
         every = advised([known], count, odds, barred)
         _tell(known.names, every, odds)
-        _write(out, source / FILE, known.names, every)
+        drawn = _page(shown_of_run(source) if out else None, [known], every, odds)
+        _write(out, source / FILE, known.names, every, drawn)
         return
     names = tuple(dict.fromkeys(word.strip() for word in effects.split(",") if word.strip()))
     with watched() as progress:
@@ -103,7 +117,12 @@ def run(
     _planned(made)
     if made.open:
         _tell(names, every, odds)
-    _write(out, source, names, every)
+    drawn = list[Section]()
+    if out and made.open:
+        model = model_in_si(source, "next", units, allow or ())[0]
+        together = with_common_candidates([t.outlook for t in made.open])
+        drawn = _page(mesh_of(model.seen, model.assembly), together, every, odds)
+    _write(out, source, names, every, drawn)
 
 
 def _planned(made: PlannedTests) -> None:
@@ -138,10 +157,21 @@ def _tell(names: Sequence[str], every: Sequence[NextMeasurement], odds: float) -
         say(f"none of the candidates tells {' and '.join(names)} apart")
 
 
+def _page(
+    shown: Shown | None, outlooks: Sequence[Outlook], every: Sequence[NextMeasurement], odds: float
+) -> list[Section]:
+    """The advice, and the map of what a sensor would tell."""
+    if not every:
+        return []
+    drawn = [] if shown is None else information_map(shown, outlooks)
+    return [Section("Next measurement", [next_measurements(every, odds), *drawn])]
+
+
 def _write(
-    out: Path | None, source: Path, names: Sequence[str], every: Sequence[NextMeasurement]
-) -> None:
-    """Write the advice, and the places for a test or the bench."""
+    out: Path | None, source: Path, names: Sequence[str], every: Sequence[NextMeasurement],
+    drawn: Sequence[Section],
+) -> None:  # fmt: skip
+    """Write the advice with its page, and the places for a test or the bench."""
     if out is None:
         return
     by_kind = {kind: [m for m in every if m.kind == kind] for kind in ("sensor", "mass", "drive")}
@@ -157,4 +187,8 @@ def _write(
             "band_hz": [m.amount for m in every if m.kind == "band"],
         }
         write_json(part / "plan.json", plan)
+        if drawn:
+            title = f"next – {source.name if source.name != FILE else source.parent.name}"
+            lead = f"To tell apart: {', '.join(names)}." if len(names) > 1 else ""
+            write_sections(part / "report.html", title, drawn, lead=lead)
     say_results(out)

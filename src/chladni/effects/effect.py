@@ -245,6 +245,7 @@ class Effect:
     point: tuple[float, float, float] | None = None  #: its place in the basic frame [m]
     radius: float | None = None  #: [m]
     trials_factor: int = 1  #: places tried, this one included (look-elsewhere effect)
+    two_log_odds: float = 0.0  #: 2 ln of its odds over calibration, from an earlier recording
     replaces: tuple[str, ...] = ()  #: names of calibration parameters that it makes superfluous
     channels: tuple[str, ...] = field(default=())
     expected: bool = False  #: the materials of the deck usually have it

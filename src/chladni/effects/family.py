@@ -95,6 +95,7 @@ class Family:
     settled_by: str = ""  #: the measurement that separates it from similar causes, in words
     needs: str = ""  #: what the structure must have in addition to sheets; "": nothing
     on_sheets: bool = False  #: it acts on shells only: a structure of beams does not try it
+    before: "Family | None" = None  #: the family without what an earlier answer says of it
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(-[a-z]+)*", self.name) or self.name == Effect.name:

@@ -160,8 +160,11 @@ class UpdatingProblem:
         return replace(self, data=self.data.allowing_errors(state, delta))
 
     def holding(self, found: Sequence[tuple[Effect, np.ndarray]]) -> "UpdatingProblem":
-        """Return the problem with effects in its base, and their changes in its model."""
-        problem = self
+        """Return the problem with effects in its base, and their changes in its model.
+
+        The odds of an earlier answer are those of single effects: next to these, others have none.
+        """
+        problem = replace(self, families=tuple(f.before or f for f in self.families))
         for effect, x in found:
             model = problem.reduced.model_for(effect, x)
             problem = replace(

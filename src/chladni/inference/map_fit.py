@@ -127,14 +127,14 @@ def _by_effects(
 
 
 def constants(effects: Sequence[Effect]) -> float:
-    """Terms of -2 ln evidence from the effects: prior widths, number of places, extra data.
+    """Terms of -2 ln evidence from the effects: prior widths and odds, places, extra data.
 
     An effect may be compared with extra data, such as measured damping.  Only the likelihood ratio
     with and without the effect counts there, so all hypotheses are compared on the same data.
     """
     widths = sum(2 * np.log(p.sd) for p in unknowns(effects))
     without = [0.0 if e.damping is None else e.damping.neg2_log_evidence() for e in effects]
-    places = [2 * np.log(e.trials_factor) for e in effects]
+    places = [2 * np.log(e.trials_factor) - e.two_log_odds for e in effects]
     return float(widths + sum(p - w for p, w in zip(places, without, strict=True)))
 
 

@@ -136,7 +136,7 @@ class NextMeasurement:
     point_m : its place [m]
     amount : [kg] of a mass, [Hz] of the top of a band
     bits : information that all of them are expected to bring together
-    settles : probability that the true explanation then has odds of 10 : 1 or better
+    settles : probability that the true explanation is then tied with no other
     misleads : probability that a wrong one has
     about : the quantity; "" where explanations are tied
     narrows : width of its interval after them, of that before

@@ -20,6 +20,7 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from . import frf_charts, live_mesh
 from .blocks import Drawing, Still, still
 from .calibration_charts import study_drawings
+from .information_map import information_map
 from .level_blocks import level_drawings
 from .mesh_drawings import TURN, field, layout, spatial
 from .shown import CALM, Shown
@@ -60,6 +61,8 @@ def drawings(case: Case, result: DiagnosisResult, shown: Shown) -> list[Drawing]
     made += _modes(case, result, shown)
     made += [*level_drawings(result.levels).values()]
     made += [*study_drawings(result.study), *_energy(result, shown)]
+    if result.outlook is not None and result.next_measurements:
+        made += [replace(d, place="next") for d in information_map(shown, [result.outlook])]
     if shown.outputs or shown.inputs:
         made.append(replace(layout("setup", shown, "setup", "Sensors and shaker."), place="test"))
     return made

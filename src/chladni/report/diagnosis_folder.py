@@ -8,6 +8,7 @@ from ..case import Case
 from ..io.nastran import changed_lines, write_deck
 from ..output import write_json, write_npz
 from ..progress import Progress, silent
+from ..search import earlier_answer
 from ..search.next_measurement import FILE, arrays_of
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
@@ -16,6 +17,7 @@ from .blocks import Code, Section, Text, write_pictures
 from .calibration_blocks import calibration_json
 from .diagnosis_drawings import drawings
 from .diagnosis_json import diagnosis_json
+from .information_map import with_surface
 from .page import write_page
 from .shown import Shown
 from .states_table import state_folder
@@ -43,17 +45,22 @@ def write_diagnosis(
     folder.mkdir(parents=True, exist_ok=True)
     home = home or folder
     result = _with_states(folder, case, result, progress, home, pictures)
+    seen = shown(case, result)
     files = _decks(folder, case, result, home)
     files |= {"report": "report.html", "diagnosis": "diagnosis.json"}
     if result.study is not None:
         files["calibration"] = "calibration.json"
         write_json(folder / "calibration.json", calibration_json(result))
     if result.outlook is not None:
-        files["outlook"] = write_npz(folder / FILE, **arrays_of(result.outlook)).name
+        arrays = with_surface(arrays_of(result.outlook), seen.seen)
+        files["outlook"] = write_npz(folder / FILE, **arrays).name
+    if result.posterior is not None:
+        left = earlier_answer.posterior_json(result.posterior)
+        files["posterior"] = write_json(folder / earlier_answer.FILE, left).name
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)
-    drawn = drawings(case, result, shown(case, result))
+    drawn = drawings(case, result, seen)
     figures = {name: folder / name for name, _ in write_pictures(folder, drawn, pictures)}
     title = f"{'Diagnosis' if result.searched else 'Calibration'} – {case.path.parent.name}"
     write_page(

@@ -14,7 +14,7 @@ from .screening_blocks import screening_json
 from .typed_fields import as_data, made
 
 Json = Mapping[str, Any]
-_UNWRITTEN = ("origin", "models", "residual_localisation", "outlook")
+_UNWRITTEN = ("origin", "models", "residual_localisation", "outlook", "posterior")
 _Q = {  # key: field of Scores
     "Q_nominal": "nominal",
     "Q_calibrated": "calibrated",

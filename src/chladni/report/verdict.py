@@ -59,6 +59,7 @@ _FILES = {
     "calibration": "what could be known, basins, covariance and profiles for other programs",
     "frf": "test and model as arrays",
     "outlook": "forecasts of further measurements, for chladni next",
+    "posterior": "odds and posterior, for chladni diagnose --earlier",
 }
 
 
@@ -126,7 +127,7 @@ def sections(
         Section("Reasons for doubt", [Items(result.distrust)] if result.distrust else []),
         *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
-        Section("Next measurement", _advised(result)),
+        Section("Next measurement", [*_advised(result), *shown("next")]),
         Section("At a glance", _glance(result)),
         Section("Findings", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),

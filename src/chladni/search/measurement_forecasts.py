@@ -4,7 +4,7 @@ Every explanation predicts the data of a further measurement with its own unknow
 and errors of form, as the recording left them (linear about its fit).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -121,7 +121,7 @@ class Rival:
 
 def outlook(
     problem: UpdatingProblem, hypotheses: Sequence[HypothesisFit], names: Sequence[str],
-    probability: np.ndarray,
+    probability: np.ndarray, kinds: Collection[str] = tuple(COSTS),
 ) -> Outlook | None:  # fmt: skip
     """Forecast every candidate measurement under each hypothesis; None without responses.
 
@@ -129,11 +129,12 @@ def outlook(
     ----------
     hypotheses : each with its own model; of one alone, its least known quantity is forecast
     names, probability : of each
+    kinds : of the candidates
     """
     if not hypotheses or not isinstance(problem.data, Responses):
         return None
     rivals = [Rival(problem, h) for h in hypotheses]
-    found = list(measurements(problem, rivals))
+    found = list(measurements(problem, rivals, kinds))
     kept = _kept([seen for _, seen in found])
     seen = tuple(
         Predicted(
@@ -171,22 +172,24 @@ Seen = list[tuple[np.ndarray, np.ndarray]]  # of each rival: mean and factor
 
 
 def measurements(
-    problem: UpdatingProblem, rivals: Sequence[Rival]
+    problem: UpdatingProblem, rivals: Sequence[Rival], kinds: Collection[str] = tuple(COSTS)
 ) -> Iterator[tuple[FurtherTest, Seen]]:
-    """Every candidate, with its prediction under each rival."""
+    """Every candidate of some kinds, with its prediction under each rival."""
     data, places = rivals[0].data, problem.reduced.candidates
     places = places.only(places.spread(PLACES))
     few = places.only(places.spread(MASSES))
     lines = data.s[np.unique(np.linspace(0, len(data.s) - 1, LINES).astype(int))]
-    sensors = [_new(r, rivals[0], lines, places.rows, data.inputs) for r in rivals]
-    for k in range(len(places)):
-        yield _placed("sensor", "a sensor at", places, k), [each.of_output(k) for each in sensors]
-    if not np.any(data.direct):
+    if "sensor" in kinds:
+        sensors = [_new(r, rivals[0], lines, places.rows, data.inputs) for r in rivals]
+        for k in range(len(places)):
+            seen = [each.of_output(k) for each in sensors]
+            yield _placed("sensor", "a sensor at", places, k), seen
+    if "drive" in kinds and not np.any(data.direct):
         drives = [_new(r, rivals[0], lines[::FEW], data.outputs, few.rows) for r in rivals]
         for k in range(len(few)):
             yield _placed("drive", "a drive at", few, k), [each.of_input(k) for each in drives]
     heavy = SHARE * problem.setup.weight
-    for k in range(len(few)):
+    for k in range(len(few) if "mass" in kinds else 0):
         states = [r.with_mass(few, k, heavy) for r in rivals]
         if None not in states:
             yield (
@@ -194,18 +197,21 @@ def measurements(
                 [_new(r, rivals[0], lines[::FEW], data.outputs, data.inputs, s, states[0]).seen
                  for r, s in zip(rivals, states, strict=True)],
             )  # fmt: skip
-    top = float(data.s.imag.max())
-    ratio = data.s[-1].real / data.s[-1].imag
+    if "band" in kinds:
+        yield _wider_band(rivals)
+    if "weighing" in kinds:
+        what = f"a weighing to {1e3 * WEIGHED:.2g} g"
+        yield FurtherTest("weighing", what, cost=COSTS["weighing"]), [r.weight() for r in rivals]
+
+
+def _wider_band(rivals: Sequence[Rival]) -> tuple[FurtherTest, Seen]:
+    """Lines above the highest one, up to ``ABOVE`` times it."""
+    data = rivals[0].data
+    top, ratio = float(data.s.imag.max()), data.s[-1].real / data.s[-1].imag
     wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
     hertz = ABOVE * top / (2 * np.pi)
-    yield (
-        FurtherTest("band", f"lines up to {hertz:.4g} Hz", cost=COSTS["band"], amount=hertz),
-        [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals],
-    )
-    yield (
-        FurtherTest("weighing", f"a weighing to {1e3 * WEIGHED:.2g} g", cost=COSTS["weighing"]),
-        [r.weight() for r in rivals],
-    )
+    found = FurtherTest("band", f"lines up to {hertz:.4g} Hz", cost=COSTS["band"], amount=hertz)
+    return found, [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals]
 
 
 def _placed(kind: str, what: str, places: ElementGrids, k: int, amount: float = 0.0) -> FurtherTest:

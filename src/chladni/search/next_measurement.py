@@ -24,10 +24,11 @@ from ..inference.expected_information import (
 )
 from ..inference.result import NextMeasurement
 from ..results import ShownBriefly
+from .decision_rules import TIED
 
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
-ODDS = 10.0
+ODDS = float(round(np.exp(TIED / 2)))  # that settle: beyond them a diagnosis ties nothing
 
 
 @dataclass(frozen=True)

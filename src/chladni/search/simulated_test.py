@@ -6,7 +6,7 @@ of interest are then fitted to the recording, as in a diagnosis.  What it leaves
 question of further measurements (:mod:`.next_measurement`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,6 +18,7 @@ from ..effects.family import Article
 from ..effects.registry import family
 from ..errors import FileError, ModelError
 from ..fem.energy import mass_properties
+from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import modelled
 from ..geometry.sampling import nearest_points
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
@@ -30,7 +31,7 @@ from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
 from .candidates import candidates
 from .diagnosis import without_effects
-from .measurement_forecasts import outlook
+from .measurement_forecasts import COSTS, outlook
 from .next_measurement import Outlook
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .preparation import (
@@ -83,7 +84,7 @@ class FirstTest:
     Attributes
     ----------
     name : of the concealed effect
-    truth : as the article states it
+    question, article : what was tested, and how
     problem : with the recording
     reduced : of the article itself
     hypotheses, names : of the rivals
@@ -91,7 +92,8 @@ class FirstTest:
     """
 
     name: str
-    truth: dict
+    question: Question
+    article: Article
     problem: UpdatingProblem
     reduced: ReducedProblem
     hypotheses: tuple[HypothesisFit, ...]
@@ -101,7 +103,11 @@ class FirstTest:
     @cached_property
     def outlook(self) -> Outlook:
         """Forecasts of further measurements."""
-        found = outlook(self.problem, self.hypotheses, self.names, self.probability)
+        return self.forecasts()
+
+    def forecasts(self, kinds: Collection[str] = tuple(COSTS)) -> Outlook:
+        """Forecasts of further measurements of some kinds."""
+        found = outlook(self.problem, self.hypotheses, self.names, self.probability, kinds)
         assert found is not None
         return found
 
@@ -174,6 +180,34 @@ def _tested(
         article = family(name).conceal(article, rng)
     except (ModelError, ValueError, IndexError) as error:
         raise FileError(f"{name}: this deck has nothing that it acts on ({error})") from error
+    measured, reduced = recorded(question, problem, article, rng, noise)
+    return FirstTest(name, question, article, *explained(measured, reduced))
+
+
+def with_sensors(
+    test: FirstTest, further: MeasuredDofs, rng: np.random.Generator, noise: float = NOISE
+) -> FirstTest:
+    """The test with further sensors, of gain 1: its data stay, and all effects are fitted anew."""
+    question = replace(test.question, outputs=test.question.outputs.joined(further))
+    gains = np.ones(len(question.outputs.labels))
+    n = len(test.article.gains)
+    gains[:n] = test.article.gains
+    article = replace(test.article, gains=gains)
+    problem, reduced = recorded(question, unmeasured(question, noise), article, rng, noise)
+    first, whole = test.problem.data, problem.data
+    assert isinstance(first, Responses)
+    assert isinstance(whole, Responses)
+    data = replace(whole, values=np.concatenate([first.values, whole.values[:, n:]], axis=1))
+    weighed = test.problem.mass_measurement
+    problem = replace(problem, data=data, mass_measurement=weighed)
+    return FirstTest(test.name, question, article, *explained(problem, reduced))
+
+
+def recorded(
+    question: Question, problem: UpdatingProblem, article: Article, rng: np.random.Generator,
+    noise: float = NOISE,
+) -> tuple[UpdatingProblem, ReducedProblem]:  # fmt: skip
+    """The problem with the recording of an article, which is weighed too, and the article."""
     f_max = problem.reduced.f_max
     solved = modelled(question.searched(article.assembly), SOLVED * f_max)
     rows = question.outputs.rows(solved.structure), question.inputs.rows(solved.structure)
@@ -188,17 +222,23 @@ def _tested(
     assert weighed is not None
     mass = article.weight - article.off_scale + weighed.sd * rng.standard_normal()
     weighed = replace(weighed, mass=mass + sum(m for _, m in question.sensor_masses))
-    measured = replace(problem, data=replace(data, values=values), mass_measurement=weighed)
+    return replace(problem, data=replace(data, values=values), mass_measurement=weighed), reduced
+
+
+def explained(
+    measured: UpdatingProblem, reduced: ReducedProblem
+) -> tuple[UpdatingProblem, ReducedProblem, tuple[HypothesisFit, ...], tuple[str, ...], np.ndarray]:
+    """Fit all families of a problem to its recording: the last five fields of a test."""
     measured, null = without_effects(measured)
     found = search_round(measured, null, candidates(measured, null), silent)
     by_name = {h.effect.name: h for h in found}
-    names = tuple(f.name for f in problem.families)
+    names = tuple(f.name for f in measured.families)
     if lost := [n for n in names if n not in by_name]:
         raise FileError(f"{lost[0]}: this deck has nothing that it acts on")
     fits = tuple(by_name[n] for n in names)
     S = np.array([h.neg2_log_evidence for h in fits])
     p = np.maximum(np.exp(-(S - S.min()) / 2), LEAST)
-    return FirstTest(name, article.truth, measured, reduced, fits, names, p / p.sum())
+    return measured, reduced, fits, names, p / p.sum()
 
 
 def _article(question: Question, made: Assembly) -> Article:

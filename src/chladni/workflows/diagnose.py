@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Unpack
 
 from ..arguments import checked
@@ -17,6 +18,7 @@ def diagnose(
     source: Source,
     recording: Measured | Sequence[Measured] = (),
     *,
+    earlier: str | Path | None = None,
     progress: Progress = silent,
     **words: Unpack[CaseWords],
 ) -> DiagnosisResult:
@@ -28,6 +30,8 @@ def diagnose(
         :func:`chladni.load_case`), which then says everything else itself
     recording : one or several: paths, ``FRF`` with channels as ``412:+Z``, ``PoleTable``,
         ``Recording``, or dicts with the keys of a [[recording]]; the first is compared
+    earlier : folder of an answer about the same object, from other data: its odds and posterior
+        are the prior here
     progress : is called with a text and a share of the work
     words : units, sensors, mass, band, effects and the other words of a case, as
         :class:`chladni.CaseWords` lists them (SI, Hz); without units a deck's materials say them
@@ -51,4 +55,5 @@ def diagnose(
         found.save("runs/first")
     """
     case = given_case(source, recording, words)
-    return replace(diagnose_states(case, True, progress), origin=case)
+    found = diagnose_states(case, True, progress, earlier=earlier)
+    return replace(found, origin=case)

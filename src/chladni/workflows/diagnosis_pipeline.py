@@ -27,6 +27,7 @@ from ..search.damping_by_part import damping_by_part
 from ..search.decide import decide
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
+from ..search.earlier_answer import EarlierAnswer, digests, earlier_answer
 from ..search.hypotheses import ALONE, Hypotheses
 from ..search.left_frequencies import left_frequencies
 from ..search.measurement_forecasts import outlook
@@ -58,11 +59,13 @@ class Explained:
     study: CalibrationStudy | None = None
     distrust: tuple[str, ...] = ()
     outlook: Outlook | None = None
+    earlier: EarlierAnswer | None = None
+    posterior: EarlierAnswer | None = None
 
 
 def searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    settings: CalibrationSettings = FULL,
+    settings: CalibrationSettings = FULL, earlier: EarlierAnswer | None = None,
 ) -> Explained:  # fmt: skip
     """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
@@ -72,6 +75,7 @@ def searched(
     ----------
     known : posterior of the shared parameters from other states
     settings : of a calibration
+    earlier : the answer that a diagnosis builds on
 
     Raises
     ------
@@ -80,14 +84,16 @@ def searched(
     """
     made, faults = mending(
         with_sign_of_gain(case),
-        lambda case, faults: _searched(case, diagnosing, progress, known, settings, faults),
+        lambda case, faults: _searched(
+            case, diagnosing, progress, known, settings, faults, earlier
+        ),
     )
     return replace(made, screening=with_undone(made.screening, faults))
 
 
 def _searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None,
-    settings: CalibrationSettings, faults: tuple[Finding, ...],
+    settings: CalibrationSettings, faults: tuple[Finding, ...], earlier: EarlierAnswer | None,
 ) -> Explained:  # fmt: skip
     """Fit the recording as it is; ``faults`` were undone already."""
     progress("identifying the recording", 0.0)
@@ -97,9 +103,13 @@ def _searched(
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
+    if earlier is not None:
+        informed_too = earlier.informed(prepared.problem)
+        prepared = replace(prepared, problem=informed_too, notes=(earlier.note, *prepared.notes))
     stage = within(progress, 0.1, 0.85)
     if diagnosing:
-        return Explained(case, question, prepared, compared(prepared.problem, stage), screening)
+        found = compared(prepared.problem, stage)
+        return Explained(case, question, prepared, found, screening, earlier=earlier)
     made = calibration(prepared.problem, stage, settings)
     articles = articles_together(question, prepared, made.diagnosis.null)
     study = replace(made.study, articles=articles)
@@ -109,15 +119,30 @@ def _searched(
 
 def explained(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None,
-    settings: CalibrationSettings = FULL,
+    settings: CalibrationSettings = FULL, earlier: EarlierAnswer | None = None,
 ) -> Explained:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
-    made = searched(case, diagnosing, progress, known, settings)
+    made = searched(case, diagnosing, progress, known, settings, earlier)
     found, distrust, known_outlook = _apply_held_out(made, diagnosing)
     seen = made.screening
     if seen is not None and seen.faults and not diagnosing:
         distrust = (*distrust, f"{seen.sentence}; a fit to it distorts the model")
-    return replace(made, found=found, distrust=distrust, outlook=known_outlook)
+    left = _left_to_later(made, found) if diagnosing else None
+    return replace(made, found=found, distrust=distrust, outlook=known_outlook, posterior=left)
+
+
+def _left_to_later(made: Explained, found: Diagnosis) -> EarlierAnswer:
+    """Odds and posterior of the answer, for a later recording of the same object."""
+    case, names = made.case, found.one_of
+    named = found.found
+    said = named.name if named else f"one of {', '.join(names)}" if names else found.verdict
+    return earlier_answer(found, said, case.setup.mass, data_of(case), made.earlier)
+
+
+def data_of(case: Case) -> dict[str, str]:
+    """Digests of the recording that is fitted."""
+    poles = case.recordings[0].poles
+    return digests(case.frfs[:1], None if poles is None else poles.frequency)
 
 
 def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
@@ -165,6 +190,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     return replace(
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
         outlook=ahead, next_measurements=() if ahead is None else advised([ahead]),
+        posterior=known.posterior,
     )  # fmt: skip
 
 

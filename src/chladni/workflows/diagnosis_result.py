@@ -32,6 +32,7 @@ from ..inference.result import (
 from ..io.nastran.edit.changes import Change
 from ..io.nastran.text.deck import Deck
 from ..results import Result, ShownBriefly
+from ..search.earlier_answer import EarlierAnswer
 from ..search.measured_modes import MeasuredModes
 from ..search.next_measurement import Outlook
 
@@ -124,6 +125,7 @@ class DiagnosisResult(Result):
     models: UpdatedModels | None = None
     residual_localisation: ResidualLocalisation | None = None
     outlook: Outlook | None = None
+    posterior: EarlierAnswer | None = None
     recordings: tuple[RecordingScore, ...] = ()
     levels: tuple[LevelTable, ...] = ()
     joints: tuple[LinearJoint, ...] = ()

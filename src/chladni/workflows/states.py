@@ -7,9 +7,11 @@
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 from ..case import Case
 from ..case.recording_groups import of_state, states
+from ..errors import FileError
 from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.joint_fit import JointFit, joint_fit
 from ..inference.written_hypothesis import as_written
@@ -17,8 +19,9 @@ from ..parallel import one_blas_thread
 from ..progress import Progress, within
 from ..search.calibration import FULL, CalibrationSettings
 from ..search.diagnosis import Diagnosis
+from ..search.earlier_answer import EarlierAnswer, read_earlier
 from ..search.result_parts import shared_values
-from .diagnosis_pipeline import Explained, build_result, explained
+from .diagnosis_pipeline import Explained, build_result, data_of, explained
 from .diagnosis_result import DiagnosisResult, StateResult
 from .effects_by_state import by_state
 from .output_only import with_natural_frequencies
@@ -27,18 +30,23 @@ from .screening_of_case import RecordingAtFault, at_fault
 
 def diagnose_states(
     case: Case, diagnosing: bool, progress: Progress,
-    settings: CalibrationSettings = FULL,
+    settings: CalibrationSettings = FULL, earlier: str | Path | None = None,
 ) -> DiagnosisResult:  # fmt: skip
     """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread.
 
     Parameters
     ----------
     settings : of a calibration; states share one set of parameters, so that none is frozen
+    earlier : folder of the answer that a diagnosis builds on
     """
     with one_blas_thread():
         case = with_natural_frequencies(case)
         names = states_compared(case)
         try:
+            if earlier is not None:
+                case, before = _after(case, names, Path(earlier))
+                known = explained(case, True, progress, before.shared, settings, before)
+                return build_result(known, True, progress)
             if len(names) < 2:
                 known = explained(case, diagnosing, progress, settings=settings)
                 return build_result(known, diagnosing, progress)
@@ -46,6 +54,28 @@ def diagnose_states(
             return _in_states(case, names, diagnosing, progress, shared)
         except RecordingAtFault as fault:
             return at_fault(case, fault.screening, diagnosing)
+
+
+def _after(case: Case, names: tuple[str, ...], folder: Path) -> tuple[Case, EarlierAnswer]:
+    """The case without what an earlier answer used, and that answer.
+
+    Raises
+    ------
+    FileError
+        If the case has several states, or its recording was used.
+    """
+    if len(names) > 1:
+        raise FileError(
+            f"{case.path}: --earlier takes a recording of one state, and there are "
+            f"{', '.join(names)}; choose one by [test] use"
+        )
+    before = read_earlier(folder)
+    before.refuse_again(data_of(case), case.path)
+    if case.setup.mass is None or case.setup.mass != before.mass:
+        return case, before
+    note = f"[test] mass is that of {folder}, whose answer used it, so it is not used again"
+    setup = replace(case.setup, mass=None)
+    return replace(case, setup=setup, notes=(*case.notes, note)), before
 
 
 def states_compared(case: Case) -> tuple[str, ...]:
@@ -70,6 +100,7 @@ def _in_states(
         known = _joint(every, [_lead(e.found) for e in every]).posterior() if every else None
         state = _one_state(case, names, name)
         every.append(explained(state, diagnosing, stage, known, settings))
+    every = _with_data_of_all(every)
     joint = _joint(every, [_as_deck(e) for e in every])
     changed = any(e.found.verdict != "nothing missing" for e in every)
     every = [_with(e, fit, changed) for e, fit in zip(every, joint.fits, strict=True)]
@@ -89,6 +120,19 @@ def _in_states(
     distrust = tuple(f"state {s.name!r}: {why}" for s in results for why in s.result.distrust)
     notes = (*first.notes, *by_state(results))
     return replace(first, states=tuple(results), shared=shared, distrust=distrust, notes=notes)
+
+
+def _with_data_of_all(every: list[Explained]) -> list[Explained]:
+    """The explanations with the data of all states in what each leaves: a state knows the others.
+
+    The weighing of the first state counts in all of them.
+    """
+    known = [e.posterior for e in every if e.posterior is not None]
+    if not known:
+        return every
+    data, mass = {d: label for k in known for d, label in k.data.items()}, known[0].mass
+    left = (e.posterior and replace(e.posterior, data=data, mass=mass) for e in every)
+    return [replace(e, posterior=p) for e, p in zip(every, left, strict=True)]
 
 
 def _one_state(case: Case, names: tuple[str, ...], name: str) -> Case:

@@ -14,7 +14,7 @@ import numpy as np
 from chladni.arrays import readonly
 from chladni.errors import LabelError, ShapeError, named
 
-Criterion = Literal["D", "A", "E"]
+Criterion = Literal["D", "A", "E", "S"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,12 @@ def positions_of(kept: np.ndarray, n: int) -> np.ndarray:
 
 
 def value(criterion: Criterion, F: np.ndarray) -> float:
-    """Mean over the draws of log det F (D), -trace F⁻¹ (A) or the lowest eigenvalue (E) of F."""
+    """Mean over the draws of log det F (D), -trace F⁻¹ (A) or the lowest eigenvalue (E) of F.
+
+    S is -ln (F⁻¹)_11: the information on the first unknown, the others unknown too.
+    """
+    if criterion == "S":
+        return value("D", F) - value("D", F[..., 1:, 1:])
     if criterion == "D":
         sign, log_det = np.linalg.slogdet(F)
         return float(np.mean(np.where(sign > 0, log_det, -np.inf)))
@@ -195,6 +200,9 @@ def changed(criterion: Criterion, F: np.ndarray, U: np.ndarray, sign: np.ndarray
     -------
     (m,)                -inf where the changed information is singular
     """
+    if criterion == "S":
+        others = changed("D", F[..., 1:, 1:], U[..., 1:], sign)
+        return changed("D", F, U, sign) - others
     if criterion == "E":
         change = np.einsum("dmqi,q,dmqj->dmij", U, sign, U, optimize=True)
         return np.linalg.eigvalsh(F[:, None] + change)[..., 0].mean(axis=0)

@@ -5,7 +5,7 @@ import numpy as np
 from chladni.errors import ShapeError
 
 from .deletion import REFRESH, faint, start, updated
-from .information import Candidates, combined, value, whitened
+from .information import Candidates, Criterion, changed, combined, value, whitened
 from .layout_rules import Rules
 
 FULL_GAIN = 30.0  # growth of log det a row that counts as 1: more than the faint prior's 18.4
@@ -25,17 +25,23 @@ class Walk:
     worth : (n,)      in [0, 1], for candidates that may move: independence E of the kept
                       (shrinking), growth of log det over ``full`` (growing); 0 for the others
     full : float      30 for each row a candidate adds to the information
-    log_det : float   log det F, prior included
+    log_det : float   log det F, prior included; with the criterion S the information on the first
+                      unknown
     """
 
-    def __init__(self, c: Candidates, n_sensors: int, rules: Rules | None, grow: bool) -> None:
-        self.c, self.n_sensors, self.grow = c, n_sensors, grow
+    def __init__(
+        self, c: Candidates, n_sensors: int, rules: Rules | None, grow: bool,
+        criterion: Criterion = "D",
+    ) -> None:  # fmt: skip
+        if criterion not in ("D", "S") or (criterion == "S" and not grow):
+            raise ShapeError(f"a walk by {criterion} is not known; by S sensors are added")
+        self.c, self.n_sensors, self.grow, self.criterion = c, n_sensors, grow, criterion
         everyone, self.rules = start(c, n_sensors, rules)
         self.reachable = everyone if not grow else ~self.rules.forbidden
         self.kept = np.zeros(len(c), bool) if grow else everyone.copy()
         self.prior = c.prior + faint(c) if grow else c.prior
-        self.full = FULL_GAIN * min(c.rows.shape[2], c.unknowns)
-        self._simple = c.noise is None and c.rows.shape[2] == 1
+        self.full = FULL_GAIN * (min(c.rows.shape[2], c.unknowns) if criterion == "D" else 1)
+        self._simple = c.noise is None and c.rows.shape[2] == 1 and criterion == "D"
         if not grow:
             self._Q = np.zeros((len(c.rows), len(c), c.rows.shape[2], c.unknowns))
             self._Q[:, everyone] = whitened(c, np.flatnonzero(everyone))
@@ -51,7 +57,7 @@ class Walk:
     def exact(self) -> float:
         """log det F of the kept, computed without updates."""
         F = self.c.fisher(np.flatnonzero(self.kept)) + (self.prior - self.c.prior)
-        return value("D", F)
+        return value(self.criterion, F)
 
     def may(self) -> np.ndarray:
         """Mask of candidates that may move next by the rules, without loss of a mode (n,) bool."""
@@ -86,13 +92,24 @@ class Walk:
     def _anew(self) -> None:
         """Compute independence without updates, so that rounding does not accumulate."""
         self._age = 0
-        if not self._simple:
+        if self.criterion == "S":
+            self._judge_growth()
+        elif not self._simple:
             self._judge(self._blocks())
+        if not self._simple:
             return
         Q, kept = self._Q[:, :, 0], self._Q[:, self.kept, 0]
         self._C = np.linalg.inv(self._F0 + kept.mT @ kept)
         self._E = np.einsum("dip,dip->di", Q @ self._C, Q)
         self._judge(self._E)
+
+    def _judge_growth(self) -> None:
+        """Worth of the candidates by the growth of the criterion."""
+        at, others = np.flatnonzero(self.kept), np.flatnonzero(~self.kept)
+        F, U = self.c.fisher(at) + (self.prior - self.c.prior), self.c.joining(at, others)
+        grown = changed(self.criterion, F, U, np.ones(U.shape[2])) - self.log_det
+        self.worth = np.zeros(len(self.c))
+        self.worth[others] = np.clip(grown / self.full, 0.0, 1.0)
 
     def _blocks(self) -> np.ndarray:
         """Independence (d, n) of candidates with several readings or correlated noise."""
