@@ -48,6 +48,7 @@ PLACES = {  # section: pictures of a run that stand there where the page does no
     "why": ("evidence",),
     "test": ("setup",),
     "found": ("where_2", "where_3"),
+    "next": ("information",),
 }
 APART = 0.01  # relative difference of a written value from the found one that is explained
 LEVELS = "levels_"  # pictures of modes over levels: with the number of the mode
