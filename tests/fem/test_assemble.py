@@ -97,6 +97,9 @@ def test_congruence_is_the_triple_product():
     T[24:30, 20:] = RNG.normal(size=(6, 5))
     expected = T.T @ A.toarray() @ T
     np.testing.assert_allclose(congruence(sp.csr_array(T), A).toarray(), expected, atol=1e-12)
+    P = np.eye(n)[RNG.permutation(n)]  # every row selects a dof, in another order
+    expected = P.T @ A.toarray() @ P
+    np.testing.assert_allclose(congruence(sp.csr_array(P), A).toarray(), expected, atol=1e-12)
 
 
 def test_displacement_frames_change_no_frequency():

@@ -154,7 +154,8 @@ def congruence(T: sp.csr_array, A: sp.csr_array) -> sp.csr_array:
     if not A.nnz:
         return sp.csr_array((T.shape[1], T.shape[1]), dtype=A.dtype)
     rows, columns, rest = _split(T)
-    picked = A[rows][:, rows] if len(rows) < A.shape[0] else A
+    in_order = np.array_equal(rows, np.arange(A.shape[0]))
+    picked = A if in_order else A[rows][:, rows]
     picked = _embed(picked, columns, T.shape[1])
     if not len(rest):
         return picked
