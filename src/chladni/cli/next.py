@@ -191,6 +191,8 @@ def _write(
         write_json(part / "plan.json", plan)
         if drawn:
             title = f"next – {source.name if source.name != FILE else source.parent.name}"
-            lead = f"To tell apart: {', '.join(names)}." if len(names) > 1 else ""
+            lead = f"Nothing is tied; the least known quantity is {every[-1].about}."
+            if len(names) > 1:
+                lead = f"To tell apart: {', '.join(names)}."
             write_sections(part / "report.html", title, drawn, lead=lead)
     say_results(out)
