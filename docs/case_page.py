@@ -198,6 +198,12 @@ with 95 % intervals. JSON holds that, and `identify` writes it as `levels.csv`.
 States are one object changed. Each is diagnosed with the information of the others on E, rho and t.
 All are then fitted at once with these shared. Each has its own effect, deck and page.
 
+A later recording of the same object can build on an answer: `chladni diagnose CASE --earlier RUN`,
+`earlier="RUN"` in Python. The odds of the effects at the places where that run found them, their
+parameters and E, rho and t become the prior. The case then holds what was measured since: responses
+that the earlier answer used are refused, and its weighing is not used again. Correlations between
+parameters are lost. A case with all recordings of one state together keeps them.
+
 Time histories and spectra of responses without a force give natural frequencies where a case holds
 neither FRFs nor poles. A decay (a record, or each of its blocks) is used from its loudest moment
 on. A steady signal is used as if the force were white in the band. The time data may be any of

@@ -81,7 +81,7 @@ def recording(made):
 def stopped(monkeypatch):
     """Long work ends where it would begin, and hands out the case it was given."""
 
-    def reached(case, *_):
+    def reached(case, *_, **__):
         raise Reached(case)
 
     monkeypatch.setattr("chladni.workflows.diagnose.diagnose_states", reached)

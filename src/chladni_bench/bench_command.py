@@ -137,6 +137,7 @@ def run(
             job.files += write_bench(job.folder, case, found)
         job.json("bench.json", to_json(found))
         job.show(bench_page(found))
+        job.say(f"next: chladni diagnose {job.place / 'case'}")
 
 
 def _with_added(case: Case, path: Path) -> tuple[Case, int]:

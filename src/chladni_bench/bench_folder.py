@@ -32,6 +32,7 @@ RENEWED = {  # words that do not hold for the new recordings, or stand in the de
     },
     "held_out": {"band"},
     "search": set(),
+    "plan": set(),
 }
 LEAST_OVERLAP = 0.5  # of a band of the case must be in the test's, or all of the test's in it
 
@@ -56,7 +57,7 @@ def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
         if r.time is not None:
             write_time_uff(place / f"{name}_time.uff", r.time, nodes)
             files.append((f"case/{name}_time.uff", "its time data, for chladni test"))
-    write_text(place / "case.toml", _toml(case, found, names))
+    write_text(place / "case.toml", _toml(case, found, names, _plan(case, place)))
     write_json(folder / "sealed" / "truth.json", found.truth)
     files.append(("sealed/truth.json", "the concealed effects: open it when the answer is on disk"))
     return files
@@ -96,7 +97,21 @@ def _rows(dofs: MeasuredDofs, role: str, masses: np.ndarray) -> list[list[str]]:
     return out
 
 
-def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
+def _plan(case: Case, place: Path) -> dict[str, Any]:
+    """Return the words of [plan]; their files are copied to ``place`` under a name of their own."""
+    asked = case.asked
+
+    def copied(name: str, text: str) -> str:
+        if not text.lower().endswith(".csv"):
+            return text
+        file = asked.file(text, asked.said.places[name])
+        write_text(place / f"plan_{file.name}", file.read_text(encoding="utf-8"))
+        return f"plan_{file.name}"
+
+    return {name: [copied(name, t) for t in words] for name, words in _kept(case, "plan").items()}
+
+
+def _toml(case: Case, found: BenchResult, names: list[str], plan: dict[str, Any]) -> str:
     """Copy every word of the case, except those that the test replaces."""
     files = [f"{n}.uff" for n in names]
     weighed = {"mass": float(f"{found.mass:.6g}"), "mass_sd": float(f"{1e-3 * found.mass:.2g}")}
@@ -114,8 +129,8 @@ def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
     if held is not None or kept:
         lines += ["", "[held_out]", *_words(kept)]
         lines += [f"band = [{held[0]:g}, {held[1]:g}]"] if held is not None else []
-    if search := _kept(case, "search"):
-        lines += ["", "[search]", *_words(search)]
+    for section, words in (("search", _kept(case, "search")), ("plan", plan)):
+        lines += ["", f"[{section}]", *_words(words)] if words else []
     for stated in case.asked.parameters:
         lines += ["", "[[parameter]]", *_words(dict(stated.words))]
     return "\n".join([*lines, ""])

@@ -126,9 +126,9 @@ def _tenths() -> Progress:
     def report_progress(what: str, share: float) -> None:
         tenth = int(10 * share)
         if what == NO_WORKER:
-            say(what)
+            say(what, error=True)
         elif tenth not in said and 0 < share <= 1:
             said.add(tenth)
-            say(what)
+            say(what, error=True)
 
     return report_progress

@@ -17,7 +17,7 @@ from chladni.report.blocks import (
     Table,
     still,
 )
-from chladni.report.words import display_unit, number, quantity
+from chladni.report.words import counted, display_unit, number, quantity
 from chladni.view.chart import Column
 
 from . import study_charts
@@ -81,7 +81,9 @@ def study_page(found: ParameterStudy) -> PageParts:
         ]
     if found.failed:
         why_not = [f"sample {k}: {why}" for k, why in found.failed[:_LISTED]]
-        sections.append(Section(f"{len(found.failed)} samples failed", [Items(why_not)]))
+        sections.append(
+            Section(counted(len(found.failed), "sample failed", "samples failed"), [Items(why_not)])
+        )
     sections.append(Section("Read it", [Code(READ)]))
     return PageParts(said.lead, sections, said.notes)
 

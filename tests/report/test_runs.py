@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tests.builders.commands import ran, refused
 
+from chladni.cli.run import place_of
 from chladni.dynamics.frf import FRF
 from chladni.output import run_folder
 from chladni.report.blocks import Drawing, Section
@@ -71,6 +72,16 @@ def test_every_run_below_a_folder_is_found_once(runs):
     assert seen["correlate"].source == "plate.bdf"
     assert seen["correlate"].q() == (3, None)
     assert finished_run(runs / "theirs") is None
+
+
+def test_cases_of_the_bench_are_told_apart(tmp_path):
+    """The bench calls every case ``case``; its own folder says which."""
+    made(tmp_path / "run", "diagnose", tmp_path / "article_B" / "case" / "case.toml")
+    assert finished_run(tmp_path / "run").source == "article_B/case"
+    (tmp_path / "article_B" / "case").mkdir(parents=True)
+    assert place_of("diagnose", tmp_path / "article_B" / "case", None).name == (
+        "diagnose-article_B-case"
+    )
 
 
 def test_the_list_is_written_again_and_hostile_names_are_text(runs):

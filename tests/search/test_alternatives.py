@@ -105,6 +105,14 @@ def test_a_leader_that_is_refused_is_told_with_what_refused_it():
     assert why_not(answer, second, null).endswith("but local-resonator, ahead of it, is not named")
 
 
+def test_an_explanation_that_is_worse_than_calibration_loses():
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    crack, lump = tried("crack", 12.9), tried("point-mass", 0.04)
+    answer = Diagnosis(null, null, null, (lump, crack), "calibration only")
+    assert why_not(answer, crack, null).startswith("loses 12.9 in -2 ln evidence over plain")
+    assert why_not(answer, lump, null).startswith("gains 0.0 in")
+
+
 @pytest.mark.parametrize(
     ("verdict", "weighed", "said"),
     [

@@ -18,7 +18,14 @@ from chladni.search import measurement_forecasts
 from chladni.search.conclusion import open_explanations
 from chladni.search.decision_in_words import BEYOND
 from chladni.search.hypotheses import ALONE
-from chladni.search.measurement_forecasts import GAIN, Rival, _new, _responses, outlook
+from chladni.search.measurement_forecasts import (
+    GAIN,
+    Rival,
+    _new,
+    _responses,
+    outlook,
+    quantity_of,
+)
 from chladni.search.next_measurement import (
     advised,
     arrays_of,
@@ -221,6 +228,20 @@ def test_of_one_explanation_the_least_known_quantity_is_narrowed(problem, tied, 
     write_npz(tmp_path / "outlook.npz", **arrays_of(one))
     assert_allclose([m.narrows for m in advised([read_outlook(tmp_path)])], left, rtol=1e-4)
     assert "nothing is tied" in ran("next", tmp_path, "--out", tmp_path / "out").stdout
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text", "said"),
+    [
+        ("t", "t of UPRIGHT", "t of UPRIGHT"),
+        ("M", "near grid 18", "M near grid 18"),
+        ("reach", "weld-patch of panel", "reach weld-patch of panel"),
+        ("k", "", "k suspension"),
+    ],
+)
+def test_a_quantity_is_named_once(parameter, text, said):
+    effect = SimpleNamespace(text=text, name="suspension")
+    assert quantity_of(effect, parameter) == said
 
 
 def test_a_mean_over_cases_is_advised(found):

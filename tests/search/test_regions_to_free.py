@@ -74,6 +74,11 @@ def test_what_is_free_or_frozen_is_not_proposed(found):
     named = regions(found, frozen=["E of right"])
     assert named.regions[0].state == "frozen"
     assert "right" not in [r.part for r in named.proposed]
+    thick = SimpleNamespace(
+        kind="calibration", parts=("right",), parameters=[SimpleNamespace(name="t")]
+    )
+    both = regions(found, [thick], frozen=["E of right"])
+    assert both.regions[0].state == "free"  # its stiffness was fitted by t
 
 
 def test_two_modes_say_nothing(found):

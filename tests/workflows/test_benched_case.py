@@ -83,6 +83,8 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
         "band": {"fit": [15.0, 110.0], "exclude": [[50.0, 51.0]]},
         "held_out": {"sensors": ["240:+Y"], "band": [110.0, 119.0]},
         "search": {"effects": ["point-mass"]},
+        "plan": {"regions": named, "fixed": ["240:+Y"], "forbidden": ["1:n"],
+                 "cost": ["2:n=2", "costs.csv"]},
         "[parameter]": {"name": "mine", "parts": named, "field": "E", "sd": 0.1, "low": 0.5,
                         "high": 2.0},
     }  # fmt: skip
@@ -94,8 +96,11 @@ def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
         for line in (f"[{name}]", *(f"{k} = {json.dumps(v)}" for k, v in values.items()))
     ]
     (case / "case.toml").write_text("\n".join(lines))
+    (case / "costs.csv").write_text("label,cost\n3:n,2\n")
     before = chladni.load_case(case)
     made = bench(case, tmp_path / "o", "--band", "12:120")
+    copy = made.path.parent / made.asked.said.words["cost"][1]
+    assert copy.read_text() == "label,cost\n3:n,2\n"
     refined = {(s, k) for s, all in RENEWED.items() for k in all}
     assert {w for w in before.given if w not in refined} <= set(made.given)
     for name in (

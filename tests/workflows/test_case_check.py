@@ -14,6 +14,7 @@ from tests.builders.structures import stiffer
 
 import chladni
 from chladni.errors import ChladniError
+from chladni.fem.energy import mass_properties
 from chladni.io.uff.uff_function import Axis, FunctionSet
 from chladni.io.uff.write_shapes import write_shapes
 from chladni.io.uff.write_uff import binary_set, head_records, write_sets
@@ -119,6 +120,21 @@ def test_a_mass_that_is_far_off_is_worth_a_look(case):
     (finding,) = chladni.check(heavier).findings
     assert "weighs" in finding.text
     assert not finding.fault
+    deck = mass_properties(heavier.assembly)[0]
+    away = 100 * (heavier.setup.mass / deck - 1)
+    assert dict(chladni.check(heavier).facts)["mass"].endswith(f"weighed ({away:+.2g} %)")
+
+
+def test_a_label_that_is_mistyped_in_the_table_is_worth_a_look(copied):
+    """Its row would be left out without a word: place, gain and mass of that sensor."""
+    label = chladni.load_case(copied).outputs.labels[0]
+    (copied / "sensors.csv").write_text("label,grid,mass\n99:+Z,1,0.002\n")
+    rewritten(copied, "[band]", 'sensors = "sensors.csv"\n[band]')
+    case = chladni.load_case(copied)
+    assert "1 row of the table of sensors is in no recording: 99:+Z" in case.notes
+    assert any(
+        "99:+Z" in f.text and label in f.text and not f.fault for f in chladni.check(case).findings
+    )
 
 
 def test_places_off_the_mesh_and_double_ones(copied):

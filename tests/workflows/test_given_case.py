@@ -35,7 +35,7 @@ def same_question_of(one, other):
 
 def test_every_word_of_a_case_is_an_argument():
     """A word that a file may hold, a program may say."""
-    once = {k.argument for k in SCHEMA if k.section not in ("recording", "parameter")}
+    once = {k.argument for k in SCHEMA if k.section not in ("recording", "plan", "parameter")}
     assert set(ARGUMENTS) == once - FILE_ALONE | {"parameters"}
 
 

@@ -96,7 +96,7 @@ def test_a_null_stays_quiet(tmp_path):
     assert found.verdict in ("nothing missing", "calibration only")
     assert not found.effects
     assert not found.distrust
-    assert any("the calibrated deck predicts the held-out data worse" in n for n in found.notes)
+    assert "the calibrated deck predicts the held-out data worse" in found.halved
     held = found.agreement.held_out
     assert held.calibrated < 0.1 * held.nominal
     assert len(found.models.final.model.assembly.shells) == 4 * len(clamped().shells)

@@ -129,7 +129,7 @@ def test_articles_differ_and_exact_ones_do_not(case):
 OF_JOINTS = (
     "weld-missing", "weld-compliance", "adhesive-stiffness", "hem-contact", "contact-stiffness",
     "over-constraint",
-    "compliant-support", "viscoelastic-joint", "open-joint",
+    "compliant-support", "viscoelastic-joint", "open-joint", "solid-patch",
 )  # fmt: skip
 
 

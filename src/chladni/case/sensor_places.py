@@ -184,11 +184,17 @@ def _nodes_said(
 
 def unrecorded(setup: TestSetup, outputs: MeasuredDofs, inputs: MeasuredDofs) -> list[str]:
     """A sentence on rows of the table of sensors that no recording has."""
-    rows = [s.label for s in setup.outputs if s.use and s.label not in outputs.labels]
-    rows += [s.label for s in setup.inputs if s.label not in inputs.labels]
+    rows = unrecorded_rows(setup.outputs, outputs) + unrecorded_rows(setup.inputs, inputs)
     if not rows:
         return []
-    return [f"{len(rows)} rows of the table of sensors are in no recording: {', '.join(rows[:6])}"]
+    n = len(rows)
+    what = f"{n} {'row' if n == 1 else 'rows'} of the table of sensors"
+    return [f"{what} {'is' if n == 1 else 'are'} in no recording: {', '.join(rows[:6])}"]
+
+
+def unrecorded_rows(table: Sequence[Sensor], found: MeasuredDofs) -> list[str]:
+    """Labels of the rows in use that no recording has."""
+    return [s.label for s in table if s.use and s.label not in found.labels]
 
 
 def sensor_masses(made: Assembly, *places: MeasuredDofs) -> tuple[tuple[int, float], ...]:

@@ -11,10 +11,10 @@ from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..report.blocks import Table
 from ..report.words import number
+from ..units import UNITS
 from ..workflows.convert import ConvertedModel, converted, with_guessed_units
 from ..workflows.loaded_model import similar_names
 from .console import say, say_table, watched
-from .run import Units
 
 
 def run(
@@ -28,7 +28,12 @@ def run(
             "all parts, or a CSV with the columns part, t, material (repeatable)."
         ),
     ] = None,
-    units: Units = None,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Unit system of the model: {', '.join(UNITS)}; default: that of its materials."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="The deck; default: MODEL.bdf here.", metavar="FILE"),

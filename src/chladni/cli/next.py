@@ -152,7 +152,9 @@ def _known(every: Sequence[Outlook], barred: Sequence[str]) -> None:
 def _tell(names: Sequence[str], every: Sequence[NextMeasurement], odds: float) -> None:
     """Tabulate the advice."""
     if every:
-        say_table(next_measurements(every, odds))
+        table = next_measurements(every, odds)
+        say(table.caption)
+        say_table(table)
     else:
         say(f"none of the candidates tells {' and '.join(names)} apart")
 

@@ -13,7 +13,7 @@ from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import FileError
 from ..geometry.clearance import Gaps, PairClearance, all_gaps, nearest, summary
 from ..report.blocks import Block, Picture, Table
-from ..report.words import number
+from ..report.words import counted, number
 from ..workflows.loaded_model import LEAST_MODES, Model, load_model, on_faces
 from .run import Allow, DeckOrCase, Out, Run, Units, started
 from .shape_pictures import against_scan, cuts
@@ -69,7 +69,7 @@ def run(
             against_scan(job, model, scan, align)
         if clearance:
             _clearance(job, model, modal, shown)
-        job.lead = f"{len(job.files)} pictures of {source.name}."
+        job.lead = f"{counted(len(job.files), 'picture', 'pictures')} of {source.name}."
         job.say(job.lead)
 
 

@@ -267,8 +267,9 @@ def command_line() -> str:
 
 
 def _name(source: Path) -> str:
-    """Name of a case or deck, for the folder of its run."""
+    """Name of a case or deck, for the folder of its run; the bench calls every case ``case``."""
     whole = source.resolve()
     if whole.is_dir() or whole.name == "case.toml":
-        return (whole if whole.is_dir() else whole.parent).name
+        place = whole if whole.is_dir() else whole.parent
+        return f"{place.parent.name}-case" if place.name == "case" else place.name
     return whole.stem

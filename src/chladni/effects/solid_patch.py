@@ -55,7 +55,7 @@ class Bodies:
 
     @classmethod
     def of(cls, assembly: Assembly) -> Self:
-        """Collect all solids, or metal in pieces larger than welds beside sheets and beams."""
+        """Collect all solids; next to sheets and beams, metal in pieces larger than welds."""
         corners, part, ids = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
         size = np.zeros(len(assembly.parts))
         for k, rows in _rows(assembly):

@@ -66,7 +66,7 @@ def kinetic_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
     u, made = np.asarray(structure.T @ phi), structure.assembly
     every = (mass_over_all_motions(only(made, k)) for k in range(len(made.parts)))
     share = np.array([np.einsum("nr,nr->r", u, M @ u) for M in every])
-    return _shares(share.reshape(len(made.parts), -1), phi, structure.system.M)
+    return _shares(share.reshape(len(made.parts), phi.shape[1]), phi, structure.system.M)
 
 
 def effective_masses(structure: Structure, phi: np.ndarray, about: np.ndarray) -> np.ndarray:

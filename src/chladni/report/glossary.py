@@ -22,7 +22,7 @@ GLOSSARY = {
     "FRF": "Frequency response function: motion over force at every frequency.",
 }
 _HEADS = {  # heads of tables and names of facts that hold a word of the glossary
-    "Q, fitted data": "Q", "Q, held-out data": "held out", "Held-out misfit Q": "held out",
+    "Q, fitted data": "Q", "Q, held-out data": "held out", "Held-out deviation Q": "held out",
     "Q fitted": "Q", "Q held out": "held out", "MAC before": "MAC", "MAC after": "MAC",
     "found (95 % interval)": "95 % interval",
     "compared with the best": "Bayes factor", "damping [%]": "damping", "off ": "off",

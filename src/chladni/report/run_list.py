@@ -90,7 +90,9 @@ def finished_run(folder: Path) -> FinishedRun | None:
     with suppress(TypeError, ValueError):
         when = datetime.fromisoformat(str(held.get("written"))).timestamp()
     source = Path(str(held.get("source") or folder.name.removeprefix(f"{command}-")))
-    name = source.parent.name if source.name == "case.toml" else source.name
+    place = source.parent if source.name == "case.toml" else source
+    parent = place.parent.name if place.name == "case" else ""  # the bench calls every case so
+    name = f"{parent}/case" if parent else place.name
     return FinishedRun(folder, command, name, datetime.fromtimestamp(when, UTC))
 
 

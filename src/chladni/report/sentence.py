@@ -50,10 +50,7 @@ def _sentence(result: DiagnosisResult) -> str:
             "explain this as well as any effect tried."
         )
     if verdict == "not in catalogue" and result.one_of:
-        tied = result.one_of[0]
-        if len(tied) == 1:
-            return f"No effect is named; {tied[0]} is the closest explanation."
-        return f"No effect is named; the data cannot distinguish {', '.join(tied)}."
+        return f"No effect is named; the data cannot distinguish {', '.join(result.one_of[0])}."
     if verdict == "not in catalogue":
         near = f": {what}" if what else ""
         return f"The model lacks physics that is not in the catalogue{near}."

@@ -48,6 +48,7 @@ PLACES = {  # section: pictures of a run that stand there where the page does no
     "why": ("evidence",),
     "test": ("setup",),
     "found": ("where_2", "where_3"),
+    "next": ("information",),
 }
 APART = 0.01  # relative difference of a written value from the found one that is explained
 LEVELS = "levels_"  # pictures of modes over levels: with the number of the mode
@@ -64,13 +65,13 @@ _FILES = {
 
 
 def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
-    """Held-out misfit, frequencies and mass, before and after."""
+    """Held-out deviation, frequencies and mass, before and after."""
     facts, agreement, mass = [], result.agreement or Agreement(), result.mass
     held = agreement.held_out
     (one, before), (last, after) = held.last_step(bool(result.effects)).items()
     if before is not None and after is not None:
         text = f"{one} deck {number(before, 3)} → {last} deck {number(after, 3)}"
-        facts.append(("Held-out misfit Q", f"{text} ({percent(after, before)})"))
+        facts.append(("Held-out deviation Q", f"{text} ({percent(after, before)})"))
     off = [_mean_off(result, key) for key in ("before_hz", "after_hz")]
     if off[0] is not None:
         text = " → ".join(f"{number(100 * x, 2)} %" for x in off if x is not None)

@@ -28,6 +28,7 @@ from ..effects.search_context import Candidate, SearchContext
 from ..errors import FileError
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.joint_fit import Posterior, of_the_object
+from ..results import ShownBriefly
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis
@@ -98,8 +99,8 @@ class KnownEffect:
         return apart <= self.radius_m + (its.radius_m or 0.0)
 
 
-@dataclass(frozen=True)
-class EarlierAnswer:
+@dataclass(frozen=True, repr=False)
+class EarlierAnswer(ShownBriefly):
     """Odds and posterior of an answer, for a later recording.
 
     Attributes

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..effects.effect import Effect
 from ..effects.effect_context import ElementGrids
 from ..errors import ModelError
 from ..inference.discrepancy import Form, columns, curvature, form
@@ -159,7 +160,7 @@ def _unknown(rival: Rival, kept: np.ndarray, seen: Sequence[Predicted]) -> OpenQ
     own = rival.hypothesis.effects
     own = own if any(e.parameters for e in own) else fit.effects
     wanted = [e in own and (e.kind != "nuisance") for e in fit.effects for _ in e.parameters]
-    names = [f"{p.name} {e.text or e.name}".strip() for e in fit.effects for p in e.parameters]
+    names = [quantity_of(e, p.name) for e in fit.effects for p in e.parameters]
     along = L[: len(names)] @ kept
     total = (L[: len(names)] ** 2).sum(axis=1)
     taken = sum(
@@ -167,6 +168,12 @@ def _unknown(rival: Rival, kept: np.ndarray, seen: Sequence[Predicted]) -> OpenQ
     )
     k = int(np.argmax(np.where(wanted, taken / total, -1.0)))
     return OpenQuantity(names[k], along[k], float(max(total[k] - along[k] @ along[k], 0.0)))
+
+
+def quantity_of(effect: Effect, parameter: str) -> str:
+    """A parameter and where it acts; the text of a calibration effect begins with its own."""
+    text = effect.text or effect.name
+    return text if text.startswith(f"{parameter} of ") else f"{parameter} {text}".strip()
 
 
 Seen = list[tuple[np.ndarray, np.ndarray]]  # of each rival: mean and factor

@@ -6,7 +6,7 @@ d ln K_p = -2 s·e / s·s.  This removes the share (s·e)² / (s·s e·e) of Σ 
 modes, for a direction at random.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 
@@ -53,14 +53,13 @@ def regions_to_free(
     change, removed = stiffness_for(share, away)
     parts = model.assembly.parts
     frozen = study.identifiability.frozen
-    free = {name for e in found.effects if e.kind == "calibration" and "E" in _quantities(e)
-            for name in e.parts}  # fmt: skip
+    freed = [(e, _quantities(e)) for e in found.effects if e.kind == "calibration"]
+    free, thick = ({name for e, of in freed if q in of for name in e.parts} for q in ("E", "t"))
     regions = [
         RegionShare(
             part.name if part else ELSE, float(share[k, worst].mean()),
             float(share[k, ~worst].mean()), float(np.exp(change[k])), float(removed[k]),
-            "free" if part and part.name in free
-            else "frozen" if part and f"E of {part.name}" in frozen else "",
+            _state(part.name if part else "", free, thick, frozen),
             "K" if part is None else "E" if _isotropic(part) else "E1",
         )
         for k, part in enumerate([*parts, None])
@@ -114,6 +113,12 @@ def _isotropic(part: Part) -> bool:
     if isinstance(section, ShellSection):
         return isinstance(section.membrane or section.bending, Isotropic)
     return isinstance(section.material, Isotropic)
+
+
+def _state(part: str, free: Set[str], thick: Set[str], frozen: Sequence[str]) -> str:
+    """State of a part's stiffness; with E frozen its thickness may carry it."""
+    held = f"E of {part}" in frozen
+    return "free" if part in free or (held and part in thick) else "frozen" if held else ""
 
 
 def _quantities(effect: Effect) -> list[str]:

@@ -175,10 +175,8 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
         but = diagnosis.refused if hypothesis is lead else f"{lead.name}, ahead of it, is not named"
         return f"gains {gain:.1f} in -2 ln evidence, but {but or 'is not named'}"
     if diagnosis.found is None:
-        return (
-            f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are required "
-            "to name an effect"
-        )
+        change = f"{'loses' if round(gain, 1) < 0 else 'gains'} {abs(gain):.1f} in -2 ln evidence"
+        return f"{change} over plain calibration; {due:.0f} are required to name an effect"
     if best.name in (hypothesis.remarks.becomes, hypothesis.remarks.nearly):
         return f"these data cannot distinguish its fitted form from {best.name}"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2

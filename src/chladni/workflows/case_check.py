@@ -10,6 +10,7 @@ from ..arguments import checked
 from ..case import Case
 from ..case.make_case import CaseWords, Measured
 from ..case.recordings import DEAD
+from ..case.sensor_places import unrecorded_rows
 from ..effects.model_errors import ABOVE, mesh_errors
 from ..ema.finding import Screening
 from ..errors import ChladniError, FileError
@@ -126,8 +127,9 @@ def check(
     progress("places", 0.7)
     dofs = (*_dofs(case, case.outputs, "output"), *_dofs(case, case.inputs, "input"))
     findings = [
-        *_units(case), *_mass(case), *_size(case), *_places(case, dofs), *_band(case, elastic),
-        *_dead(case), *_mesh(elastic, converged, bool(len(case.assembly.shells))),
+        *_units(case), *_mass(case), *_size(case), *_labels(case), *_places(case, dofs),
+        *_band(case, elastic), *_dead(case),
+        *_mesh(elastic, converged, bool(len(case.assembly.shells))),
         *(CaseFinding(said, HANGS) for said in loose_parts(model, modal)),
     ]  # fmt: skip
     if not case.recordings:
@@ -178,7 +180,10 @@ def _facts(case: Case) -> list[tuple[str, str]]:
     }  # fmt: skip
     held = ", ".join(f"{n} {what}" for what, n in count.items() if n)
     size = " x ".join(f"{x:.3g}" for x in np.ptp(made.points, axis=0))
-    weighed = "not weighed" if case.setup.mass is None else f"{case.setup.mass:.5g} kg weighed"
+    weighed = "not weighed"
+    if case.setup.mass is not None:
+        away = f" ({100 * (case.setup.mass / mass - 1):+.2g} %)" if mass > 0 else ""
+        weighed = f"{case.setup.mass:.5g} kg weighed{away}"
     out = [
         ("deck", f"{case.deck.path.name} in {case.units.name}: {len(made.ids)} grids, {held}"),
         ("size", f"{size} m"),
@@ -255,6 +260,18 @@ def _size(case: Case) -> list[CaseFinding]:
     return [CaseFinding(f"the deck is {size:.3g} m across", "check its unit of length", True)]
 
 
+def _labels(case: Case) -> list[CaseFinding]:
+    """Report a row of the table that no recording has, where a recorded dof has no row."""
+    out = []
+    for table, found in ((case.setup.outputs, case.outputs), (case.setup.inputs, case.inputs)):
+        rows = unrecorded_rows(table, found)
+        bare = [label for label in found.labels if label not in {s.label for s in table}]
+        if rows and bare:
+            said = f"the table of sensors has {rows[0]}, the recording {bare[0]}"
+            out.append(CaseFinding(said, "correct the label, else the row is not used"))
+    return out
+
+
 def _places(case: Case, dofs: tuple[CheckedDof, ...]) -> list[CaseFinding]:
     size = float(np.linalg.norm(np.ptp(case.assembly.points, axis=0)))
     out = []
@@ -262,8 +279,8 @@ def _places(case: Case, dofs: tuple[CheckedDof, ...]) -> list[CaseFinding]:
     if far:
         worst = max(far, key=lambda d: d.off_mesh_m)
         said = (
-            f"{len(far)} places are away from the mesh, {worst.label} by "
-            f"{1e3 * worst.off_mesh_m:.3g} mm"
+            f"{len(far)} {'place is' if len(far) == 1 else 'places are'} away from the mesh, "
+            f"{worst.label} by {1e3 * worst.off_mesh_m:.3g} mm"
         )
         out.append(
             CaseFinding(

@@ -140,7 +140,8 @@ def _far(dofs: Sequence[MatchedDof]) -> list[str]:
         return []
     worst = max(far, key=lambda d: d.distance)
     return [
-        f"{len(far)} places are more than {1e3 * _FAR:g} mm from the mesh, {worst.label} "
+        f"{len(far)} {'place is' if len(far) == 1 else 'places are'} more than "
+        f"{1e3 * _FAR:g} mm from the mesh, {worst.label} "
         f"{1e3 * worst.distance:.3g} mm: check that the recording is in the deck's frame"
     ]
 

@@ -25,6 +25,7 @@ from ..search.compensation import compensating
 from ..search.conclusion import concluded, open_explanations
 from ..search.damping_by_part import damping_by_part
 from ..search.decide import decide
+from ..search.decision_in_words import BEYOND
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
 from ..search.earlier_answer import EarlierAnswer, digests, earlier_answer
@@ -179,7 +180,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         left = tuple(left_frequencies(result.frequencies, stages.final.model))
         distrust = (*left, *distrust)
         if left and result.verdict == "not in catalogue":
-            result = replace(result, one_of=without_calibration(result.one_of))
+            result = replace(result, one_of=beyond_calibration(result.one_of))
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
@@ -194,10 +195,15 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     )  # fmt: skip
 
 
-def without_calibration(groups: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
-    """Tied explanations less calibration alone, whose deck leaves too much of the frequencies."""
-    each = (tuple(name for name in group if name != ALONE) for group in groups)
-    return tuple(group for group in each if group)
+def beyond_calibration(groups: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+    """Tied explanations with a cause outside the catalogue in place of calibration alone.
+
+    The calibrated deck leaves too much of the frequencies to be an explanation.
+    """
+    return tuple(
+        tuple(dict.fromkeys(BEYOND if name == ALONE else name for name in group))
+        for group in groups
+    )
 
 
 FAR_OFF = 1.0  # Q of a deck whose responses are tenfold or a tenth of the recording's

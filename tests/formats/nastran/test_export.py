@@ -56,8 +56,19 @@ def differences(a, b, where=""):
 
 
 def round_trip(made, folder, unit):
+    """Differences; a scalar point has no place, and only one spring keeps the id of its element."""
     path = write_assembly(made, folder / "fresh.bdf", UNITS[unit])
-    return differences(made, assembly(read_deck(path), UNITS[unit], loose=True))
+    back = assembly(read_deck(path), UNITS[unit], loose=True)
+    if made.scalar_points is None:
+        return differences(made, back)
+    nowhere, ids = made.scalar_points[:, None], made.springs.ids
+    first = np.isin(np.arange(len(ids)), np.unique(ids, return_index=True)[1])
+    made, back = (
+        replace(a, points=np.where(nowhere, 0.0, a.points),
+                springs=replace(a.springs, ids=np.where(first, a.springs.ids, 0)))
+        for a in (made, back)
+    )  # fmt: skip
+    return differences(made, back)
 
 
 @real_decks()
