@@ -11,6 +11,7 @@ from tests.builders.commands import ran, refused
 from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
 
 from chladni.fem.energy import mass_properties
+from chladni.inference.likelihood import LN10
 from chladni.output import write_npz
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import measurement_forecasts
@@ -18,6 +19,7 @@ from chladni.search.conclusion import open_explanations
 from chladni.search.decision_in_words import BEYOND
 from chladni.search.hypotheses import ALONE
 from chladni.search.measurement_forecasts import (
+    GAIN,
     Rival,
     _new,
     _responses,
@@ -102,6 +104,17 @@ def test_what_was_measured_tells_less_a_second_time(problem, tied, reduced):
     before = np.concatenate([prior, np.ones(A.shape[1] - len(prior))])
     assert ((A @ L) ** 2).sum() < 0.5 * ((A * before) ** 2).sum()
     assert ((A @ L) ** 2).sum(axis=1).max() < 2.0  # about what its own noise leaves
+
+
+def test_terms_of_second_order_are_noise_as_in_a_fit(tied, problem):
+    """Near a zero of H the first order says nothing: a fit counts the rest, and so do forecasts."""
+    rival, data = Rival(problem, tied[0]), tied[0].data
+    new = _new(rival, rival, data.s, data.outputs, data.inputs)
+    values = data.model(rival.state)
+    plain = replace(data, values=values, level=np.abs(values).max(axis=0), bent=None)
+    bent = data.allowing_errors(rival.state).bent
+    assert bent.max() > 2 * data.sigma_model
+    assert_allclose(GAIN / LN10 / new.gain, np.hypot(plain.std(), bent), rtol=1e-6)
 
 
 def test_a_sensor_sees_no_difference_between_twins(problem, tied):

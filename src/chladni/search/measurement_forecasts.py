@@ -1,7 +1,8 @@
 """Forecasts of sensors, drives, a known mass, lines above the band and a weighing.
 
 Every explanation predicts the data of a further measurement with its own unknowns: its parameters
-and errors of form, as the recording left them (linear about its fit).
+and errors of form, as the recording left them (linear about its fit).  Errors of form beyond the
+first order are noise, as in a fit: near a zero of H the linear prediction says nothing.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -14,7 +15,7 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.effect_context import ElementGrids
 from ..errors import ModelError
-from ..inference.discrepancy import Form, columns, form
+from ..inference.discrepancy import Form, columns, curvature, form
 from ..inference.expected_information import OpenQuantity, Predicted, Rivals
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import LN10, Responses
@@ -271,8 +272,10 @@ def _new(
 ) -> NewChannels:  # fmt: skip
     """Responses on some lines under a rival, compared with those of the first rival."""
     given = _responses(first, lines, outputs, inputs)
-    values = given.model(elsewhere(first.state if about is None else about))
+    about = elsewhere(first.state if about is None else about)
+    values = given.model(about)
     given = replace(given, values=values, level=np.abs(values).max(axis=0))
+    given = replace(given, bent=curvature(given, about))
     rows = replace(given, a=rival.model.rows(outputs, keep=False),
                    b=rival.model.rows(inputs, keep=False))  # fmt: skip
     mean, F = rival.predicted(rows, elsewhere(rival.state if state is None else state))
