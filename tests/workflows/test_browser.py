@@ -155,7 +155,10 @@ EVIL = (
 READY = "return document.querySelector(`[data-name='${arguments[0]}']`).dataset.ready == 'yes'"
 PLOT = "const plot = document.querySelector(`[data-name='${arguments[0]}'] .plot`);"
 DRAWN = "return [...document.querySelectorAll('.live')].map(f => f.dataset.name)"
-NAMES = {"where", "frf", "mac", "shapes", "steps", "odds", "ladder", "left", "fit_test", "setup"}
+NAMES = {
+    "where", "information", "frf", "mac", "shapes", "steps", "odds", "ladder", "left", "fit_test",
+    "setup",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
