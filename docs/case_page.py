@@ -112,10 +112,10 @@ standard deviations. A sheet with paint or sealant on it weighs more than its st
 `sd` that covers it.
 
 Without any `[[parameter]]` these are free: E of every part of shells and beams, t of shells, the
-wall of tubes, and rho of every material. In a deck with neither shells nor beams E and rho of every
-material of solids are free, those of steel and aluminium by 0.03 and 0.005: such a mesh has all
-dimensions. Bars between two spiders hold sheets together: they are joints, and are not freed by
-themselves.
+wall of tubes, and rho of every material. A deck with neither shells nor beams has all
+dimensions in its mesh. There E and rho of every material of solids are free, those of steel and
+aluminium by 0.03 and 0.005. Bars between two spiders hold sheets together: they are joints, and are
+not freed by themselves.
 
 | of | can be freed |
 |---|---|

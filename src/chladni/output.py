@@ -159,6 +159,15 @@ def _made(out: Path) -> Iterator[None]:
                 folder.rmdir()
 
 
+def name_of(folder: Path) -> str:
+    """Name of the folder of a case; the bench calls every case ``case``, and its parent counts.
+
+    >>> name_of(Path("lab/case")), name_of(Path("lab/bracket"))
+    ('lab/case', 'bracket')
+    """
+    return "/".join(folder.parts[-2:]) if folder.name == "case" else folder.name
+
+
 def make_folder(out: Path) -> None:
     """Make a folder for results, unless it is there.
 

@@ -29,7 +29,7 @@ from ..search.next_measurement import (
     with_common_candidates,
 )
 from ..workflows.before_any_test import PlannedTests, before_any_test
-from ..workflows.loaded_model import model_in_si
+from ..workflows.loaded_model import model_in_si, opened
 from .console import say, say_results, say_table, watched
 from .run import Allow, Units, folder_named
 
@@ -103,14 +103,14 @@ def run(
         return
     names = tuple(dict.fromkeys(word.strip() for word in effects.split(",") if word.strip()))
     with watched() as progress:
+        found = opened(source, units, allow or ())
         layout = Path(sensors) if sensors else None
         if sensors.isdecimal():
             words = {"sensors": int(sensors), "modes": max(1, 4 * int(sensors) // 5), "draws": 0}
-            model = model_in_si(source, "next", units, allow or ())[0]
-            layout = import_module("chladni").plan(model, **words)
+            layout = import_module("chladni").plan(model_in_si(found, "next")[0], **words)
         made = before_any_test(
-            source, names, layout, top=top, articles=articles, seed=seed, odds=odds, units=units,
-            allow=allow or (), progress=progress,
+            found, names, layout, top=top, articles=articles, seed=seed, odds=odds,
+            progress=progress,
         )  # fmt: skip
         _known([t.outlook for t in made.open], barred)
         every = made.advised(count, barred)
@@ -119,7 +119,7 @@ def run(
         _tell(names, every, odds)
     drawn = list[Section]()
     if out and made.open:
-        model = model_in_si(source, "next", units, allow or ())[0]
+        model = model_in_si(found, "next")[0]
         together = with_common_candidates([t.outlook for t in made.open])
         drawn = _page(mesh_of(model.seen, model.assembly), together, every, odds)
     _write(out, source, names, every, drawn)

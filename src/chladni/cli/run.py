@@ -12,7 +12,7 @@ import typer
 
 from ..arrays import real_number
 from ..errors import FileError
-from ..output import run_folder, write_json
+from ..output import name_of, run_folder, write_json
 from ..progress import Progress, within
 from ..report.blocks import (
     Block,
@@ -267,9 +267,8 @@ def command_line() -> str:
 
 
 def _name(source: Path) -> str:
-    """Name of a case or deck, for the folder of its run; the bench calls every case ``case``."""
+    """Name of a case or deck, for the folder of its run."""
     whole = source.resolve()
     if whole.is_dir() or whole.name == "case.toml":
-        place = whole if whole.is_dir() else whole.parent
-        return f"{place.parent.name}-case" if place.name == "case" else place.name
+        return name_of(whole if whole.is_dir() else whole.parent).replace("/", "-")
     return whole.stem

@@ -64,8 +64,8 @@ def _mesh(found: CaseCheck) -> list[Block]:
 
 _MESH = (
     "Elastic modes, and their limit for an infinitely fine mesh. It follows from a mesh twice as "
-    "fine: errors fall with the square of the element size, or with its fourth power where all "
-    "shells have nodes on their edges."
+    "fine. Errors fall with the square of the element size. They fall with its fourth power where "
+    "all shells have nodes on their edges."
 )
 
 

@@ -86,9 +86,7 @@ def two_models(
     """Shapes (n, 3, r) of another model next to those of the model; MAC (other, model)."""
     if not len(f_other):
         return []
-    some, shapes = slice(drawn), shapes.copy()
-    for k, j in pairs:  # partners move the same way
-        shapes[:, :, k] *= np.sign((shapes[:, :, k] * motion[:, :, j]).sum()) or 1.0
+    some, shapes = slice(drawn), _as_partners(shapes, motion, pairs)
     still = _picture("montage", seen=shown.seen, shapes=shapes[:, :, some],
                      frequency=f_other[some], numbers=numbers_other[some])  # fmt: skip
 
@@ -103,6 +101,16 @@ def two_models(
 
     what = f"shapes of {other}"
     return [Drawing("shapes", spatial("shapes", shown, moving), TURN, {"shapes": still}, what)]
+
+
+def _as_partners(
+    shapes: np.ndarray, motion: np.ndarray, pairs: Sequence[tuple[int, int]]
+) -> np.ndarray:
+    """Shapes (n, 3, r) that move the way of their partners in ``motion`` (n, 3, q)."""
+    out = shapes.copy()
+    for k, j in pairs:
+        out[:, :, k] *= np.sign((shapes[:, :, k] * motion[:, :, j]).sum()) or 1.0
+    return out
 
 
 def shape_pairs(
@@ -122,9 +130,7 @@ def shape_pairs(
         model = live_mesh.ModeSet(found.f_model, found.motion[used], found.model, found.numbers)
         tests = {"test": live_mesh.ModeSet(found.f_test, sensors=found.test)}
         if expanded is not None:
-            whole = expanded.copy()
-            for k, j in found.pairs:  # as the sensors, whose sign is that of their partner
-                whole[:, :, k] *= np.sign((whole[:, :, k] * found.motion[:, :, j]).sum()) or 1.0
+            whole = _as_partners(expanded, found.motion, found.pairs)
             tests = {EXPANDED: live_mesh.ModeSet(found.f_test, whole[used], found.test), **tests}
         rows = [[*[k] * len(tests), partner.get(k)] for k in range(len(found.f_test))]
         places = [Marker(x, n, label) for x, n, label in at]

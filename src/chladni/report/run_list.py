@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import FileError
 from ..inference.result import Agreement
-from ..output import LIST
+from ..output import LIST, name_of
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Items, PageParts, Section, Table
 from .diagnosis_json import read_diagnosis
@@ -90,9 +90,7 @@ def finished_run(folder: Path) -> FinishedRun | None:
     with suppress(TypeError, ValueError):
         when = datetime.fromisoformat(str(held.get("written"))).timestamp()
     source = Path(str(held.get("source") or folder.name.removeprefix(f"{command}-")))
-    place = source.parent if source.name == "case.toml" else source
-    parent = place.parent.name if place.name == "case" else ""  # the bench calls every case so
-    name = f"{parent}/case" if parent else place.name
+    name = name_of(source.parent if source.name == "case.toml" else source)
     return FinishedRun(folder, command, name, datetime.fromtimestamp(when, UTC))
 
 

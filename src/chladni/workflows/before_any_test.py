@@ -20,7 +20,7 @@ from ..search.next_measurement import ADVISED, ODDS, advised, with_common_candid
 from ..search.question import Question
 from ..search.simulated_test import FirstTest, first_tests
 from .frf import layout_places
-from .loaded_model import Model, as_model, model_in_si, opened
+from .loaded_model import DeckModels, Model, as_model, model_in_si, opened
 
 MODES = 12  # elastic modes in the band of a planned test
 BELOW, ABOVE = 0.7, 1.05  # times the first and the last of them
@@ -57,7 +57,8 @@ class PlannedTests:
 
 
 def before_any_test(
-    source: str | Path | Model | Case, effects: Sequence[str], sensors: Path | Any = None,
+    source: str | Path | Model | DeckModels | Case, effects: Sequence[str],
+    sensors: Path | Any = None,
     *, top: float | None = None, articles: int = 1, seed: int = 0, odds: float = ODDS,
     units: str | None = None, allow: Sequence[str] = (), progress: Progress = silent,
 ) -> PlannedTests:  # fmt: skip
