@@ -322,7 +322,7 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     caption = (
         "Condition: best driven mode over the one driven least (Hankel singular values), the lower "
         "the better. Weakest mode: response of the one driven least, of that at the place where it "
-        "responds most. The rank counts both alike. Rattles "
+        "responds most. The rank counts both. Rattles "
         "from: force at resonance at which two sheets first touch. Allowed: a straight rod "
         f"reaches the place, and nothing rattles at {found.settings.force:g} N."
     )
