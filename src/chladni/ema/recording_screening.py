@@ -41,6 +41,7 @@ def screened(
     use: np.ndarray | None = None,
     calmer: Sequence[Recording] = (),
     alone: bool = True,
+    spurious: np.ndarray | None = None,
 ) -> Screening:
     """Screen a recording: channels, overload, levels, and phases of the modes.
 
@@ -52,6 +53,7 @@ def screened(
     use : (n_f,) bool, lines of that identification, default all; used again for a repetition
     calmer : more recordings of the test: a channel that works at a lower level is not dead
     alone : False where a model follows, which tells how the numbers are to be read
+    spurious : (r,) bool, poles of ``found`` that are known to be no modes
     """
     frf = recording.frf
     if frf is None:
@@ -91,7 +93,9 @@ def screened(
             more, one = axis_check(frf, found, use)
             findings += more
             checks.append(one)
-        checks.append(_lines(strong, frf.frequency))
+        real = True if spurious is None else ~spurious
+        modes = found.sel(found.inside & found.firm & real)
+        checks.append(_lines(modes, frf.frequency))
     return Screening(recording.name, tuple(findings), tuple(checks))
 
 
