@@ -37,6 +37,7 @@ from .plan_summary import (
     summary,
 )
 from .sensor_candidates import FOOT, SensorCandidates
+from .separation_page import separation_in_words, separation_section
 from .whole_plan import Plan, motion
 
 _SHOWN = 12  # modes in the picture of shapes
@@ -49,13 +50,19 @@ def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
     shown = mesh_of(model.seen, model.assembly)
     body = sections(found, result, shown, model.structure)
     files = [("sensors.csv", "sensors and shakers, for case.toml")]
-    return PageParts(lead(result), body, notes(found), files)
+    return PageParts(_lead(found, result), body, notes(found), files)
 
 
 def in_words(found: Plan) -> PageParts:
     """The page without its pictures."""
     result = summary(found)
-    return PageParts(lead(result), [Section("Sensors", [_layout(result)])], notes(found))
+    return PageParts(_lead(found, result), [Section("Sensors", [_layout(result)])], notes(found))
+
+
+def _lead(found: Plan, result: PlanSummary) -> str:
+    """The plan, and the explanations it separates, in a few sentences."""
+    apart = [] if found.separation is None else separation_in_words(found.separation)
+    return " ".join([lead(result), *apart])
 
 
 def lead(result: PlanSummary) -> str:
@@ -74,7 +81,8 @@ def notes(found: Plan) -> list[str]:
     """List decisions of the planning, and warnings."""
     centres = int((~found.places.is_grid).sum())
     out = [*found.notes, *_places_notes(found.places), *_cost_notes(found)]
-    if fixed := [name for name in found.places.fixed if name]:
+    apart = () if found.separation is None else found.separation.labels
+    if fixed := [name for name in found.places.fixed if name and name not in apart]:
         out.append(f"Fixed by the settings: {named(fixed)}.")
     if len(found.layout) == len(found.places):
         out.append(f"Every place has a sensor: there is room for only {len(found.places)}.")
@@ -169,8 +177,10 @@ def _rattle_notes(found: Plan) -> list[str]:
 
 def sections(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> list[Section]:
     """The sections of the page."""
+    apart = [] if found.separation is None else [separation_section(found.separation)]
     return [
         Section("Sensors", _sensors(found, result, shown)),
+        *apart,
         Section("Modes", _modes(found, result, shown, built)),
         Section("Shaker and cords", _shaker(found, result, shown)),
         Section("Lines and duration", [Text([_test(result.test)])]),
