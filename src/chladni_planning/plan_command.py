@@ -114,7 +114,7 @@ def run(
     )
     from .detectable_page import detectable_section
     from .plan_page import plan_page
-    from .separation_page import separation_json
+    from .separation_page import separation_in_words, separation_json
 
     with started("plan", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
@@ -135,5 +135,6 @@ def run(
             section = detectable_section(model, smallest, noise)
             parts = replace(parts, sections=[*parts.sections, section])
         if found.separation is not None:
+            job.say(" ".join(separation_in_words(found.separation)))
             job.json("separate.json", separation_json(found.separation), "what it separates")
         job.show(parts)

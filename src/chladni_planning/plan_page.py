@@ -37,7 +37,7 @@ from .plan_summary import (
     summary,
 )
 from .sensor_candidates import FOOT, SensorCandidates
-from .separation_page import separation_in_words, separation_section
+from .separation_page import separation_section
 from .whole_plan import Plan, motion
 
 _SHOWN = 12  # modes in the picture of shapes
@@ -50,19 +50,19 @@ def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
     shown = mesh_of(model.seen, model.assembly)
     body = sections(found, result, shown, model.structure)
     files = [("sensors.csv", "sensors and shakers, for case.toml")]
-    return PageParts(_lead(found, result), body, notes(found), files)
+    return PageParts(lead(result), body, notes(found), files)
 
 
 def in_words(found: Plan) -> PageParts:
     """The page without its pictures."""
     result = summary(found)
-    return PageParts(_lead(found, result), [Section("Sensors", [_layout(result)])], notes(found))
+    body = [Section("Sensors", [_layout(result)]), *_apart(found)]
+    return PageParts(lead(result), body, notes(found))
 
 
-def _lead(found: Plan, result: PlanSummary) -> str:
-    """The plan, and the explanations it separates, in a few sentences."""
-    apart = [] if found.separation is None else separation_in_words(found.separation)
-    return " ".join([lead(result), *apart])
+def _apart(found: Plan) -> list[Section]:
+    """The explanations that the layout separates, where the settings name some."""
+    return [] if found.separation is None else [separation_section(found.separation)]
 
 
 def lead(result: PlanSummary) -> str:
@@ -177,10 +177,9 @@ def _rattle_notes(found: Plan) -> list[str]:
 
 def sections(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -> list[Section]:
     """The sections of the page."""
-    apart = [] if found.separation is None else [separation_section(found.separation)]
     return [
         Section("Sensors", _sensors(found, result, shown)),
-        *apart,
+        *_apart(found),
         Section("Modes", _modes(found, result, shown, built)),
         Section("Shaker and cords", _shaker(found, result, shown)),
         Section("Lines and duration", [Text([_test(result.test)])]),

@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from chladni.errors import FileError, ShapeError
 from chladni.progress import Progress, within
 from chladni.search.next_measurement import (
@@ -16,7 +18,12 @@ from chladni.search.next_measurement import (
 )
 from chladni.workflows.before_any_test import PlannedTests, before_any_test
 from chladni.workflows.loaded_model import Model
-from chladni.workflows.place_words import PlaceRules, allowed_places, labels_not_allowed
+from chladni.workflows.place_words import (
+    SAME_PLACE,
+    PlaceRules,
+    allowed_places,
+    labels_not_allowed,
+)
 
 from .layouts.separation import separating_layout
 from .plan_summary import durations
@@ -35,19 +42,18 @@ def separated_plan(
     planned : makes the plan of some settings
     """
     rules = settings.rules(model.assembly, model.seen)
-    fixed, folder = len(rules.fixed.labels), _folder(settings.separate)
+    left, folder = settings.sensors - len(rules.fixed.labels), _folder(settings.separate)
     if folder is not None:
         known = _of_diagnosis(model, rules, folder)
         separation = Separation(known.names, str(folder))
-        most = min(ADVISED, settings.sensors - fixed)
-        return _with_sensors([known], separation, settings, most, planned, progress)
+        return _with_sensors([known], separation, settings, min(ADVISED, left), planned, progress)
     names = effects_named(settings.separate)
     if len(names) < 2:
         raise FileError(
             f"--separate {', '.join(names)}: this is no folder of a diagnosis; give one, or two "
             "and more effects, as weld-missing,adhesive-stiffness"
         )
-    most = min(ADVISED, max(1, settings.sensors - fixed - 1))
+    most = min(ADVISED, left - (left > 1))
     n = max(1, settings.sensors - most)
     fewer = replace(settings, sensors=n, modes=settings.modes and min(settings.modes, n))
     first = planned(fewer, within(progress, 0.0, 0.3))
@@ -87,6 +93,15 @@ def _of_diagnosis(model: Model, rules: PlaceRules, folder: Path) -> Outlook:
     if known.unknown is not None:
         raise FileError(f"{folder}: nothing is tied there, so no sensor can separate anything")
     sensors = known.without(("drive", "mass", "band", "weighing"))
+    for c in sensors.candidates:
+        id = c.label.partition(":")[0]
+        here = model.assembly.points[model.assembly.ids == (int(id) if id.isdecimal() else -1)]
+        there = len(here) and np.allclose(here, c.point_m or np.nan, atol=SAME_PLACE)
+        if not there:
+            raise FileError(
+                f"{folder} is a diagnosis of another mesh than {model.source}, which has no grid "
+                f"at the place of its {c.label}"
+            )
     labels = [c.label for c in sensors.candidates]
     if not (found := sensors.without(labels_not_allowed(model.assembly, rules, labels))).seen:
         raise FileError(f"{folder / FILE}: none of its sensors is at an allowed place")

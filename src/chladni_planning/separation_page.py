@@ -3,7 +3,7 @@
 from typing import Any
 
 from chladni.errors import named
-from chladni.report.blocks import Section, Table
+from chladni.report.blocks import Section, Table, Text
 from chladni.report.measurement_table import next_measurements
 from chladni.report.words import number, odds_of
 from chladni.workflows.before_any_test import PlannedTests
@@ -21,7 +21,8 @@ def separation_section(found: Separation) -> Section:
     """The section of the page."""
     made = found.before
     table = next_measurements(found.steps) if made is None else _articles(made, found.after)
-    return Section("Explanations this layout separates", [table])
+    said = Text(separation_in_words(found))
+    return Section("Explanations this layout separates", [said, table])
 
 
 def separation_in_words(found: Separation) -> list[str]:
@@ -37,8 +38,8 @@ def separation_in_words(found: Separation) -> list[str]:
     out.append(
         f"{named(found.labels)} {'was' if one else 'were'} chosen to tell "
         f"{named(found.names)} apart{f', which {found.folder} leaves open' if found.folder else ''}"
-        f". With {'it' if one else 'them'} these are {number(found.apart, 2)} standard deviations "
-        "of all that is not known apart. The other sensors serve for the modes."
+        f". With {'it' if one else 'them'} they differ by {number(found.apart, 2)} standard "
+        "deviations of all that is not known. The other sensors serve for the modes."
     )
     if found.after is not None:
         out.append(f"This layout settles {_settled(found.after)}.")

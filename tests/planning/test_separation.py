@@ -149,6 +149,14 @@ def test_a_plan_has_sensors_for_what_a_diagnosis_leaves_open(folder):
     assert "Fixed by the settings" not in " ".join(in_words(found).notes)
 
 
+def test_a_diagnosis_of_another_mesh_is_refused(folder, tmp_path):
+    """Its grid 10 is elsewhere in this deck; 33 is none of a smaller one."""
+    for n in (5, 3):
+        write_assembly(plate(0.4, 0.3, n, n, 2e-3), tmp_path / "other.bdf")
+        with pytest.raises(ChladniError, match="is a diagnosis of another mesh than"):
+            chladni.plan(tmp_path / "other.bdf", **SMALL, separate=folder / "run")
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [

@@ -156,7 +156,8 @@ def _tell(names: Sequence[str], every: Sequence[NextMeasurement], odds: float) -
         say(table.caption)
         say_table(table)
     else:
-        say(f"none of the candidates tells {' and '.join(names)} apart")
+        does = "narrows an interval" if len(names) == 1 else f"tells {' and '.join(names)} apart"
+        say(f"none of the candidates {does}")
 
 
 def _page(
