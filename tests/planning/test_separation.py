@@ -186,6 +186,19 @@ def test_sensor_placement_separates_what_is_tied():
     check_env(env.unwrapped, skip_render_check=True)
 
 
+def test_the_environment_divides_information_by_cost():
+    """A dear sensor of an outlook is worth less, and its cost is in the info."""
+    known = drawn(3)
+    dear = replace(known.candidates[0], cost=4.0)
+    env = gym.make("chladni_envs:chladni/SensorPlacement-v0", n_sensors=1,
+                   outlook=replace(known, candidates=(dear, *known.candidates[1:])))  # fmt: skip
+    plain = gym.make("chladni_envs:chladni/SensorPlacement-v0", outlook=known, n_sensors=1)
+    worth, before = env.reset()[0], plain.reset()[0]
+    assert worth[0] < before[0]
+    assert_allclose(worth[1:], before[1:])
+    assert env.step(0)[-1]["cost"] == 4.0
+
+
 def test_a_walk_by_this_criterion_only_adds():
     with pytest.raises(ShapeError, match="sensors are added"):
         Walk(separating(drawn()), 2, None, False, "S")
