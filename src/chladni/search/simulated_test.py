@@ -108,7 +108,10 @@ class FirstTest:
 
     def forecasts(self, kinds: Collection[str] = tuple(COSTS)) -> Outlook:
         """Forecasts of further measurements of some kinds."""
-        found = outlook(self.problem, self.hypotheses, self.names, self.probability, kinds)
+        found = outlook(
+            self.problem, self.hypotheses, self.names, self.probability, kinds,
+            self.question.further,
+        )  # fmt: skip
         assert found is not None
         return found
 
