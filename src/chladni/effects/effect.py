@@ -359,6 +359,7 @@ def of(kind: type[Kind], terms: Sequence[Term]) -> list[Kind]:
     return [term for term in terms if isinstance(term, kind)]
 
 
-def changes_channels(effect: Effect) -> bool:
-    """True for an effect of the test on its channels."""
-    return bool(of(ChannelChange, effect.terms(np.zeros(len(effect.parameters)))))
+def of_test(effect: Effect) -> bool:
+    """True for an effect of the test: it changes what is measured, and not the structure."""
+    every = effect.terms(np.zeros(len(effect.parameters)))
+    return bool(every) and all(isinstance(t, (ChannelChange, ShapeChange)) for t in every)

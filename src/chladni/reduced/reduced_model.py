@@ -362,7 +362,8 @@ def _moved(
             whole = change.shapes @ (model.rows(change.rows, strained=True) @ phi)
             value = change.coefficient * whole
             total = value if total is None else total + value
-            slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
+            for p in np.flatnonzero(change.gradient).tolist():
+                slopes[at.start + p] = slopes.get(at.start + p, 0.0) + change.gradient[p] * whole
     return total, slopes
 
 

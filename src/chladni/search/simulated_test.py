@@ -25,7 +25,7 @@ from ..geometry.sampling import nearest_points
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import Fit, MassMeasurement, Status
-from ..inference.sensor_errors import sensor_errors
+from ..inference.sensor_errors import gauge_errors, sensor_errors
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
@@ -62,6 +62,7 @@ def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows = question.outputs.rows(built), question.inputs.rows(built)
+    test = question.outputs, question.inputs, built, question.accuracy
     mesh = mesh_hidden(nominal, f_max, measured_on(question))
     reduced = ready_for_responses(question, nominal, f_max)
     f = equalised_lines((low, f_max), question.exclude, ZETA)
@@ -71,9 +72,10 @@ def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
         np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
         noise=np.full(shape, noise / LN10),
         direct=question.outputs.moved_with_base(question.inputs),
-        sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
+        sensors=sensor_errors(*test),
     ).rebased(reduced.model)  # fmt: skip
-    problem = updating_problem(question, reduced, unit, nuisances(reduced, nominal, mesh), f_max)
+    nuisance = [*nuisances(reduced, nominal, mesh), *gauge_errors(*test)]
+    problem = updating_problem(question, reduced, unit, nuisance, f_max)
     state = evaluate(reduced.model, problem.base, problem.mean())
     return replace(problem, data=replace(unit, values=unit.model(state)))
 
