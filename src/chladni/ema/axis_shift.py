@@ -22,7 +22,8 @@ from .pole_selection import Rule
 SURE = 5.0  # standard deviations of a shift that is named, and root of the fall of χ²
 POOR = 3.0  # times the noise: an identification that leaves more does not hold the axis
 REACH = 0.9  # of the lowest line: the greatest shift that is tried
-TRIALS, STEPS = 37, 10  # shifts, and steps of a fit
+TRIALS, STEPS = 37, 20  # shifts, and steps of a fit
+OVERDAMPED = 0.99  # damping ratio of a pole that relaxes: foam or rubber has such, an axis has none
 LINES, CHANNELS = 500, 16  # to compare on: they show a shift of a few lines as well as all
 
 
@@ -49,8 +50,8 @@ def axis_shift(
     def fitted(shift: float, p: np.ndarray, steps: int) -> tuple[float, float, np.ndarray]:
         """χ² with the price of its poles, χ, and the poles on the recorded axis."""
         data, top = pole_data(replace(some, frequency=some.frequency - shift), lines)
-        q = bounded((p - 2j * np.pi * shift) / top, 0.1)
-        fit = (polish(data, q, iterations=steps) if steps else solve(data, q))[0]
+        q = bounded((p - 2j * np.pi * shift) / top, OVERDAMPED)
+        fit = (polish(data, q, OVERDAMPED, steps) if steps else solve(data, q))[0]
         return fit.chi2 + _price(data) * len(p), chi_of(data, fit), fit.p * top + 2j * np.pi * shift
 
     low = found.frequency < lowest / 2
