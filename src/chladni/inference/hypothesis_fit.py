@@ -270,16 +270,20 @@ def _fit_responses(
 ) -> Fit:  # fmt: skip
     """Fit parameters and the size δ of the model's error in turn; evidence integrates δ out."""
     assert data.error is not None
+    begun = None
     for _ in range(ROUNDS):
-        found, there = linearised_fit(model, effects, data, mass_measurement, x, max_steps)
+        found, there = linearised_fit(
+            model, effects, data, mass_measurement, x, max_steps, begun=begun
+        )
         likely = there.model.learned(there.r, there.r0)
         change = abs(np.log(likely.delta / data.error.delta))
-        data = replace(data, error=data.error.with_delta(likely.delta))
+        error = data.error.with_delta(likely.delta)
+        data = replace(data, error=error)
         S = likely.neg2_log_evidence + constants(effects)
         found = replace(found, neg2_log_evidence=S, data=data)
         if max_steps <= ROUGH or change < CLOSE:
             break
-        x = found.x
+        x, begun = found.x, there.under(error)
     return found
 
 
