@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.attachments import AtPoints
 from chladni.effects.calibration_parameters import calibration_parameter
-from chladni.effects.effect import Effect, MatrixTerm, Parameter, Rise, Weight, Within
-from chladni.inference import local_scores as module
+from chladni.effects.effect import Effect, MatrixTerm, Parameter, PointTerm, Rise, Weight, Within
 from chladni.inference.local_scores import local_scores
 from chladni.inference.map_fit import MassMeasurement
 from chladni.inference.scan import baseline
+from chladni.reduced import local_effect as module
 from chladni.reduced.reduced_model import evaluate
 
 WEIGHED = MassMeasurement(1.45, 0.01)
@@ -109,7 +109,7 @@ def test_a_share_counts_as_the_base_left_its_whole(reduced, responses):
 
 
 def test_other_effects_have_no_local_score(reduced, responses, base, monkeypatch):
-    """Fields, rising stiffness, dofs of their own, loads on the base, or too many rows."""
+    """Fields, rising stiffness, places that move, loads on the base, or too many rows."""
     stiff = operator(reduced, 20, 3e4, np.random.default_rng(3))
     term = MatrixTerm("K", stiff, 1.0, np.ones(1))
     rising = Rise(0.1, np.zeros(1), 50.0, (1.0, 1e3), 0.0, np.zeros(1))
@@ -121,6 +121,9 @@ def test_other_effects_have_no_local_score(reduced, responses, base, monkeypatch
     assert none(calibration_parameter(reduced.groups, "t", [0]))
     assert none(Patch((replace(term, rise=rising),)))
     assert none(Patch((replace(term, geometric=True),)))
+    row, unit = reduced.candidates.rows[:1], np.ones(1)
+    assert not none(Patch((PointTerm("K", row, unit, unit[None]),)))
+    assert none(Patch((PointTerm("K", row, unit, unit[None], {0: row}),)))
     driven = replace(base, state=replace(base.state, drive=np.zeros((1, 1))))
     assert none(Patch((term,)), driven)
     clamped = replace(reduced.model, following=np.zeros((len(reduced.structure.system.dofs), 1)))
