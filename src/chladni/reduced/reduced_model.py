@@ -260,10 +260,15 @@ class Reduced:
         key = "" if axis is None else str(axis.tolist())
         if (known := self._split.get(key)) is not None:
             return known
-        linear: dict[str, MatrixStack] = {}
-        cubic: dict[str, MatrixStack] = {}
-        for name, pair in self.groups.components(axis):
-            linear[name], cubic[name] = map(stacked, self.groups.project(pair, self.vectors))
+        whole = self.linear[""], self.cubic[""]
+        parts: dict[str, list[MatrixStack]] = {}
+        *others, rest = COMPONENTS  # the last is what the others leave of the whole
+        for name, (_, pair) in zip(others, self.groups.components(axis), strict=False):
+            each = self.groups.project(pair, self.vectors)
+            parts[name] = [stack.alike(A) for stack, A in zip(whole, each, strict=True)]
+        taken = zip(*parts.values(), strict=True)
+        parts[rest] = [stack.less(some) for stack, some in zip(whole, taken, strict=True)]
+        linear, cubic = ({name: pair[k] for name, pair in parts.items()} for k in range(2))
         made = self._split[key] = replace(self, linear=linear, cubic=cubic, axis=axis)
         return made
 
