@@ -78,12 +78,12 @@ def screened(
     more, check = levels_checked(recording, others)
     findings += more
     checks += check
-    more, one = roving_mass(frf, found)
+    strong = None if found is None else strong_modes(found)
+    read = other_readings(frf, strong, use) if strong is not None and alone else []
+    more, one = roving_mass(frf, None if read else found)  # misread, each output has other poles
     findings += more
     checks.append(one)
-    if found is not None:
-        strong = strong_modes(found)
-        read = other_readings(frf, strong, use) if alone else []
+    if found is not None and strong is not None:
         said = f"the identified modes leave {number(strong.chi, 3)} times the noise"
         failed = Check("phase of the modes", said, False)
         more, one = (read, failed) if read else _phases(frf, strong, use)
