@@ -313,7 +313,7 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
             a.at.label,
             *_where(a.at),
             number(rounded(a.condition)),
-            number(a.least_over_mean_residue, 2),
+            f"{number(100 * a.weakest_mode, 2)} %",
             _rattling(a),
             "no" if a.vetoed else "yes",
             "yes" if a.is_sensor else "",
@@ -330,12 +330,12 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     ]  # fmt: skip
     caption = (
         "Condition: best driven mode over the one driven least (Hankel singular values), the lower "
-        "the better. Least "
-        "residue: driving-point residue of the mode driven least, relative to the mean. Rattles "
+        "the better. Weakest mode: response of the one driven least, of that at the place where it "
+        "responds most. The rank counts both. Rattles "
         "from: force at resonance at which two sheets first touch. Allowed: a straight rod "
         f"reaches the place, and nothing rattles at {found.settings.force:g} N."
     )
-    columns = ("rank", "label", "grid", "place [m]", "condition", "least residue")
+    columns = ("rank", "label", "grid", "place [m]", "condition", "weakest mode")
     words = ("rattles from", "allowed", "also a sensor")
     table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
     cords = [_hanger(found, int(g)) for g in result.hangers]
