@@ -84,8 +84,8 @@ class LocalEffect:
         A factor of the base on modes does not multiply them here.
         """
         acting = acting_at([*self.base, self.effect], z := np.concatenate([x, y]))
-        groups, split = self.reduced.groups, "" not in self.reduced.model.linear
-        fields = log_fields(acting, len(groups), len(z), split)
+        groups, split = self.reduced.model.groups, "" not in self.reduced.model.linear
+        fields = log_fields(acting, groups, len(z), split)
         change: dict[int, Operator] = {}
         for sign, some in ((1, acting), (-1, acting[:-1])):
             for share in multiplied(some, groups, *fields, split):

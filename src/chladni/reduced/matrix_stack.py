@@ -33,6 +33,20 @@ class MatrixStack:
         """Extend the stack by the columns (g, r + k, k) of further basis vectors."""
         return MatrixStack((*self.blocks, border))
 
+    def divided(self, parent: np.ndarray, pieces: np.ndarray, of: np.ndarray) -> "MatrixStack":
+        """Matrices of other groups: the p-th is that of ``parent[p]``, pieces have their own.
+
+        Parameters
+        ----------
+        pieces : positions (k,) of the groups with matrices ``of`` (k, r, r)
+        """
+        out = []
+        for at, block in self._placed():
+            made = block[parent]
+            made[pieces] = of[:, : at.stop, at]
+            out.append(made)
+        return MatrixStack(tuple(out))
+
     def alike(self, values: np.ndarray) -> "MatrixStack":
         """The stack of other symmetric matrices (g, r, r), in the same blocks."""
         return MatrixStack(tuple(
