@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from tests.builders.modal_frfs import noisy
-from tests.ema.test_frf_maps import plate_like
+from tests.builders.modal_frfs import modal_sum, noisy
+from tests.ema.test_frf_maps import F, plate_like
 
 from chladni.ema.axis_shift import axis_check, axis_shift
 from chladni.ema.identification import identify
@@ -35,6 +36,16 @@ def test_an_axis_that_begins_at_zero_passes_whatever_its_scale(scale):
     findings, check = axis_check(frf := recorded(0.0, scale), identify(frf))
     assert findings == []
     assert check.passed
+
+
+def test_foam_below_the_band_is_no_shift():
+    """A pole that relaxes belongs to the structure; the axis of its recording begins at zero."""
+    frf, all_alike = plate_like(), np.ones((3, 1))
+    foam = modal_sum(2j * np.pi * F, [9.0], all_alike, all_alike[:1], damping=1.0)
+    frf = noisy(replace(frf, values=frf.values + foam), 0.004, seed=3, stated=False)
+    frf = frf.sel(band=(10.0, 190.0))
+    findings, check = axis_check(frf, identify(frf))
+    assert (findings, check.passed) == ([], True)
 
 
 def test_modes_that_do_not_fit_decide_nothing():

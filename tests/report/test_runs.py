@@ -67,10 +67,10 @@ def test_every_run_below_a_folder_is_found_once(runs):
     seen = {run.command: run for run in finished_runs(runs)}
     assert sorted(seen) == ["correlate", "diagnose", "modes"]
     assert seen["diagnose"].source == "bracket"
-    assert seen["diagnose"].q() == (0.3, 0.02)
+    assert seen["diagnose"].q() == ("held-out data", 0.3, 0.02)
     assert seen["diagnose"].lead.startswith("The model lacks point-mass, at 7")
     assert seen["correlate"].source == "plate.bdf"
-    assert seen["correlate"].q() == (3, None)
+    assert seen["correlate"].q() == ("all data", 3, None)
     assert finished_run(runs / "theirs") is None
 
 

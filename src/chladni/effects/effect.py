@@ -78,6 +78,7 @@ class FieldChange:
     field: str
     value: np.ndarray  #: (n_groups,)
     gradient: np.ndarray  #: (n_groups, n_parameters)
+    of: np.ndarray | None = None  #: (n_elements,) group of each, where it needs its own
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ SURE = 5.0  # standard deviations of a shift that is named, and root of the fall
 POOR = 3.0  # times the noise: an identification that leaves more does not hold the axis
 REACH = 0.9  # of the lowest line: the greatest shift that is tried
 TRIALS, STEPS = 37, 10  # shifts, and steps of a fit
+DAMPED, RELAXED = 0.1, 0.99  # largest damping ratio of a mode, and of foam below the modes
 LINES, CHANNELS = 500, 16  # to compare on: they show a shift of a few lines as well as all
 
 
@@ -37,7 +38,8 @@ def axis_shift(
     Poles move with the axis, and residues are fitted again. This profile is smooth, and its fall
     is at most that of a whole fit, which is made at its lowest value. Poles below half of the
     lowest line may stand for a shift, so each shift is tried with them and without, at the price of
-    a pole.
+    a pole. A structure on foam or rubber has poles that relax, which a shift would imitate; so they
+    compete with it.
     """
     keep = np.flatnonzero(kept_lines(frf, found.band, use))
     keep = keep[:: max(1, len(keep) // LINES)]
@@ -46,11 +48,13 @@ def axis_shift(
     lines = np.isin(np.arange(len(frf.frequency)), keep)
     lowest = float(frf.frequency[keep[0]])
 
-    def fitted(shift: float, p: np.ndarray, steps: int) -> tuple[float, float, np.ndarray]:
+    def fitted(
+        shift: float, p: np.ndarray, steps: int, most: float = DAMPED
+    ) -> tuple[float, float, np.ndarray]:
         """χ² with the price of its poles, χ, and the poles on the recorded axis."""
         data, top = pole_data(replace(some, frequency=some.frequency - shift), lines)
-        q = bounded((p - 2j * np.pi * shift) / top, 0.1)
-        fit = (polish(data, q, iterations=steps) if steps else solve(data, q))[0]
+        q = bounded((p - 2j * np.pi * shift) / top, most)
+        fit = (polish(data, q, most, steps) if steps else solve(data, q))[0]
         return fit.chi2 + _price(data) * len(p), chi_of(data, fit), fit.p * top + 2j * np.pi * shift
 
     low = found.frequency < lowest / 2
@@ -67,7 +71,11 @@ def axis_shift(
         return None
     best = float(trials[k] + np.clip(-slope / rise, -1, 1) * h)
     noise = max(1.0, whole[1][1] ** 2)
-    zero = min(fitted(0.0, each, STEPS)[0] for each in sets)
+    zero = min(
+        fitted(0.0, each, steps, most)[0]
+        for each in sets
+        for steps, most in ((STEPS, DAMPED), (3 * STEPS, RELAXED))
+    )
     gain = (zero - fitted(best, p, STEPS)[0]) / noise
     return best, float(np.sqrt(2 * noise / rise)) * h, gain
 

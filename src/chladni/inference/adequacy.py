@@ -15,6 +15,7 @@ its modal damping would scatter more than that of one structure.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from scipy.special import ndtr
@@ -58,6 +59,13 @@ class FitTest:
         """P as evidence against the explanation: one where it fits better than right models do."""
         return 1.0 if self.passes and self.better else self.p
 
+    def or_less_likely(self, p: float, *rows: FitStatistic, **said: Any) -> Self:
+        """The test with further statistics; ``said`` of another one if that is the less likely."""
+        test = replace(self, statistics=(*self.statistics, *rows))
+        if p >= min(self.against, LEAST_P):
+            return test
+        return replace(test, passes=False, p=p, **said)
+
 
 @dataclass(frozen=True, eq=False)
 class _Linear(LinearModel):
@@ -98,11 +106,10 @@ class _Linear(LinearModel):
 
 def _along_lines(z: np.ndarray) -> np.ndarray:
     """White noise (n_f, ...) made similar on neighbouring lines; its variance stays one."""
-    from scipy.signal import lfilter
-
-    scale = np.sqrt(1 - ALIKE**2)
-    fresh = np.concatenate([z[:1], scale * z[1:]])
-    return np.asarray(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0))
+    out = np.concatenate([z[:1], np.sqrt(1 - ALIKE**2) * z[1:]])
+    for k in range(1, len(out)):
+        out[k] += ALIKE * out[k - 1]
+    return out
 
 
 STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
@@ -175,23 +182,16 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
     """The test, or that of the damping where it is the less likely of the two."""
     if len(damping.ratio) < FEWEST:
         return test
-    p, row = damping.tested()
-    test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.against, LEAST_P):
-        return test
     what, where, modes = damping.said()
-    return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
+    return test.or_less_likely(*damping.tested(), what=what, where=where, modes_hz=modes)
 
 
 def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
     """The test, or that of complex modes where it is the less likely of the two."""
     p, row, what, modes = coupling.tested()
-    test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.against, LEAST_P):
-        return test
     what += ": a part rotates or is driven by itself, or channels are delayed"
     where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
-    return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
+    return test.or_less_likely(p, row, what=what, where=where, modes_hz=modes)
 
 
 def of_poles(data: Poles, state: State) -> FitTest:

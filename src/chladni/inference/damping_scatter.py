@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.special import stdtr, stdtrit
 
-from ..effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
+from ..effects.identified_damping import SCATTER, TAILS, IdentifiedDamping, paired_with
 from ..ema.identification import Identified
 from ..reduced.reduced_model import State
 from .result import FitStatistic
@@ -59,20 +60,21 @@ class ModalDamping(IdentifiedDamping):
     def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
         """P-value that damping follows a share (n,) of the modes by scatter alone; its statistic.
 
-        The statistic is exp of the component of ln ζ along the share, scaled to unit norm and mean
-        zero.  It is the factor by which modes with more of the share are damped more.
+        The statistic is exp of the component of ln ζ along the share, scaled to unit norm.  It is
+        the factor by which modes with more of the share are damped more.  The scatter is that of
+        the other components, as ``TAILS`` more modes of usual scatter would join them: Student's t.
+        A mean and a trend over ln f, as materials and air have it, are taken off both.
         """
-        along = share - share.mean()
+        f = np.log(self.frequency)
+        common, _ = np.linalg.qr(np.column_stack([np.ones_like(f), f]))
+        along, rest = (y - common @ (common.T @ y) for y in (share, np.log(self.ratio)))
         along = along / max(float(np.linalg.norm(along)), 1e-300)
-        rng = np.random.default_rng(20250105)
-        scatter = SCATTER * np.exp(LOG_SD * rng.normal(size=(DRAWS, 1)))
-        drawn = np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(share)))
-        own, seen = np.exp(drawn @ along), float(np.exp(np.log(self.ratio) @ along))
-        median, low, high = np.quantile(own, (0.5, 0.005, 0.995))
-        row = FitStatistic(
-            "damping where it is compliant", seen, float(median), float(low), float(high)
-        )
-        return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
+        grown, free = float(rest @ along), len(f) - 3 + TAILS
+        usual = SCATTER**2 + along**2 @ self.sd**2
+        sd = np.sqrt((rest @ rest - grown**2 + TAILS * usual) / free)
+        low, high = np.exp(sd * stdtrit(free, [0.005, 0.995]))
+        row = FitStatistic("damping where it is compliant", np.exp(grown), 1.0, low, high)
+        return float(stdtr(free, -grown / sd)), row
 
     def said(self) -> tuple[str, str, tuple[float, ...]]:
         """Sentence on the modes that stand out, their place, and their frequencies [Hz]."""

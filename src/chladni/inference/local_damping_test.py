@@ -10,13 +10,11 @@ most are also damped most, beyond the scatter of damping.
 A dashpot in one place makes modes complex by a symmetric coupling, a spinning part by a skew one.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..effects.effect import SpinTerm, of
 from ..reduced.reduced_model import evaluate
-from .adequacy import LEAST_P, FitTest
+from .adequacy import FitTest
 from .damping_scatter import FEWEST, ModalDamping
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Responses
@@ -40,12 +38,7 @@ def damping_test_along_effect(
     own = off.min(axis=1, initial=np.inf) < NEAR_MODE
     if own.sum() < FEWEST:
         return test
-    kept = damping.of(own)
     near = shift[off[own].argmin(axis=1)]
-    p, row = kept.following(np.abs(near))
-    test = replace(test, statistics=(*test.statistics, row))
-    if p >= min(test.against, LEAST_P):
-        return test
     gives = "is compliant and dissipates, as a slipping joint or a viscous layer"
     holds = "is stiff and dissipates, as foam or rubber"
     what = (
@@ -53,7 +46,8 @@ def damping_test_along_effect(
         f"material or joint there {gives if near.sum() > 0 else holds}; a recording at another "
         "level of excitation would distinguish them"
     )
-    return replace(test, passes=False, p=p, what=what, where=hypothesis.effect.text)
+    p, row = damping.of(own).following(np.abs(near))
+    return test.or_less_likely(p, row, what=what, where=hypothesis.effect.text)
 
 
 def damping_instead_of_spin(
@@ -75,10 +69,8 @@ def damping_instead_of_spin(
     damped = dashpot_scores(about, model, data, where.places)
     ahead = float(spin_scores(about, model, data, rows, sd)[1].min() - damped.min())
     p = float(np.exp(-max(ahead, 0.0) / 2))
-    if p >= min(test.against, LEAST_P):
-        return test
-    return replace(
-        test, passes=False, p=p, step="" if problem.coupling is None else problem.coupling.step,
+    return test.or_less_likely(
+        p, step="" if problem.coupling is None else problem.coupling.step,
         what="damping in one place explains the responses better than a part that spins",
         where=f"near grid {where.places.grids[int(damped.argmin())]}", modes_hz=(),
     )  # fmt: skip

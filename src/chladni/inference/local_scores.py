@@ -75,9 +75,9 @@ def _added(
     plain = all(t.own is None for t in points) and not any(t.rise or t.geometric for t in matrices)
     if not plain or len(points) + len(matrices) < len(terms):
         return None
-    acting, groups = acting_at([*base.effects, effect], z), reduced.groups
+    acting, groups = acting_at([*base.effects, effect], z), reduced.model.groups
     split = "" not in reduced.model.linear
-    fields = log_fields(acting, len(groups), len(z), split)
+    fields = log_fields(acting, groups, len(z), split)
     change: dict[int, Operator] = {}
     for sign, some in ((1, acting), (-1, acting[:-1])):
         for share in multiplied(some, groups, *fields, split):

@@ -151,9 +151,10 @@ def _by_responses(
         problem = replace(problem, data=data[0])
     unseen, held = (left_out.samples(d) for d in data)
     labels = question.outputs.labels
+    firm = int((found.firm & (found.frequency >= low) & (found.frequency <= f_max)).sum())
     notes = [
-        f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
-        f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
+        f"FRFs were compared: {firm} modes identified between {low:g} and {f_max:g} Hz, "
+        f"whitened residual {found.chi:.2f} (1 is the noise)",
         f"model and test were given {100 * ZETA:.0f} % damping for the search and "
         f"{100 * ZETA_Q:.0f} % for Q (damping equalisation): modes need no pairing, and damping "
         "cannot appear as stiffness",
