@@ -168,6 +168,15 @@ def test_every_public_object_has_an_example(reference):
     assert bare == []
 
 
+def test_links_of_an_example_lead_somewhere_on_the_page_of_an_object(reference):
+    pages, folder = reference.object_pages, DOCS / "reference" / "python"
+    made = {folder.parent / f"{name}.md" for name in reference.pages()}
+    for one in pages.public_objects().values():
+        for target in LINK.findall(plain(pages.object_page(one))):
+            path = (folder / target.partition("#")[0]).resolve()
+            assert path in made or path.is_file(), (one.full, target)
+
+
 def test_names_of_pages_differ_by_more_than_case(reference):
     names = [name.lower() for name in reference.object_pages.public_objects()]
     assert len(set(names)) == len(names) > 150

@@ -102,6 +102,11 @@ def test_a_folder_without_runs_is_refused(tmp_path, monkeypatch, words):
     assert not list((tmp_path / "empty").iterdir())
 
 
+def test_a_misspelt_run_is_compared_with_those_beside_it(runs, tmp_path):
+    said = refused("compare", runs / "d", runs / "deep" / "cc", "--out", tmp_path / "out")
+    assert "did you mean 'c'?" in said
+
+
 def test_two_runs_are_compared(runs, tmp_path):
     """Results side by side; of two commands only the numbers that both have."""
     out = tmp_path / "out"

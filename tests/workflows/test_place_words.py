@@ -190,6 +190,9 @@ def test_a_diagnosis_advises_what_the_case_allows(tmp_path):
     assert (at[402], at[187]) == (3.0, 1.0)
     assert set(at) < set(PANEL.ids.tolist())
     assert found.fixed.labels == ("34:+Y",)  # along X the grid has a sensor
+    (tmp_path / "case.toml").write_text(case + plan.replace("313", "9313"))
+    with pytest.raises(ChladniError, match=r"case.toml, \[plan\]: forbidden '9313:n'"):
+        further_places(chladni.load_case(tmp_path))
 
 
 def test_the_page_draws_allowed_places(tmp_path):

@@ -87,7 +87,7 @@ def _deck(source: Path, allow: tuple[str, ...], units: str | None, out: Path | N
         table = Table(("card", "count", "use", "meaning"), rows, words=_WORDS)
         job.section("Cards", [*([Items([found.refused])] if found.refused else []), table])
         if found.facts:
-            job.section("The structure", [Table(("what", "content"), found.facts)])
+            job.section("The structure", [Table(("it", ""), found.facts, ("it", ""))])
         say_sections(job.lead, job.sections)
         job.note([found.doubt] if found.doubt else [])
     if found.refused:

@@ -209,6 +209,7 @@ class UpdatingProblem:
         inside = self._positions(kept)
         about = [self._about(tuple(kept), tuple(x[inside].tolist())) for x in bases]
         state, x = about[0].state, about[0].x
+        assert state is not None
         local = LocalEffect.of(self.reduced, kept, effect, state, x, start)
         if local is None:
             model = self.reduced.model_for(effect, start)
@@ -278,14 +279,14 @@ def _fit_responses(
 ) -> Fit:  # fmt: skip
     """Fit parameters and the size δ of the model's error in turn; evidence integrates δ out."""
     assert data.error is not None
-    begun = None
+    error, begun = data.error, None
     for _ in range(ROUNDS):
         found, there = linearised_fit(
             model, effects, data, mass_measurement, x, max_steps, begun=begun
         )
         likely = there.model.learned(there.r, there.r0)
-        change = abs(np.log(likely.delta / data.error.delta))
-        error = data.error.with_delta(likely.delta)
+        change = abs(np.log(likely.delta / error.delta))
+        error = error.with_delta(likely.delta)
         data = replace(data, error=error)
         S = likely.neg2_log_evidence + constants(effects)
         found = replace(found, neg2_log_evidence=S, data=data)

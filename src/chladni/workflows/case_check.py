@@ -182,7 +182,7 @@ def contents(made: Assembly) -> tuple[tuple[str, str], ...]:
     held = ", ".join(f"{n} {what}" for what, n in count.items() if n)
     size = " x ".join(f"{x:.3g}" for x in np.ptp(made.points, axis=0))
     return (
-        ("content", f"{len(made.ids)} grids, {held}"),
+        ("holds", f"{len(made.ids)} grids, {held}"),
         ("size", f"{size} m"),
         ("mass", f"{mass_properties(made)[0]:.5g} kg in the deck"),
     )

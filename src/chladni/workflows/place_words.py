@@ -58,7 +58,11 @@ def further_places(case: Case) -> FurtherPlaces | None:
     if not (stated := stated_places(case)):
         return None
     made = case.assembly
-    return allowed_places(made, place_rules(made, surface(made), **stated), case.outputs)
+    try:
+        rules = place_rules(made, surface(made), **stated)
+    except LabelError as error:
+        raise LabelError(f"{case.path}, [plan]: {error}") from None
+    return allowed_places(made, rules, case.outputs)
 
 
 def allowed_places(
