@@ -54,7 +54,7 @@ class MatrixStack:
         ))  # fmt: skip
 
     def less(self, others: Iterable["MatrixStack"]) -> "MatrixStack":
-        """What is left without others of the same blocks."""
+        """The rest of it without others of the same blocks."""
         every = zip(self.blocks, *(other.blocks for other in others), strict=True)
         return MatrixStack(tuple(own - sum(taken) for own, *taken in every))
 
