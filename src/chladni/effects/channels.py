@@ -44,8 +44,8 @@ def channel_gain(n_outputs: int, sd: float) -> ChannelGain:
 class GaugeErrors(Effect):
     """Tilt and place of a force gauge: the motion there is φ_i + Σ_k x_k r_k, x ~ N(0, I).
 
-    They change all lines and channels at once. H is linear in them, but ln H is not: where the
-    gauge is near a node line, the responses to a force beside it are several times as large.
+    They change all lines and channels at once. H is linear in them, but ln H is not. If the gauge
+    is near a node line, the response to a force at a small distance is several times as large.
     """
 
     name = "gauge-errors"

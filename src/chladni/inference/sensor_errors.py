@@ -7,10 +7,10 @@ the place, and u, v normal to the direction n = u x v:
 d(ln H) = e + (θ_u H_u + θ_v H_v + x_u ∂H/∂u + x_v ∂H/∂v) / H.
 
 H_u is the response along u.  The slopes of the sheet ∂H/∂u = -φ_v, ∂H/∂v = φ_u follow from its
-rotations (w(x + dx) = w + θ × dx · n). The covariance V Vᵀ of the errors of the outputs, one
-channel at a time, and of the gains of the gauges is whitened out of the residuals before anything
-is fitted (C = I + V Vᵀ). Tilt and place of a gauge act on all channels: they are unknowns of every
-fit (:class:`..effects.channels.GaugeErrors`).
+rotations (w(x + dx) = w + θ × dx · n). V Vᵀ is the covariance of the errors of the outputs and of
+the gains of the gauges. It is whitened out of the residuals before anything is fitted
+(C = I + V Vᵀ). Tilt and place of a gauge act on all channels: they are unknowns of every fit
+(:class:`..effects.channels.GaugeErrors`).
 """
 
 from dataclasses import dataclass, replace
