@@ -261,17 +261,13 @@ def _at_rest(
 
     Return the final lines and the number of lines tried.
     """
-    known: dict[bytes, float] = {}
+    tried: set[bytes] = set()
 
     def scores(drawn: Sequence[Line]) -> np.ndarray:
         """Score of each line; a line that would gain stiffness explains nothing."""
-        keys = [line.shells.tobytes() for line in drawn]
-        fresh = {key: line.shells for key, line in zip(keys, drawn, strict=True)}
-        fresh = {key: shells for key, shells in fresh.items() if key not in known}
-        amount, score = scan.bending_scores(about, list(fresh.values()))
-        score = np.where(amount < 0, score, np.inf)
-        known.update(zip(fresh, map(float, score), strict=True))
-        return np.array([known[key] for key in keys])
+        tried.update(line.shells.tobytes() for line in drawn)
+        amount, score = scan.bending_scores(about, [line.shells for line in drawn])
+        return np.where(amount < 0, score, np.inf)
 
     score = scores(first)
     begun = far_apart(score, np.array([line.centre for line in first]), BEGUN)
@@ -287,7 +283,7 @@ def _at_rest(
             if own[best] < own[0] - WORTH:
                 ends[k] = each[best]
                 moving.append(k)
-    return _different(ends), len(known)
+    return _different(ends), len(tried)
 
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:

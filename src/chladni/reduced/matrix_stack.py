@@ -4,7 +4,7 @@ Every hypothesis has a basis of its own: the common one and a few further vector
 of its matrices is its own.  The common block is held once for all hypotheses.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +53,7 @@ class MatrixStack:
             np.ascontiguousarray(values[:, : at.stop, at]) for at, _ in self._placed()
         ))  # fmt: skip
 
-    def less(self, others: Sequence["MatrixStack"]) -> "MatrixStack":
+    def less(self, others: Iterable["MatrixStack"]) -> "MatrixStack":
         """What is left without others of the same blocks."""
         every = zip(self.blocks, *(other.blocks for other in others), strict=True)
         return MatrixStack(tuple(own - sum(taken) for own, *taken in every))

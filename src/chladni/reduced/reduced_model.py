@@ -129,7 +129,7 @@ class Reduced:
         if r == self.vectors.shape[1]:  # the same basis: only clamps were released
             return old
         border = vectors.bordering(A)
-        return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
+        return np.block([[old, border[:r]], [border[:r].T, (border[r:] + border[r:].T) / 2]])
 
     @property
     def deformation(self) -> Basis:
@@ -260,15 +260,13 @@ class Reduced:
         key = "" if axis is None else str(axis.tolist())
         if (known := self._split.get(key)) is not None:
             return known
-        whole = self.linear[""], self.cubic[""]
-        parts: dict[str, list[MatrixStack]] = {}
+        linear, cubic = dict[str, MatrixStack](), dict[str, MatrixStack]()
         *others, rest = COMPONENTS  # the last is what the others leave of the whole
         for name, (_, pair) in zip(others, self.groups.components(axis), strict=False):
-            each = self.groups.project(pair, self.vectors)
-            parts[name] = [stack.alike(A) for stack, A in zip(whole, each, strict=True)]
-        taken = zip(*parts.values(), strict=True)
-        parts[rest] = [stack.less(some) for stack, some in zip(whole, taken, strict=True)]
-        linear, cubic = ({name: pair[k] for name, pair in parts.items()} for k in range(2))
+            A, B = self.groups.project(pair, self.vectors)
+            linear[name], cubic[name] = self.linear[""].alike(A), self.cubic[""].alike(B)
+        linear[rest] = self.linear[""].less(linear.values())
+        cubic[rest] = self.cubic[""].less(cubic.values())
         made = self._split[key] = replace(self, linear=linear, cubic=cubic, axis=axis)
         return made
 
@@ -400,7 +398,3 @@ def _weight(
 ) -> tuple[float, np.ndarray]:
     w = model.groups.weight * np.exp(mass_log(logs))
     return float(model.weight0 + w.sum()), np.asarray(w @ mass_log(slopes))
-
-
-def _symmetric(A: np.ndarray) -> np.ndarray:
-    return np.asarray(A + A.T) / 2

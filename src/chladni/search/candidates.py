@@ -331,9 +331,21 @@ class UpdatingContext:
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,)."""
-        base, model = self.baselines[about], self.problem.reduced.model
-        return direction_scores(base, bending_slopes(base, model, self.data, sets))
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
+
+        Several families try the same lines of shells.
+        """
+        base, model, known = self.baselines[about], self.problem.reduced.model, self._bent
+        keys = [(about, each.tobytes()) for each in sets]
+        fresh = {key: each for key, each in zip(keys, sets, strict=True) if key not in known}
+        slopes = bending_slopes(base, model, self.data, list(fresh.values()))
+        known |= zip(fresh, np.transpose(direction_scores(base, slopes)), strict=True)
+        amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
+        return amount, score
+
+    @cached_property
+    def _bent(self) -> dict[tuple[int, bytes], np.ndarray]:
+        return {}
 
 
 def _prior(effect: Effect, x: np.ndarray) -> float:
