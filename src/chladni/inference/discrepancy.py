@@ -17,7 +17,7 @@ from typing import Protocol, Self
 import numpy as np
 import scipy.linalg as sl
 
-from ..reduced.reduced_model import Reduced, State
+from ..reduced.reduced_model import State
 
 MEDIAN = 0.01  # of δ before it is learned
 REACH = 1.5  # modes up to this many times the highest line take part
@@ -96,34 +96,16 @@ class Lines(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """A change of the form of the model, held: G and G' in the modes of a reference state.
+    """The modes of a reference state in which the form of the model may change.
 
     Attributes
     ----------
     rows : (k, m)      of Φ⁻¹, the reference modes that take part
     lam : (k,)         their ω² [rad²/s²]
-    G : (2, k, k)      relative change of modal stiffness and mass
     """
 
     rows: np.ndarray
     lam: np.ndarray
-    G: np.ndarray
-
-    def changed(self, model: Reduced) -> Reduced:
-        """The model with the change in it."""
-        root = np.sqrt(self.lam)
-        dK, dM = (
-            self.rows.T @ A @ self.rows for A in (root[:, None] * self.G[0] * root, self.G[1])
-        )
-        return replace(model, K0=model.K0 + dK, M0=model.M0 + dM)
-
-    def with_values(self, g: np.ndarray) -> Self:
-        """A copy with the entries g (2 pairs,), in units of their standard deviation at δ = 1."""
-        i, j = self.pairs.T
-        G = np.zeros_like(self.G)
-        for q, values in enumerate(g.reshape(2, -1)):
-            G[q, i, j] = G[q, j, i] = values * np.where(i == j, 1.0, np.sqrt(0.5))
-        return replace(self, G=G)
 
     @property
     def pairs(self) -> np.ndarray:
@@ -132,11 +114,10 @@ class Form:
 
 
 def form(state: State, f_max: float) -> Form:
-    """No change yet, in the flexible modes up to ``REACH`` times the highest line [rad/s]."""
+    """The flexible modes up to ``REACH`` times the highest line [rad/s]."""
     omega = np.sqrt(np.maximum(state.lam, 0))
     modes = np.flatnonzero((omega > RIGID * f_max) & (omega < REACH * f_max))
-    k = len(modes)
-    return Form(np.linalg.inv(state.vectors)[modes], state.lam[modes], np.zeros((2, k, k)))
+    return Form(np.linalg.inv(state.vectors)[modes], state.lam[modes])
 
 
 @dataclass(frozen=True, eq=False)
