@@ -156,7 +156,8 @@ def object_page(one: PublicObject) -> str:
     out = [f"# {one.full}\n", f"```{{eval-rst}}\n{directive}{members}\n```\n"]
     links = [f"[{e.title}](../../examples.md#{e.anchor})" for e in of_object(one)]
     if links and ">>>" not in (inspect.getdoc(one.value) or ""):
-        out.append(f"## Example: {links.pop(0)}\n\n{of_object(one)[0].text}\n")
+        text = re.sub(r"\]\((?![a-z]+:|#)", "](../../", of_object(one)[0].text)
+        out.append(f"## Example: {links.pop(0)}\n\n{text}\n")
     if links:
         out.append(f"Also in the examples {', '.join(links)}.\n")
     return "\n".join([*out, "[All names](../python.md)\n"])

@@ -85,7 +85,7 @@ def best_actuators(env: gym.Env[Any, Any]) -> Agent:
     inner = env.unwrapped
     if not isinstance(inner, ActuatorPlacementEnv):
         raise ShapeError("this agent places actuators; make it for ActuatorPlacement-v0")
-    return towards(best_shakers(inner.shaker, inner.n_actuators, inner.allowed), env)
+    return towards(best_shakers(inner.shaker, inner.n_actuators, inner.allowed, even=True), env)
 
 
 def held_back(threshold: float = 0.1) -> Agent:

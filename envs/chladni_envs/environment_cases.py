@@ -18,12 +18,12 @@ from chladni.search.next_measurement import Outlook, with_common_candidates
 from chladni.workflows.before_any_test import before_any_test
 from chladni.workflows.given_case import Source
 from chladni.workflows.loaded_model import is_case, model_in_si, opened
+from chladni.workflows.place_words import allowed_places
 from chladni.workflows.question_of_case import prepared
 from chladni_planning import (
     Linearised,
     PlanSettings,
     find_sensor_candidates,
-    labels_not_allowed,
     motion,
     mounts_at,
     openings,
@@ -111,14 +111,12 @@ def outlooks(
     elif isinstance(sensors, str):
         sensors = Path(sensors)
     source = given if isinstance(given, Case) else model
-    tests = before_any_test(source, effects, sensors, **words).open
+    rules = settings.rules(model.assembly, model.seen)
+    further = allowed_places(model.assembly, rules)
+    tests = before_any_test(source, effects, sensors, further=further, **words).open
     if not tests:
         raise ShapeError("the planned test leaves nothing open; give fewer sensors")
-    every = with_common_candidates([t.outlook for t in tests])
-    labels = [c.label for o in every for c in o.candidates if c.label]
-    rules = settings.rules(model.assembly, model.seen)
-    barred = labels_not_allowed(model.assembly, rules, labels)
-    return tuple(o.without(barred) for o in every)
+    return with_common_candidates([t.outlook for t in tests])
 
 
 class Recorded:

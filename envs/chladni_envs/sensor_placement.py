@@ -54,8 +54,8 @@ def of_case(
 
 def _of_outlook(
     outlook: "Outlook | Sequence[Outlook] | str | Path",
-) -> tuple[Candidates, np.ndarray | None, tuple[str, ...]]:
-    """Candidates, places and labels of the sensors of an outlook."""
+) -> tuple[Candidates, np.ndarray | None, tuple[str, ...], np.ndarray]:
+    """Candidates, places, labels and costs of the sensors of an outlook."""
     from chladni.search.next_measurement import Outlook, read_outlook, with_common_candidates
     from chladni_planning import separating
 
@@ -65,7 +65,7 @@ def _of_outlook(
     sensors = [c for c in every[0].candidates if c.kind == "sensor"]
     places = [c.point_m for c in sensors if c.point_m is not None]
     points = np.array(places) if len(places) == len(sensors) else None
-    return made, points, tuple(c.label for c in sensors)
+    return made, points, tuple(c.label for c in sensors), np.array([c.cost for c in sensors])
 
 
 def kept_labels(labels: tuple[str, ...], kept: np.ndarray) -> tuple[str, ...]:
@@ -154,11 +154,12 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         self.outline: np.ndarray | None = None
         self.notes: tuple[str, ...] = ()
         self.criterion: Literal["D", "S"] = "D" if outlook is None else "S"
+        price: np.ndarray | None = None
         if outlook is not None:
-            moves, (phi, points, labels) = "add", _of_outlook(outlook)
+            moves, (phi, points, labels, price) = "add", _of_outlook(outlook)
         places = {"regions": regions, "fixed": fixed, "forbidden": forbidden, "cost": cost}
         specimen = of_case(case, modes, units, places, plate())
-        price = specimen.cost if phi is None else None
+        price = specimen.cost if phi is None else price
         rules = rules or Rules()
         if phi is None:
             phi, points, self.outline = specimen.phi, specimen.points, specimen.outline

@@ -8,7 +8,7 @@ import numpy as np
 
 from chladni.effects.calibration_parameters import scaled as sheet_scaled
 from chladni.effects.calibration_parameters import value
-from chladni.effects.membrane_prestress import critical_force, prestressed, tensors
+from chladni.effects.membrane_prestress import WAYS, critical_force, prestressed, tensors
 from chladni.errors import ModelError
 from chladni.geometry.facets import cell_areas, cell_normals, unit
 from chladni.model.assembly import Assembly
@@ -159,7 +159,7 @@ def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden
     def stiffness(s: np.ndarray) -> np.ndarray:
         return np.asarray((m * s**2 * (k + c * s) / (m * s**2 + c * s + k))[:, None, None])
 
-    truth = {"value": m, "frequency_hz": f, "point_m": site.article.points[row].tolist()}
+    truth = {"value": m, "f": f, "point_m": site.article.points[row].tolist()}
     coupling = Coupling(np.array([row]), n[None, None], stiffness)
     return Hidden(site.article, truth, (coupling,), unweighed=-m)
 
@@ -212,20 +212,21 @@ def prestress(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     part = a.part(name)
     if not (a.shells.part == part).any():
         raise ModelError(f"part {name} has no sheet for a membrane force")
-    along, across = tensors(a, part)
-    if rng.integers(2):
-        along, across = across, along
-    tensor = along + float(rng.uniform(0, 1)) * across
+    ways = dict(zip(WAYS, tensors(a, part), strict=True))
+    first, second = reversed(WAYS) if rng.integers(2) else WAYS
+    less = float(rng.uniform(0, 1))
+    tensor = ways[first] + less * ways[second]
     share = float(rng.choice([-1, 1]) * min(rng.uniform(0.2, 0.45) * size, 0.7))
     N = share * critical_force(a, part, tensor)
-    truth = {"value": N, "part": name, "share": share}
+    truth = {f"N {first}": N, f"N {second}": less * N, "value": N, "part": name, "share": share}
     return Hidden(prestressed(a, part, tensor, N), truth)
 
 
 def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A line of shells across the sheet that lose most bending but no membrane stiffness.
 
-    Its place is the middle of these shells, because the sheet may end before the line does.
+    Its place is the middle of these shells, because the sheet may end before the line does. Its
+    hinge is the length of sheet that bends as much.
     """
     a = site.article
     length = float(rng.uniform(0.12, 0.2)) * site.size * float(np.clip(size, 1.0, 3.0))
@@ -240,8 +241,11 @@ def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     new = Part(1 + max(x.id for x in a.parts), "cracked", replace(section, bending_ratio=kept))
     shells = replace(a.shells, part=np.where(mine, len(a.parts), a.shells.part))
     middle = a.points[a.shells.nodes[mine]].mean(axis=1)  # edges and holes cut it short
+    area, reach = cell_areas(a.points, a.shells.nodes)[mine], _longest(middle)
+    across = float(area.sum() / (np.ptp(middle @ reach) + np.sqrt(area).mean()))
     truth = {
-        "value": kept,
+        "kept": kept,
+        "hinge": across * (1 / kept - 1),
         "point_m": middle.mean(axis=0).tolist(),
         "length_m": float(np.linalg.norm(np.ptp(middle, axis=0))),
         "shells": int(mine.sum()),

@@ -15,7 +15,6 @@ from chladni.ema.identification import Identified, identify
 from chladni.ema.pole_fitting import PoleData, solved
 from chladni.ema.pole_selection import Rule, uncertainty
 from chladni.errors import LabelError
-from chladni.workflows.identify import firm
 
 NOISE = 0.02
 BAND = (20.0, 200.0)
@@ -106,7 +105,7 @@ def held_against(known: Known, frf: FRF, variance: np.ndarray, found: Identified
     there = partner >= 0
     m = partner[there]
     df, dz = found.frequency[m] - f[there], found.damping[m] - zeta[there]
-    stray = firm(found) & found.inside & ~np.isin(np.arange(found.order), m)
+    stray = found.firm & found.inside & ~np.isin(np.arange(found.order), m)
     return Found(
         df / f[there],
         dz / zeta[there],

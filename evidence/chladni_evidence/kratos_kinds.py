@@ -154,7 +154,7 @@ def stretched(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     made = Stretched(**vars(a), moved=strain * (a.points - a.points.mean(axis=0)))
     m = sheet_of(a, 0)
     N = m.E * value(part, "t") / (1 - m.nu) * strain
-    return Hidden(made, {"value": N, "part": part.name})
+    return Hidden(made, {"value": N, "N along": N, "N across": N, "part": part.name})
 
 
 BY_KRATOS: dict[str, Kind] = {

@@ -1,9 +1,10 @@
 """Evidence on the next measurement: articles whose first test leaves explanations open.
 
 An effect is concealed in an article that differs from the deck in E, rho and t.  Its recording is
-the response of a full model of that article.  Where the first test leaves the name open, a sensor
-is added, all effects are fitted anew to the whole recording, and so on, until one name has the
-odds: the loop of ``chladni diagnose`` and ``chladni next``.  Forecasts never see the article.
+the response of a full model of that article.  Where the first test leaves the name open, a sensor,
+a drive, a wider band or a weighing is added.  All effects are fitted anew to the whole recording,
+and so on, until one name has the odds: the loop of ``chladni diagnose`` and ``chladni next``.
+Forecasts never see the article.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -19,10 +20,11 @@ from chladni.model.assembly import Assembly
 from chladni.parallel import one_blas_thread
 from chladni.search.next_measurement import ODDS, Outlook
 from chladni.search.question import Question
-from chladni.search.simulated_test import FirstTest, first_tests, with_sensors
+from chladni.search.simulated_test import FirstTest, first_tests, with_further
 from chladni_specimens import plate
 
-MOST = 3  # further sensors
+MOST = 3  # further measurements
+KINDS = "sensor", "drive", "band", "weighing"
 EFFECTS = ("point-mass", "mass-patch", "crack", "stiffness-patch", "thickness-distribution")
 SHELLS = 18, 13  # of the plate
 BAND = 20.0, 250.0  # [Hz]
@@ -33,12 +35,12 @@ BINS = 0.0, 0.3, 0.7, 0.9, 1.0  # of forecasts
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Further sensors of one article, as one agent chose them.
+    """Further measurements of one article, as one agent chose them.
 
     Attributes
     ----------
     agent, truth : by name
-    made : labels of the sensors
+    made : labels of the sensors and drives, kinds of the others
     forecast : probability, before each, that the true name then has the odds
     right, wrong : whether the true or a wrong name has the odds after each
     """
@@ -57,20 +59,20 @@ Found = Course | FirstTest
 def course(
     test: FirstTest, known: Outlook, agent: str, rng: np.random.Generator, odds: float = ODDS
 ) -> Course:
-    """Add sensors until one name has the odds, or ``MOST`` were added.
+    """Measure further until one name has the odds, or ``MOST`` measurements were made.
 
     Parameters
     ----------
-    known : forecasts of a first sensor
+    known : forecasts of the first of them
     """
     made, forecast, right, wrong = list[str](), list[float](), list[bool](), list[bool]()
     for _ in range(MOST):
         if not test.settled(odds):
-            known = (test.forecasts(("sensor",)) if made else known).without(made)
+            known = (test.forecasts(KINDS) if made else known).without(made)
             k = _choice(agent, known, rng)
             forecast.append(known.rivals.forecast(known.seen[k]).settled(odds))
-            made.append(known.candidates[k].label)
-            test = with_sensors(test, _upward(test.question.assembly, made[-1:]), rng)
+            made.append(known.candidates[k].label or known.candidates[k].kind)
+            test = with_further(test, known.candidates[k], rng)
         right.append(test.settled(odds) and test.right)
         wrong.append(test.settled(odds) and not test.right)
     each = (tuple(made), tuple(forecast), tuple(right), tuple(wrong))
@@ -78,7 +80,7 @@ def course(
 
 
 def _choice(agent: str, known: Outlook, rng: np.random.Generator) -> int:
-    """Position of the sensor that an agent adds."""
+    """Position of the measurement that an agent makes; effective independence takes sensors."""
     if agent == RANDOM:
         return int(rng.integers(len(known.seen)))
     if agent == INFORMED:
@@ -88,7 +90,8 @@ def _choice(agent: str, known: Outlook, rng: np.random.Generator) -> int:
         each = [np.linalg.slogdet(np.eye(F.shape[1]) + F.T @ F)[1] for F in seen.factors]
         return float(known.rivals.probability @ each)
 
-    return int(np.argmax([growth(s) for s in known.seen]))
+    sensors = [k for k, c in enumerate(known.candidates) if c.kind == "sensor"]
+    return max(sensors, key=lambda k: growth(known.seen[k]))
 
 
 def courses(
@@ -106,7 +109,7 @@ def courses(
         for n, test in enumerate(first_tests(question, effects, seed=seed, scatter=1.0)):
             yield test
             if not test.settled(odds):
-                known = test.forecasts(("sensor",))
+                known = test.forecasts(KINDS)
                 for agent in AGENTS:
                     yield course(test, known, agent, np.random.default_rng([seed, n]), odds)
 

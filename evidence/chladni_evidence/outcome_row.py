@@ -38,6 +38,7 @@ KIN = (  # effects that change the same operator: the right family, if not the r
 )  # fmt: skip
 NEAR_PLACE = {"tailgate": 0.150}  # largest distance of a right place [m]; else ``CLOSE``
 CLOSE = 0.060
+IN_A_PART = ("membrane-prestress",)  # effects whose place is a whole part
 DRAWN_IN = 1.645 / 1.960  # intervals are written for 95 %, and scored for 90 %
 _VETOES = "|".join(re.escape(why.value) for why in (Reason.AGAINST, Reason.WORSE))
 VETO = re.compile(rf"(\S+) gained .* in -2 ln evidence, but (?:{_VETOES})")
@@ -57,7 +58,7 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     d, kind = answer.result, truth["effect"]
     truth = {**truth, "effect": catalogued(kind)}
     name, vetoed, place = called(d), _vetoed(d), _place(d, truth)
-    reach = NEAR_PLACE.get(truth["structure"], CLOSE)
+    near = _near(d, truth, place)
     return {
         "structure": truth["structure"],
         "seed": truth["seed"],
@@ -71,9 +72,9 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
         "veto_right": None if vetoed is None else not _is(vetoed, truth),
         "kin": _kin(name, truth),
         "place_m": place,
-        "near": None if place is None else place <= reach,
+        "near": near,
         "gain_share": _gain(d),
-        "covered": _covered(d, truth),
+        "covered": _covered(d, truth, near is not False),
         "beside": {
             "calibration": None if plain is None else _figures(plain.result, truth),
             "diagnosis": _figures(d, truth),
@@ -162,6 +163,16 @@ def _place(d: Row, truth: Row) -> float | None:
     return max(away, default=None)
 
 
+def _near(d: Row, truth: Row, place: float | None) -> bool | None:
+    """True at the right place or in the right part; None where the effect has neither."""
+    if place is not None:
+        return place <= NEAR_PLACE.get(truth["structure"], CLOSE)
+    named = [e["where"] for e in d.get("effects") or [] if e["name"] == truth["effect"]]
+    if truth["effect"] not in IN_A_PART or not named:
+        return None
+    return truth["part"] in (named[0].get("parts") or [])
+
+
 def _points(d: Row, name: str | None) -> list[list[float]]:
     """Named places of this effect, or of the first one without a name."""
     effects = d.get("effects") or []
@@ -179,10 +190,14 @@ def _gain(d: Row) -> float | None:
     return float((before - after) / possible) if possible > 0 else None
 
 
-def _covered(d: Row, truth: Row) -> dict[str, list[int]]:
-    """Numbers of 90 % intervals that hold the truth, and of all, for E, rho, t, wall, effect."""
+def _covered(d: Row, truth: Row, there: bool) -> dict[str, list[int]]:
+    """Numbers of 90 % intervals that hold the truth, and of all, for E, rho, t, wall, effect.
+
+    Intervals of an effect hold its values if the explanation is right: those of one that is not
+    ``there`` do not count. A wrong place is counted for itself.
+    """
     count = {name: [0, 0] for name in (*QUANTITIES, "effect")}
-    of_effect = (("effect", entry, true) for entry, true in _named(d, truth))
+    of_effect = (("effect", entry, true) for entry, true in _named(d, truth) if there)
     for name, entry, true in (*_calibration_parameters(d, truth), *of_effect):
         count[name][0] += int(_holds(entry, true))
         count[name][1] += 1

@@ -10,7 +10,6 @@ from chladni.ema.identification import Identified, identify
 from chladni.ema.mode_pairing import pair
 from chladni.ema.shapes import driven_shapes
 from chladni.ema.stabilisation import ghosts, stabilisation
-from chladni.workflows.identify import firm
 from chladni_bench import BenchRecording
 
 BAND = (10.0, 195.0)  # [Hz], section 5.1
@@ -56,7 +55,7 @@ def article_identified(recording: BenchRecording, rings: np.ndarray) -> ArticleI
     frf = recording.frf
     use = used_lines(frf.frequency)
     found = identify(frf, BAND, use=use)
-    struck = ghosts(found, stabilisation(frf, found, use)) | ~firm(found) | doubled(found)
+    struck = ghosts(found, stabilisation(frf, found, use)) | ~found.firm | doubled(found)
     near = np.abs(found.frequency[:, None] / rings - 1).min(axis=1) < NEAR_CORD
     of_cord = near & (found.damping > CORD_DAMPING)
     inside, f = found.inside, found.frequency

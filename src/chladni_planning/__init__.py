@@ -1,6 +1,7 @@
 """Pre-test planning on a structure: candidates on the mesh, sensors, shaker, cords, test time."""
 
 from chladni.ema.correlation import auto_mac as auto_mac
+from chladni.workflows.place_words import labels_not_allowed as labels_not_allowed
 
 from . import plan_views as plan_views
 from .actuator_ranking import ActuatorRanking as ActuatorRanking
@@ -62,7 +63,6 @@ from .measurement_lines import transient_left as transient_left
 from .mounts import mounts_at as mounts_at
 from .mounts import seen_at as seen_at
 from .parameter_information import Linearised as Linearised
-from .place_words import labels_not_allowed as labels_not_allowed
 from .plan_summary import sensors_csv as sensors_csv
 from .plan_summary import summary as summary
 from .plan_workflow import plan as plan

@@ -1,6 +1,10 @@
-"""Ranking of shaker places by condition number, driving-point residue and rattle.
+"""Ranking of shaker places by the response of the weakest mode, and rattle.
 
-The condition number is that of Echaniz Granado (2015), section 4.1.1 and table 2.
+The condition number of a place is that of Echaniz Granado (2015), section 4.1.1 and table 2. It
+compares modes, so it is low next to a clamp too, where no mode moves. A force F brings the mode
+that is driven least to F σ_min. Where the mode that is driven most fills the range S of the
+channels first, it comes to S / κ, κ = σ_max/σ_min. Which of the two limits a test is not known
+before it, so their geometric mean counts: √(σ_min/κ).
 """
 
 from dataclasses import dataclass
@@ -37,6 +41,17 @@ class Shaking:
         """Ratio σ_max/σ_min of every candidate alone (n,)."""
         return condition(hankel_values(self.each, self.observed))
 
+    def weakest(self) -> np.ndarray:
+        """Hankel value σ_min of the mode that every candidate alone drives least (n,)."""
+        return np.asarray(hankel_values(self.each, self.observed)[..., -1])
+
+    def effort(self, W: np.ndarray, even: bool = False) -> np.ndarray:
+        """κ/σ_min of gramians W (..., 2r, 2r) of actuators; with ``even`` κ, whatever the force."""
+        values = hankel_values(W, self.observed)
+        kappa, least = condition(values), values[..., -1]
+        out = np.full(kappa.shape, np.inf)
+        return np.divide(kappa, 1.0 if even else least, out=out, where=np.isfinite(kappa))
+
 
 def shaking(
     frequency: np.ndarray,
@@ -52,9 +67,12 @@ def shaking(
 
 
 def best_actuators(
-    shaker: Shaking, count: int, allowed: np.ndarray | None = None, *, exhaustive: int = 2000
-) -> np.ndarray:
-    """The ``count`` allowed actuators of the lowest joint condition number (sorted positions).
+    shaker: Shaking, count: int, allowed: np.ndarray | None = None, *, exhaustive: int = 2000,
+    even: bool = False,
+) -> np.ndarray:  # fmt: skip
+    """The ``count`` allowed actuators that drive the weakest mode best (sorted positions).
+
+    With ``even`` they have the lowest joint condition number, however little they move.
 
     All combinations are tried where they are at most ``exhaustive``.  Otherwise actuators are added
     one by one and then exchanged one for one.
@@ -72,28 +90,32 @@ def best_actuators(
         )
     if comb(len(among), count) <= exhaustive:
         sets = [np.array(s) for s in combinations(among, count)]
-        return sets[int(np.argmin([shaker.condition(s) for s in sets]))]
+        return sets[int(np.argmin([shaker.effort(shaker.each[s].sum(axis=0), even) for s in sets]))]
     found = np.zeros(0, dtype=np.int64)
     for _ in range(count):
-        found = _joined(shaker, found, np.setdiff1d(among, found))
-    return np.sort(_exchanged(shaker, found, among))
+        found = _joined(shaker, found, np.setdiff1d(among, found), even)
+    return np.sort(_exchanged(shaker, found, among, even))
 
 
-def _joined(shaker: Shaking, found: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The actuators plus the other candidate that lowers the condition number most."""
+def _joined(shaker: Shaking, found: np.ndarray, others: np.ndarray, even: bool) -> np.ndarray:
+    """The actuators plus the other candidate that lowers the effort most."""
     W = shaker.each[found].sum(axis=0) + shaker.each[others]
-    best = int(np.argmin(condition(hankel_values(W, shaker.observed))))
-    return np.r_[found, others[best]]
+    return np.r_[found, others[int(np.argmin(shaker.effort(W, even)))]]
 
 
-def _exchanged(shaker: Shaking, found: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """The actuators after one-for-one swaps, until no swap lowers the condition number."""
-    now, better = shaker.condition(found), True
+def _exchanged(shaker: Shaking, found: np.ndarray, among: np.ndarray, even: bool) -> np.ndarray:
+    """The actuators after one-for-one swaps, until no swap lowers the effort."""
+
+    def effort(actuators: np.ndarray) -> float:
+        return float(shaker.effort(shaker.each[actuators].sum(axis=0), even))
+
+    now, better = effort(found), True
     while better:
         better = False
         for k in range(len(found)):
-            new = _joined(shaker, np.delete(found, k), np.setdiff1d(among, np.delete(found, k)))
-            if (after := shaker.condition(new)) < now * (1 - 1e-9):
+            rest = np.delete(found, k)
+            new = _joined(shaker, rest, np.setdiff1d(among, rest), even)
+            if (after := effort(new)) < now * (1 - 1e-9):
                 found, now, better = new, after, True
     return found
 
@@ -145,6 +167,7 @@ class ActuatorRanking:
     residue : (n,)       least over mean driving-point residue of its modes
     margin : (n,)        rattle margin, inf where no gap was given
     allowed : (n,) bool  accessible, and free of rattle
+    weakest : (n,)       Hankel value of the mode driven least, over the largest of all candidates
     """
 
     order: np.ndarray
@@ -152,6 +175,7 @@ class ActuatorRanking:
     residue: np.ndarray
     margin: np.ndarray
     allowed: np.ndarray
+    weakest: np.ndarray
 
 
 def ranked_actuators(
@@ -162,21 +186,21 @@ def ranked_actuators(
     margin: np.ndarray | None = None,
     access: np.ndarray | None = None,
 ) -> ActuatorRanking:
-    """Rank candidates by condition number; no access or a rattle margin below 1 is a veto.
+    """Rank candidates by the response of the weakest mode; no access, or a margin < 1, is a veto.
 
-    Every condition is infinite where no candidate drives all modes, for example where two modes
-    share a frequency.  The least residue decides then.
+    It is zero everywhere where no candidate drives all modes, for example where two modes share a
+    frequency.  The driving-point residues of the modes stand for the Hankel values then.
     """
     n = len(phi)
     margin = np.full(n, np.inf) if margin is None else margin
     allowed = (np.ones(n, bool) if access is None else np.asarray(access, bool)) & (margin >= 1)
-    kappa = shaker.conditions()
-    residue = driving_point_residue(frequency, phi)
+    residue, weakest = driving_point_residue(frequency, phi), shaker.weakest()
     least = residue.min(axis=1) / np.maximum(residue.mean(axis=1), 1e-300)
     return ActuatorRanking(
-        np.lexsort((-least, kappa, ~allowed)),
-        kappa,
+        np.lexsort((-least * residue.min(axis=1), shaker.effort(shaker.each), ~allowed)),
+        shaker.conditions(),
         least,
         margin,
         allowed,
+        weakest / max(float(weakest.max()), 1e-300),
     )

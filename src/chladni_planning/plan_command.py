@@ -8,7 +8,6 @@ import typer
 from chladni.cli.run import Allow, DeckOrCase, Out, Pictures, Units, started
 from chladni.progress import within
 from chladni.report.result_json import to_json
-from chladni.workflows.before_any_test import before_any_test
 from chladni.workflows.loaded_model import model_in_si, opened
 
 from . import PlanSettings
@@ -60,8 +59,8 @@ def run(
     separate: Annotated[
         str,
         typer.Option(
-            help="Predict if the layout separates these effects, for example "
-            "weld-missing,adhesive-stiffness, and the sensors that would."
+            help="Let some of the sensors tell these effects apart, for example "
+            "weld-missing,adhesive-stiffness, or the open explanations of a folder of a diagnosis."
         ),
     ] = "",
     region: Annotated[
@@ -111,10 +110,11 @@ def run(
         fixed=fixed or (),
         forbidden=forbidden or (),
         cost=cost or (),
+        separate=separate,
     )
     from .detectable_page import detectable_section
     from .plan_page import plan_page
-    from .separation_page import separation_json, separation_section
+    from .separation_page import separation_in_words, separation_json
 
     with started("plan", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
@@ -134,23 +134,7 @@ def run(
             job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
             section = detectable_section(model, smallest, noise)
             parts = replace(parts, sections=[*parts.sections, section])
-        if separate:
-            names, stage = _names(separate), within(job.progress, 0.8, 1.0)
-            made = before_any_test(
-                model, names, job.folder / "plan.json", top=durations(found).band_hz[1],
-                progress=stage,
-            )  # fmt: skip
-            every = made.advised(without=("drive", "mass", "band", "weighing"))
-            job.json("separate.json", separation_json(made, every), "what it separates")
-            section = separation_section(made, every)
-            parts = replace(parts, sections=[*parts.sections, section])
+        if found.separation is not None:
+            job.say(" ".join(separation_in_words(found.separation)))
+            job.json("separate.json", separation_json(found.separation), "what it separates")
         job.show(parts)
-
-
-def _names(text: str) -> tuple[str, ...]:
-    """Names with commas between them.
-
-    >>> _names("crack, point-mass")
-    ('crack', 'point-mass')
-    """
-    return tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))

@@ -37,6 +37,7 @@ from .plan_summary import (
     summary,
 )
 from .sensor_candidates import FOOT, SensorCandidates
+from .separation_page import separation_section
 from .whole_plan import Plan, motion
 
 _SHOWN = 12  # modes in the picture of shapes
@@ -55,7 +56,13 @@ def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
 def in_words(found: Plan) -> PageParts:
     """The page without its pictures."""
     result = summary(found)
-    return PageParts(lead(result), [Section("Sensors", [_layout(result)])], notes(found))
+    body = [Section("Sensors", [_layout(result)]), *_apart(found)]
+    return PageParts(lead(result), body, notes(found))
+
+
+def _apart(found: Plan) -> list[Section]:
+    """The explanations that the layout separates, where the settings name some."""
+    return [] if found.separation is None else [separation_section(found.separation)]
 
 
 def lead(result: PlanSummary) -> str:
@@ -74,7 +81,8 @@ def notes(found: Plan) -> list[str]:
     """List decisions of the planning, and warnings."""
     centres = int((~found.places.is_grid).sum())
     out = [*found.notes, *_places_notes(found.places), *_cost_notes(found)]
-    if fixed := [name for name in found.places.fixed if name]:
+    apart = () if found.separation is None else found.separation.labels
+    if fixed := [name for name in found.places.fixed if name and name not in apart]:
         out.append(f"Fixed by the settings: {named(fixed)}.")
     if len(found.layout) == len(found.places):
         out.append(f"Every place has a sensor: there is room for only {len(found.places)}.")
@@ -171,6 +179,7 @@ def sections(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -
     """The sections of the page."""
     return [
         Section("Sensors", _sensors(found, result, shown)),
+        *_apart(found),
         Section("Modes", _modes(found, result, shown, built)),
         Section("Shaker and cords", _shaker(found, result, shown)),
         Section("Lines and duration", [Text([_test(result.test)])]),
@@ -304,7 +313,7 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
             a.at.label,
             *_where(a.at),
             number(rounded(a.condition)),
-            number(a.least_over_mean_residue, 2),
+            f"{number(100 * a.weakest_mode, 2)} %",
             _rattling(a),
             "no" if a.vetoed else "yes",
             "yes" if a.is_sensor else "",
@@ -321,12 +330,12 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     ]  # fmt: skip
     caption = (
         "Condition: best driven mode over the one driven least (Hankel singular values), the lower "
-        "the better. Least "
-        "residue: driving-point residue of the mode driven least, relative to the mean. Rattles "
+        "the better. Weakest mode: response of the one driven least, of that at the place where it "
+        "responds most. The rank counts both. Rattles "
         "from: force at resonance at which two sheets first touch. Allowed: a straight rod "
         f"reaches the place, and nothing rattles at {found.settings.force:g} N."
     )
-    columns = ("rank", "label", "grid", "place [m]", "condition", "least residue")
+    columns = ("rank", "label", "grid", "place [m]", "condition", "weakest mode")
     words = ("rattles from", "allowed", "also a sensor")
     table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
     cords = [_hanger(found, int(g)) for g in result.hangers]

@@ -55,6 +55,7 @@ class PlannedActuator:
 
     at: PlannedPlace
     condition: float
+    weakest_mode: float
     least_over_mean_residue: float
     straight_way_to_it: bool
     rattles_from_n: float | None
@@ -197,6 +198,7 @@ def _actuator(found: Plan, i: int) -> PlannedActuator:
     return PlannedActuator(
         at=_place(found, i),
         condition=float(found.actuators.condition[i]),
+        weakest_mode=float(found.actuators.weakest[i]),
         least_over_mean_residue=float(found.actuators.residue[i]),
         straight_way_to_it=bool(found.places.straight[found.mounts.place[i]]),
         rattles_from_n=None if quiet else float(found.rattle.force[i]),

@@ -1,6 +1,6 @@
 """Where to put sensors and shakers, and which lines to measure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +11,10 @@ from chladni.progress import Progress, silent
 from chladni.units import Units
 from chladni.workflows.given_case import Source
 from chladni.workflows.loaded_model import DeckModels, Model, model_in_si, opened
+from chladni.workflows.place_words import stated_places
 
-from .place_words import FILES
+from .separated_plan import separated_plan
 from .whole_plan import Plan, PlanSettings, plan_test
-
-PLACES = ("regions", "fixed", "forbidden", "cost")
 
 
 @checked
@@ -50,7 +49,14 @@ def plan(
     chosen = with_places_of(found, settings_of(PlanSettings, settings, words))
     model, said = model_in_si(found, "plan")
     built, unit = model.structure, model.unit
-    made = plan_test(model.assembly, chosen, built=built, unit=unit, progress=progress)
+
+    def planned(settings: PlanSettings, stage: Progress) -> Plan:
+        return plan_test(model.assembly, settings, built=built, unit=unit, progress=stage)
+
+    if chosen.separate:
+        made = separated_plan(model, chosen, planned, progress)
+    else:
+        made = planned(chosen, progress)
     return replace(made, origin=model, notes=(said,) if said else ())
 
 
@@ -58,17 +64,5 @@ def with_places_of(source: Case | Model | DeckModels, settings: PlanSettings) ->
     """Settings with the places that [plan] of a case states, where they state none."""
     if not isinstance(source, Case):
         return settings
-    asked = source.asked
-    words: Mapping[str, Any] = asked.said.words
-    at = asked.said.places
-
-    def resolved(name: str, text: str) -> str:
-        is_file = text.lower().endswith(FILES)
-        return str(asked.file(text, at[name])) if is_file else text
-
-    stated = {
-        name: [resolved(name, text) for text in words[name]]
-        for name in PLACES
-        if name in words and not getattr(settings, name)
-    }
+    stated = {n: words for n, words in stated_places(source).items() if not getattr(settings, n)}
     return settings_of(PlanSettings, settings, stated)

@@ -13,8 +13,7 @@ from chladni.geometry.nearest import ShellSurface
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.model.assembly import Assembly
 from chladni.view.surface import Surface, surface
-
-from .place_words import PlaceRules, centre_ids, place_rules
+from chladni.workflows.place_words import PlaceRules, centre_ids, place_rules
 
 TILT = np.radians(35.0)  # of the four oblique lines of sight around the normal one
 FOOT, ROOM = 0.008, 0.03  # radius of a sensor's foot, height it needs [m]

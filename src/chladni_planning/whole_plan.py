@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
+from pathlib import Path
 
 import numpy as np
 
@@ -17,10 +18,13 @@ from chladni.effects.calibration_parameters import thickness_of
 from chladni.ema.correlation import auto_mac
 from chladni.errors import ModelError, ShapeError
 from chladni.fem.assemble import Structure, structure
+from chladni.inference.result import NextMeasurement
 from chladni.model.assembly import Assembly
 from chladni.progress import Progress, silent, within
 from chladni.results import Result
 from chladni.view.surface import Surface, surface
+from chladni.workflows.before_any_test import PlannedTests
+from chladni.workflows.place_words import PlaceRules, place_rules
 
 from .actuator_ranking import ActuatorRanking, best_actuators, ranked_actuators, shaking
 from .drawn_models import drawn, ensemble
@@ -32,7 +36,6 @@ from .layouts.information import Candidates, candidates, value
 from .layouts.layout_quality import Move, loaded_frequency, overlap, visibility, with_visible_modes
 from .layouts.layout_rules import Rules, too_near
 from .mounts import Mount, mounts_at, seen_at
-from .place_words import PlaceRules, place_rules
 from .rattle import Openings, Rattle, first_rattle, openings
 from .sensor_candidates import SensorCandidates, find_sensor_candidates
 
@@ -47,7 +50,7 @@ class PlanSettings:
     Attributes
     ----------
     sensors : number of uniaxial accelerometers
-    modes : target modes; None: modes below ``f_max``, or 24, or 4/5 of the sensors
+    modes : target modes; None: modes below ``f_max``, or 24, or 4/5 of the sensors, one at least
     f_max : highest frequency of interest [Hz]
     damping : expected damping ratio of every mode
     candidates : number of candidate places
@@ -60,12 +63,14 @@ class PlanSettings:
     draws, spread : number of models drawn, and standard deviation of ln of every part's thickness;
                     the layout then serves all of them
     seed : of the draws
-    regions : parts, boxes, labels or files of labels, in words of :mod:`.place_words`; nothing is
-              put elsewhere
+    regions : parts, boxes, labels or files of labels (:mod:`chladni.workflows.place_words`);
+              nothing is put elsewhere
     fixed : labels, or tables, of sensors in every layout
     forbidden : places for no sensor, shaker or cord, in words as the regions
     cost : of a sensor, by place: ``inner=3`` (a dict in Python) or a CSV file; others cost 1. The
            layout has the most information with that of a place divided by its cost.
+    separate : names of effects, or the folder of a diagnosis, whose open explanations some of the
+               sensors must tell apart; the others see the modes
     """
 
     sensors: int = 30
@@ -86,6 +91,7 @@ class PlanSettings:
     fixed: Sequence[str] = ()
     forbidden: Sequence[str] = ()
     cost: Sequence[str] | Mapping[str, float] = ()
+    separate: str | Path | Sequence[str] = ()
 
     def __post_init__(self) -> None:
         refuse_fields(
@@ -98,6 +104,30 @@ class PlanSettings:
     def rules(self, assembly: Assembly, seen: Surface) -> PlaceRules:
         """The rules for places on a mesh that these settings state."""
         return place_rules(assembly, seen, self.regions, self.fixed, self.forbidden, self.cost)
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Sensors of a layout that tell explanations apart.
+
+    Attributes
+    ----------
+    names : of the explanations
+    folder : of the diagnosis that left them open; "" before any test
+    labels : of the sensors that serve for it
+    apart : distance d of the explanations with these sensors, in standard deviations of all that
+            is not known; of several pairs that of the mean of ln(1 + d²)
+    steps : these sensors one after the other, with what they would do
+    before, after : tests of articles by the sensors for modes alone, and by this layout
+    """
+
+    names: tuple[str, ...]
+    folder: str = ""
+    labels: tuple[str, ...] = ()
+    apart: float = 0.0
+    steps: tuple[NextMeasurement, ...] = ()
+    before: PlannedTests | None = None
+    after: PlannedTests | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,6 +161,7 @@ class Plan(Result):
     quiet : (k,)                  their rms motion over the first modes, of the largest anywhere
     rules : PlaceRules            on the surface of the model
     notes : the unit system, where it was guessed
+    separation : explanations that the layout must tell apart, where the settings name some
     """
 
     settings: PlanSettings
@@ -159,6 +190,7 @@ class Plan(Result):
     quiet: np.ndarray
     rules: PlaceRules
     notes: tuple[str, ...] = ()
+    separation: Separation | None = None
 
 
 def plan_test(
@@ -253,7 +285,7 @@ def plan_test(
 
 def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, ModalModel, int]:
     """Target modes, target modes plus some above, and the number of rigid modes before them."""
-    due = settings.modes or min(24, 4 * settings.sensors // 5)
+    due = settings.modes or max(1, min(24, 4 * settings.sensors // 5))
     n = len(built.system.dofs)
     modal = normal_modes(built.system, min(n, due + SPARE + 6))
     rigid = int(rigid_modes(modal).sum())

@@ -194,11 +194,11 @@ def label(column: str) -> str:
     """A column in words.
 
     >>> label("f3_hz"), label("mass_kg"), label("Q")
-    ('mode 3 [Hz]', 'mass [kg]', 'Q')
+    ('mode 3 [Hz]', 'mass [kg]', 'Q of curves')
     """
     if column.endswith("_hz") and column[1:-3].isdigit():
         return f"mode {column[1:-3]} [Hz]"
-    return "mass [kg]" if column == "mass_kg" else column
+    return {"mass_kg": "mass [kg]", "Q": "Q of curves"}.get(column, column)
 
 
 def _samples(found: ParameterStudy) -> list[Block]:

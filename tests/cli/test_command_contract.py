@@ -41,6 +41,7 @@ READERS = {  # commands that read a bare deck, and what makes them quick
     "plan": ("--sensors", "4", "--drawn", "0", "--modes", "2"),
     "bench": ("--exact",),
     "study": ("--vary", "E=90%:110%", "--samples", "2"),
+    "check": (),
 }
 BAD = {
     "missing": None,
@@ -93,7 +94,7 @@ def test_a_model_of_another_program_names_the_command(tmp_path, name):
     path.write_text(text)
     made = f"`chladni convert {path} --out {path.stem}.bdf` makes a deck of it"
     due = f"{path} is {what}, not a Nastran deck; {made}"
-    for command in (*READERS, "map", "init", "check", "diagnose", "correlate"):
+    for command in (*READERS, "map", "init", "diagnose", "correlate"):
         words = (command, path, *NEEDED.get(command, []), "--out", tmp_path / "out")
         assert due in " ".join(refused(*words).split())
         if name != "a.inp":
@@ -132,6 +133,16 @@ def case(tmp_path_factory):
         rows = ["label,grid,direction,role", *(f"{g}:+Z,{g},+{way},output" for g in sensors)]
         (folder / f"along_{way}.csv").write_text("\n".join([*rows, ""]))
     return folder
+
+
+@pytest.mark.parametrize(("command", "said"), [("check", "9 outputs"), ("correlate", "partner")])
+def test_a_deck_with_its_recording_is_a_case(case, tmp_path, command, said):
+    """As it is to ``diagnose`` and ``calibrate``."""
+    deck, recording = case / "plate.bdf", case / "frf.npz"
+    done = ran(command, deck, recording, "--units", "SI", "--out", tmp_path / "out")
+    assert said in done.output
+    out = "--out", tmp_path / "not"
+    assert "leave out units" in refused(command, case, "--units", "SI", *out)
 
 
 def spoilt(case, place, changes):

@@ -137,6 +137,11 @@ def others(on_plate):
     ones = (Parameter("k", "-", 0.0, 0.4),)
     half = np.full((len(groups), 1), 0.5)
     number = FreeParameter("E", "E", ("sheet",), 0.1, 0.8, 1.3, positions=(0,))
+    seen = on_plate.by_responses.data
+    tilts = tuple(Parameter(f"tilt {k}", "-", 0.0, 1.0, kind="linear") for k in range(2))
+    at = np.eye(len(seen.a) + len(seen.b))[:, [-1]]
+    rows = tuple(seen.outputs[[k]] for k in range(2))
+    gauge = channels.GaugeErrors(tilts, "gauge", rows=rows, shapes=at)
     by_mesh = dict(rows=over.rows, omega=over.omega, log=over.log)
     found = {
         **{
@@ -146,6 +151,7 @@ def others(on_plate):
         "user parameter": (user_parameter(groups, number), [0.2], [0]),
         "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
         "gain": (channels.channel_gain(4, 0.5), [0.3], [0]),
+        "gauge-errors": (gauge, [0.3, -0.2], [0, 0]),
         "mesh-error": (over, [1.0], [0]),
         "joint-footprint": (JointFootprint(over.parameters, over.text, **by_mesh), [1.0], [0]),
         "jitter": (jitter, 0.01 * np.sin(np.arange(r) + 1), np.zeros(r)),

@@ -45,6 +45,15 @@ def test_a_sound_recording_is_left_in_peace(given: bool) -> None:
     assert "no fault found" in found.sentence
 
 
+def test_lines_are_counted_for_the_modes_that_are_reported() -> None:
+    frf = recording()
+    found = identify(frf)
+    spurious = np.arange(found.order) == 3
+    checks = screened(Recording("a", frf), found, spurious=spurious).checks
+    (said,) = (c.result for c in checks if c.name == "lines per half-bandwidth")
+    assert f"of {(found.inside & found.firm & ~spurious).sum()} modes" in said
+
+
 def test_a_channel_of_noise_is_dead() -> None:
     frf, rng = replace(recording(), variance=None), np.random.default_rng(4)
     values = frf.values.copy()

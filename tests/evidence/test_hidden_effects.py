@@ -8,6 +8,7 @@ import pytest
 from chladni.effects.hems import hem_lines
 from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
+from chladni.geometry.facets import cell_areas
 from chladni.model.ground_springs import with_ground_bushes
 from chladni_bench.part_scatter import WELDS, decades_apart, scattered_parts
 from chladni_evidence.article_modes import article_modes
@@ -21,6 +22,7 @@ from chladni_evidence.hidden_kinds import (
     local_resonator,
     mass_patch,
     orthotropic,
+    prestress,
     stiffness_patch,
     thinning,
 )
@@ -122,7 +124,7 @@ def test_a_resonator_on_a_rigid_spring_is_a_mass(site):
 def test_a_resonator_is_felt_where_it_is_tuned(site):
     """Its dynamic stiffness is that of its mass far below its frequency, and turns sign above."""
     hidden = local_resonator(site, np.random.default_rng(1), 1.0)
-    D, f = hidden.couplings[0].stiffness, hidden.truth["frequency_hz"]
+    D, f = hidden.couplings[0].stiffness, hidden.truth["f"]
     low, high = 2j * np.pi * np.array([f / 50, 3 * f])
     m = hidden.truth["value"]
     np.testing.assert_allclose(D(np.array([low]))[0, 0, 0], m * low**2, rtol=2e-3)
@@ -185,6 +187,11 @@ def test_a_crack_takes_bending_alone(site):
     """Mass and membrane are as they were, and no mode of the article is stiffer."""
     hidden = crack(site, np.random.default_rng(4), 2.0)
     assert hidden.truth["shells"] >= 3
+    kept = hidden.article.parts[-1].section.bending_ratio
+    mine = hidden.article.shells.part == len(hidden.article.parts) - 1
+    area = cell_areas(hidden.article.points, hidden.article.shells.nodes)[mine].sum()
+    hinge = hidden.truth["hinge"] * hidden.truth["length_m"]  # m of sheet times m of line
+    assert hinge == pytest.approx(area * (1 / kept - 1), rel=0.3)
     assert mass_properties(hidden.article)[0] == pytest.approx(site.mass, rel=1e-12)
     rows = site.article.rows([60])
     f, g = (article_modes(a, rows, rows, TOP).frequency for a in (site.article, hidden.article))
@@ -269,6 +276,11 @@ def test_truth_is_what_was_done(site):
     thin = thinning(site, rng(9), 1.0)
     least = thin.article.shells.thickness.min() / 1e-3
     assert least == pytest.approx(1 - thin.truth["value"], abs=0.01)
+    for seed in range(4):  # either force may be the larger
+        forced = prestress(site, rng(seed), 1.0).truth
+        both = forced["N along"], forced["N across"]
+        assert max(both, key=abs) == forced["value"]
+        assert 0 <= min(both, key=abs) / forced["value"] <= 1
     rolled = orthotropic(site, rng(10), 1.0).article.parts[0].section.membrane
     truth = orthotropic(site, rng(10), 1.0).truth
     assert (rolled.E1, rolled.E2, rolled.G12) == (truth["E1"], truth["E2"], truth["G12"])

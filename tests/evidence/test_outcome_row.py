@@ -275,3 +275,16 @@ def test_of_several_the_place_farthest_off_counts():
     truth.pop("point_m")
     assert row(several("point-mass", "point-mass"), truth)["place_m"] == pytest.approx(0.05)
     assert row(several("sensor-mass", "crack"), truth)["place_m"] is None
+
+
+@pytest.mark.parametrize(("part", "near", "counted"), [("a", True, 2), ("b", False, 0)])
+def test_values_of_a_force_count_in_the_part_that_has_it(part, near, counted):
+    """Each force is compared with the one of its name."""
+    forces = [estimate(-100.0, -120.0, -80.0, name="N along"),
+              estimate(-30.0, -40.0, -20.0, name="N across")]  # fmt: skip
+    effect = {"name": "membrane-prestress", "where": {"parts": [part]}, "parameters": forces}
+    truth = told("membrane-prestress", **{"N along": -105.0, "N across": -70.0, "part": "a"})
+    truth.pop("point_m")
+    found = row(answer(effects=[effect]), truth)
+    assert found["near"] == near
+    assert found["covered"]["effect"] == [counted // 2, counted]

@@ -11,7 +11,7 @@ from chladni.inference import discrepancy as dis
 from chladni.inference.discrepancy import columns, discrepancy, form
 from chladni.inference.hypothesis_fit import fitted
 from chladni.inference.linear_model import LinearModel
-from chladni.inference.map_fit import MassMeasurement, fit, prior_residuals
+from chladni.inference.map_fit import MassMeasurement, fit, posterior, prior_residuals
 from chladni.reduced.reduced_model import evaluate
 
 
@@ -167,3 +167,17 @@ def test_errors_that_spread_from_a_state_are_the_same_however_often_they_spread(
     assert_allclose(once.residual(near, False)[0], again.residual(near, False)[0])
     other = responses.allowing_errors(far, 1e-3).residual(near, False)[0]
     assert np.abs(other - once.residual(near, False)[0]).max() > 1e-6
+
+
+def test_errors_of_another_size_need_no_new_slopes(softer, state, reduced):
+    """A fit goes on from what is known at its x as from a posterior made anew."""
+    data, effects = softer
+    data, x = data.allowing_errors(state, 0.01), np.array([0.02, 0.0])
+    weighed = MassMeasurement(1.4, 0.02)
+    _, there = posterior(reduced.model, effects, data, weighed, x).sloped()
+    error = data.error.with_delta(0.002)
+    due = posterior(reduced.model, effects, replace(data, error=error), weighed, x)
+    found = there.under(error)
+    assert found.cost == pytest.approx(due.cost)
+    assert_allclose(found.sloped()[0].gradient, due.sloped()[0].gradient)
+    assert_allclose(found.sloped()[0].information, due.sloped()[0].information)

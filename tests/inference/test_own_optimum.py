@@ -10,9 +10,11 @@ from tests.inference.test_map_fit import EXACT, MEAN, Offsets, linear, model
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.masses import PointMass
+from chladni.effects.stiffener import GridLines, Stiffener
 from chladni.inference.linear_model import LinearModel
 from chladni.inference.map_fit import MassMeasurement, fit
-from chladni.inference.own_optimum import own_optimum
+from chladni.inference.own_optimum import Base, own_optimum
+from chladni.reduced.local_effect import LocalEffect
 from chladni.reduced.reduced_model import evaluate
 
 __all__ = ["model"]
@@ -29,7 +31,7 @@ def test_it_is_the_joint_fit_of_linear_responses(model, weighed):
     due = fit(model, [base, effect], data, weighed, np.zeros(3), **EXACT)
     x = MEAN[[0, 2]] + 0.4
     slopes = data.scaled(evaluate(model, [base], x), True)[1]
-    about = LinearModel(None, slopes, np.zeros((0, 2))), x
+    about = Base(LinearModel(None, slopes, np.zeros((0, 2))), x)
     found, moved = own_optimum(model, [base], effect, data, weighed, [about], np.zeros(1))
     assert_allclose(found.x, due.of(effect), atol=1e-2)
     assert_allclose(moved, due.of(base), atol=1e-2)
@@ -50,10 +52,36 @@ def test_a_strong_effect_is_sought_about_the_base_that_it_did_not_spoil(reduced,
     ways = []
     for there in (np.array([-0.4, 0.3]), np.zeros(2)):
         J = data.scaled(evaluate(model, base, there), True)[1]
-        ways.append((LinearModel(None, J, np.zeros((0, 2))), there))
+        ways.append(Base(LinearModel(None, J, np.zeros((0, 2))), there))
     start = np.array([-0.5, 0.0, 0.0])
     found, moved = own_optimum(model, base, effect, data, None, ways, start)
     assert_allclose(found.x[0], x[0], atol=0.02)
     assert_allclose(moved, 0.0, atol=0.01)
     alone, _ = own_optimum(model, base, effect, data, None, ways[:1], start)
     assert alone.neg2_log_evidence > found.neg2_log_evidence
+
+
+def test_an_effect_on_few_dofs_may_be_added_to_a_state(reduced, responses):
+    """With slopes by differences it has the optimum of evaluations, where its basis is there."""
+    where = EffectContext(
+        reduced.groups, reduced.grids, reduced.candidates, Setup((), (), 1.41, 200.0)
+    )
+    base = [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho")]
+    lines = GridLines.of(reduced.structure.assembly)
+    effect = Stiffener.along(where, lines.through(30, np.array([1.0, 0.0, 0.0]), 0.08), 5)
+    assert effect is not None
+    x, start, there = np.array([-1.0, -1.3]), np.array([-0.5, -1.0]), np.array([0.01, 0.0])
+    grown = replace(reduced, model=(model := reduced.model_for(effect, start)))
+    data, weighed = responses.rebased(model), MassMeasurement(1.4, 0.01)
+    data = replace(data, values=data.model(evaluate(model, [effect], x, False)))
+    state = evaluate(model, base, there)
+    linear = LinearModel(None, data.scaled_slopes(state), np.zeros((0, 2)))
+    about = [Base(linear, there, state.without_slopes())]
+    local = LocalEffect.of(grown, base, effect, state, there, start)
+    assert local is not None
+    due, moved_due = own_optimum(model, base, effect, data, weighed, about, start)
+    found, moved = own_optimum(model, base, effect, data, weighed, about, start, local)
+    assert_allclose(found.x, due.x, atol=1e-3)
+    assert_allclose(found.sd, due.sd, rtol=1e-3)
+    assert_allclose(moved, moved_due, atol=1e-4)
+    assert found.neg2_log_evidence == pytest.approx(due.neg2_log_evidence, abs=0.01)

@@ -10,7 +10,7 @@ from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.ema.setup import SensorAccuracy
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.inference.likelihood import Responses
-from chladni.inference.sensor_errors import sensor_errors, variance
+from chladni.inference.sensor_errors import gauge_errors, sensor_errors, variance
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
@@ -86,12 +86,12 @@ def test_what_is_mixed_in_is_what_turned_and_moved_sensors_show(made, state, way
 def spread(data, state):
     """Columns of one deviation of every error: sensors with a little of it in them (n, k)."""
     out = []
-    for name, side in (("a", data.sensors.outputs), ("b", data.sensors.inputs)):
+    for name, modal in (("a", data.sensors.outputs.modal), ("b", ())):
         rows = getattr(data, name)
         one = np.eye(len(rows))
         for k in range(len(rows)):
             changes = [(1 + SMALL * GAIN * one[k])[:, None] * rows]
-            changes += [rows + SMALL * one[k][:, None] * mixed for mixed in side.modal]
+            changes += [rows + SMALL * one[k][:, None] * mixed for mixed in modal]
             out += [
                 np.log10(replace(data, **{name: c}).model(state) / data.values) for c in changes
             ]
@@ -101,7 +101,7 @@ def spread(data, state):
 def test_what_is_whitened_is_what_every_error_does(made, state):
     data = recorded(made, state).allowing_errors(state)
     V = spread(replace(data, known=None), state)
-    assert V.shape[1] == 5 * (3 + 2)
+    assert V.shape[1] == 5 * 3 + 2
     inverse = np.linalg.inv(data.known.whitened(np.eye(len(V))))
     told = inverse @ inverse.T - np.eye(len(V))
     assert_allclose(told, V @ V.T, atol=1e-3 * np.abs(told).max())
@@ -113,6 +113,50 @@ def test_the_covariance_is_the_identity_after_whitening(made, state):
     C = np.linalg.inv(W) @ np.linalg.inv(W).T
     assert_allclose(W @ C @ W.T, np.eye(len(W)), atol=1e-9)
     assert np.linalg.eigvalsh(C).min() > 1 - 1e-9  # errors only ever add to the noise
+
+
+@pytest.mark.parametrize(("way", "amount"), [(0, 3.0), (1, -2.0), (2, 40.0), (3, -40.0)])
+def test_a_gauge_turned_or_moved_by_any_amount_is_exact(made, state, way, amount):
+    """H is linear in the motion of the gauge, however much of it an error adds."""
+    data, effects = (
+        recorded(made, state),
+        gauge_errors(OUTPUTS, INPUTS, made.groups.structure, USUAL),
+    )
+    modal = made.model.rows(effects[1].rows[way])
+    b = data.b + np.array([[0.0], [amount]]) * modal
+    due = replace(data, values=replace(data, b=b).model(state))
+    x = np.zeros(8)
+    x[4 + way] = amount
+    found = evaluate(made.model, effects, x)
+    assert np.abs(due.deviation(found)).max() < 1e-9
+    assert np.abs(due.deviation(state)).max() > 1e-3
+
+
+def test_slopes_by_the_errors_of_a_gauge_are_those_of_differences(made, state):
+    data, effects = (
+        recorded(made, state),
+        gauge_errors(OUTPUTS, INPUTS, made.groups.structure, USUAL),
+    )
+    x, step = np.linspace(-1, 1, 8), 1e-5
+    J = data.slopes(evaluate(made.model, effects, x))
+    for k, unit in enumerate(step * np.eye(8)):
+        ends = [data.deviation(evaluate(made.model, effects, x + s * unit)) for s in (1, -1)]
+        assert_allclose(J[k], (ends[0] - ends[1]) / (2 * step), atol=1e-6 * np.abs(J).max())
+
+
+def test_a_gauge_near_a_node_line_takes_no_data_away(made, state):
+    """Its errors are several times the response, on all lines and channels: two unknowns."""
+    data = recorded(made, state)
+    far = replace(data, b=1e-3 * data.b)  # as little as a gauge at a node line drives
+    plain, near = (
+        d.allowing_errors(state).std() for d in (data, replace(far, values=far.model(state)))
+    )
+    assert_allclose(near, plain, rtol=1e-6)
+
+
+def test_a_moving_base_has_no_gauge(made):
+    moved = replace(INPUTS, points=np.full((2, 3), np.nan))
+    assert not gauge_errors(OUTPUTS, moved, made.groups.structure, USUAL)
 
 
 def test_a_wrong_sensor_costs_as_much_as_its_error_is_likely(made, state):

@@ -173,11 +173,26 @@ def test_several_actuators(exhaustive):
     """Exchange comes near what trying every pair finds."""
     f, zeta, phi_out, phi_in = specimen(r=4, n_in=9, seed=11)
     shaker = shaking(f, zeta, phi_out, phi_in)
-    two = best_actuators(shaker, 2, exhaustive=exhaustive)
+    two = best_actuators(shaker, 2, exhaustive=exhaustive, even=True)
     every = min(shaker.condition([i, j]) for i in range(9) for j in range(i))
     assert shaker.condition(two) <= 1.2 * every
     if exhaustive > 1:
         assert shaker.condition(two) == pytest.approx(every)
+
+
+def test_a_place_where_nothing_moves_is_last_however_evenly_it_drives():
+    """A hundredth of a shape is a hundredth of its Hankel values, at the same condition number."""
+    f, zeta, phi_out, phi_in = specimen(n_in=6, seed=10)
+    before = ranked_actuators(shaking(f, zeta, phi_out, phi_in), f, phi_in)
+    k = before.order[0]
+    phi_in[k] *= 0.01
+    shaker = shaking(f, zeta, phi_out, phi_in)
+    ranking = ranked_actuators(shaker, f, phi_in)
+    assert ranking.condition[k] == pytest.approx(before.condition[k])
+    assert ranking.weakest[k] < 0.05
+    assert ranking.order[-1] == k
+    assert best_actuators(shaker, 1) == before.order[1]
+    assert best_actuators(shaker, 1, even=True) == k
 
 
 def test_a_second_actuator_frees_a_mode_the_first_cannot_drive():

@@ -93,8 +93,8 @@ def test_each_channel_says_how_far_each_deck_is_off():
     curves = {"test": resonances(), "before": resonances(gain=10.0), "after": resonances()}
     chart, rows = responses(curves, held_out=["1:+Z"])
     one, two = chart.views
-    assert one.startswith("0:+Z from 1:+Z, Q before 1, Q after ")
-    assert two.startswith("1:+Z from 1:+Z (held out), Q before 1, Q after ")
+    assert one.startswith("0:+Z from 1:+Z, Q of curves: before 1, after ")
+    assert two.startswith("1:+Z from 1:+Z (held out), Q of curves: before 1, after ")
     np.testing.assert_allclose([off for *_, off in rows], 0, atol=1e-9)
     test = chart.panels[0].series[0]
     assert test.x[np.argmax(test.y)] == pytest.approx(40.0, abs=0.1)

@@ -14,6 +14,7 @@ from chladni.inference.result import FrequencyError
 from chladni.output import plain
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
 from chladni.report.diagnosis_json import diagnosis_json, from_json, read_diagnosis
+from chladni.report.next_steps import next_steps
 from chladni.report.page import write_page, write_sections
 from chladni.report.sentence import sentence
 from chladni.report.states_table import states_table
@@ -23,6 +24,9 @@ from chladni.view.chart_png import png
 from chladni.workflows.diagnosis_pipeline import beyond_calibration
 from chladni.workflows.diagnosis_result import StateResult
 
+LUMP = {"name": "point-mass", "claim": "a lump", "gain": 90.0, "where": {"text": "near grid 9"}}
+FAULT = {"name": "sensor-fault", "gain": 40.0, "where": {"text": "channel 7", "channels": ["7:+Z"]}}
+SENSORS = {"name": "sensor-mass", "gain": 60.0, "where": {"text": "at the 6 sensors"}}
 EVIL = '<script>alert("x")</script>'
 DIAGNOSIS = {
     "verdict": "missing physics",
@@ -267,11 +271,42 @@ def test_a_quiet_verdict_that_is_not_trusted_says_so(verdict):
     assert "hem-contact explains the recording better" in sentence(tied)
 
 
-def test_a_deck_of_frequencies_that_is_not_trusted_explains_nothing():
+@pytest.mark.parametrize("compared", ["responses", "frequencies"])
+def test_a_deck_that_is_not_trusted_explains_nothing(compared):
     """The reason says how far it is off; the headline does not say the opposite."""
     doubted = replace(RESULT, verdict="calibration only", one_of=(), distrust=("7.6 % off",))
-    assert sentence(doubted).startswith("Calibration explains the recording")
-    assert sentence(replace(doubted, compared="frequencies")).startswith("No effect is named")
+    assert sentence(replace(doubted, compared=compared)).startswith("No effect is named")
+
+
+CLAIMS = ("The model lacks point-mass", "explains the recording;", "is missing", "is wrong, not")
+
+
+@pytest.mark.parametrize("compared", ["responses", "frequencies"])
+@pytest.mark.parametrize("one_of", [(), (("point-mass", "hem-contact"),)])
+@pytest.mark.parametrize("effects", [[], [LUMP], [FAULT]])
+@pytest.mark.parametrize("verdict", HEADING)
+def test_no_headline_contradicts_the_scores_of_the_decks(verdict, effects, one_of, compared):
+    """A worse deck takes the claim back and is not recommended; a better one changes no word."""
+
+    def said(last):
+        every = [3.0, 3.0 if effects else last, last]
+        Q = dict(zip(("Q_nominal", "Q_calibrated", "Q_with_effect"), every, strict=True))
+        off = dict(zip(("before", "calibrated", "after"), every, strict=True))
+        scores = {
+            "responses": {"fit": {"held_out": Q}},
+            "frequencies": {"frequency_rms_percent": off},
+        }
+        d = {"verdict": verdict, "effects": effects, "alternatives": [{"name": "crack"}],
+             "compared": compared, "files": {"deck": "updated.bdf"}}  # fmt: skip
+        found = replace(from_json(d | scores[compared]), one_of=one_of)
+        return sentence(found), any(s.startswith("Use updated") for s in next_steps(found))
+
+    (better, _), (worse, used) = said(0.05), said(9.0)
+    assert not any(word in better for word in ("worse", "farther"))
+    assert not used
+    assert not any(claim in worse for claim in CLAIMS)
+    if "0.05" in better:  # it tells the scores of the decks
+        assert "worse than the" in worse or "farther from the test than" in worse
 
 
 def test_a_deck_far_from_the_frequencies_is_no_explanation_of_them():
@@ -299,11 +334,6 @@ def test_what_cannot_be_told_apart_is_the_headline(verdict):
     assert "hem-contact" in said
     assert "weigh the structure" in said
     assert sentence(replace(tied, one_of=())) != said
-
-
-LUMP = {"name": "point-mass", "claim": "a lump", "gain": 90.0, "where": {"text": "near grid 9"}}
-FAULT = {"name": "sensor-fault", "gain": 40.0, "where": {"text": "channel 7", "channels": ["7:+Z"]}}
-SENSORS = {"name": "sensor-mass", "gain": 60.0, "where": {"text": "at the 6 sensors"}}
 
 
 def named(*effects, **more):

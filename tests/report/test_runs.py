@@ -67,10 +67,10 @@ def test_every_run_below_a_folder_is_found_once(runs):
     seen = {run.command: run for run in finished_runs(runs)}
     assert sorted(seen) == ["correlate", "diagnose", "modes"]
     assert seen["diagnose"].source == "bracket"
-    assert seen["diagnose"].q() == (0.3, 0.02)
+    assert seen["diagnose"].q() == ("held-out data", 0.3, 0.02)
     assert seen["diagnose"].lead.startswith("The model lacks point-mass, at 7")
     assert seen["correlate"].source == "plate.bdf"
-    assert seen["correlate"].q() == (3, None)
+    assert seen["correlate"].q() == ("all data", 3, None)
     assert finished_run(runs / "theirs") is None
 
 
@@ -100,6 +100,11 @@ def test_a_folder_without_runs_is_refused(tmp_path, monkeypatch, words):
     (tmp_path / "empty").mkdir()
     assert "run.json" in refused(*words, "--out", tmp_path / "out")
     assert not list((tmp_path / "empty").iterdir())
+
+
+def test_a_misspelt_run_is_compared_with_those_beside_it(runs, tmp_path):
+    said = refused("compare", runs / "d", runs / "deep" / "cc", "--out", tmp_path / "out")
+    assert "did you mean 'c'?" in said
 
 
 def test_two_runs_are_compared(runs, tmp_path):

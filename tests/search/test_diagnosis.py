@@ -68,20 +68,17 @@ def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, f
     """The linear base may be as wrong about one place as about another; all places are known."""
     done = []
 
-    def own(effect, start, bases, model):
+    def own(effect, start, bases):
         if expected[effect.k] is None:
             raise ModelError("an effect left negative stiffness")
-        return LocalOptimum(effect, expected[effect.k], start, start), bases[0]
+        return LocalOptimum(effect, expected[effect.k], start, start), bases[0], effect
 
     def fit(effect, start, base, steps, model):
         done.append(effect.k)
         assert (model is effect) == (len(done) == 1)  # the first has its model already
         return hypothesis_of(effect, joint[effect.k])
 
-    problem = SimpleNamespace(
-        own_optimum=own, fitted_with=fit, mean=lambda: NULL.fit.x,
-        reduced=SimpleNamespace(model_for=lambda e, x: e),
-    )  # fmt: skip
+    problem = SimpleNamespace(own_optimum=own, fitted_with=fit, mean=lambda: NULL.fit.x)
     nowhere = SimpleNamespace(point_m=None, radius_m=None)
     effects = [
         SimpleNamespace(k=k, name="mass", text=f"at grid {k}", location=lambda x, sd: nowhere)

@@ -143,6 +143,27 @@ def test_another_file_is_refused(tmp_path, text, why):
         read_earlier(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('"mass": 2.0', '"mass": NaN', "nan is no number"),
+        ('"mass": 2.0', '"mass": -2', "-2 is not above 0"),
+        ('"two_log_odds": ', '"two_log_odds": -Infinity, "was": ', "-inf is no number"),
+        ('"two_log_odds": ', '"two_log_odds": "1e999", "was": ', "1e999 is no number"),
+        ('"sd": ', '"sd": 0, "was": ', "0 is not above 0"),
+        ('"mean": ', '"mean": 1e400, "was": ', "inf is no number"),
+        ('"point_m": [', '"point_m": [0, ', "too many values"),
+    ],
+)
+def test_a_posterior_edited_by_hand_is_refused(known, tmp_path, old, new, why):
+    """Numbers that no fit leaves would end the search far from the file that holds them."""
+    text = json.dumps(json.loads(write_json(tmp_path / FILE, posterior_json(known)).read_text()))
+    assert old in text
+    (tmp_path / FILE).write_text(text.replace(old, new, 1))
+    with pytest.raises(FileError, match=rf"posterior.json does not .* a posterior: .*{why}"):
+        read_earlier(tmp_path)
+
+
 def test_data_that_were_used_are_refused_in_any_order_and_scale_of_rounding(known):
     """A column is known again next to others and with six digits; a repeat of the test is new."""
     rng = np.random.default_rng(0)

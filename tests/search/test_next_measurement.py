@@ -11,6 +11,7 @@ from tests.builders.commands import ran, refused
 from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
 
 from chladni.fem.energy import mass_properties
+from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.inference.likelihood import LN10
 from chladni.output import write_npz
 from chladni.reduced.reduced_model import evaluate
@@ -27,6 +28,7 @@ from chladni.search.measurement_forecasts import (
     quantity_of,
 )
 from chladni.search.next_measurement import (
+    FurtherPlaces,
     advised,
     arrays_of,
     read_outlook,
@@ -250,6 +252,42 @@ def test_a_mean_over_cases_is_advised(found):
     both = with_common_candidates([found, less])
     assert [o.candidates for o in both] == [less.candidates, less.candidates]
     assert advised(both) == advised([less])
+
+
+def test_places_that_are_allowed_are_the_candidates(problem, tied, tmp_path):
+    """Sensors, drives and masses are at them, at their cost; fixed sensors are always first."""
+    every = problem.reduced.grids
+    cheap, dear, fixed = every.grids[:8], every.grids[8:14], every.grids[-1]
+    held = MeasuredDofs(
+        (f"{fixed}:-Z",), np.array([fixed]), every.point[-1:], -every.normal[-1:], np.zeros(1),
+        np.zeros(1),
+    )  # fmt: skip
+    grids, cost = np.concatenate([cheap, dear]), np.repeat([1.0, 50.0], [8, 6])
+    allowed = FurtherPlaces(grids, cost, held)
+    known = outlook(problem, tied, ("here", "there"), np.ones(2), allowed=allowed)
+    placed = [c for c in known.candidates if c.label and not c.fixed]
+    assert {int(c.label.partition(":")[0]) for c in placed} <= set(grids.tolist())
+    sensors = [c for c in placed if c.kind == "sensor"]
+    assert {c.cost for c in sensors} == {1.0, 50.0}
+    write_npz(tmp_path / "outlook.npz", **arrays_of(known))
+    for found in (known, read_outlook(tmp_path)):
+        first, *more = advised([found], 3)
+        assert first.label == f"{fixed}:-Z"
+        bought = [c.cost for c in found.candidates for m in more if c.what == m.what]
+        assert max(bought, default=0.0) < 50
+    assert advised([known], without=[f"{fixed}:-Z"])[0].label != f"{fixed}:-Z"
+
+
+def test_a_fixed_sensor_is_forecast_in_its_own_direction(problem, tied):
+    """Against its normal it tells what the sensor along it does."""
+    every = problem.reduced.grids
+    at = MeasuredDofs(
+        ("x",), every.grids[[5]], every.point[[5]], -every.normal[[5]], np.zeros(1), np.zeros(1)
+    )
+    known = outlook(problem, tied, ("here", "there"), np.ones(2), ("sensor",),
+                    FurtherPlaces(every.grids[[5]], np.ones(1), at))  # fmt: skip
+    assert [c.fixed for c in known.candidates] == [True, False]
+    assert_allclose(known.information([0]), known.information([1]), rtol=0.05)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """First tests of articles with a concealed effect, before anything is measured."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from chladni.search import measurement_forecasts
 from chladni.search.measurement_forecasts import Rival, measurements
 from chladni.search.question import Question
 from chladni.search.simulated_test import first_tests
-from chladni.workflows.before_any_test import before_any_test
+from chladni.workflows.before_any_test import PlannedTests, before_any_test
 from chladni_planning import plan
 from chladni_specimens import plate
 
@@ -95,9 +96,21 @@ def test_a_plan_says_what_it_separates(deck, tmp_path):
     words = ("--units", "SI", "--sensors", "2", "--modes", "1", "--drawn", "0", "--top", "200")
     said = ran("plan", deck, *words, "--separate", ",".join(EFFECTS), "--out", tmp_path / "out")
     assert "Explanations this layout separates" in said.stdout
+    assert "1 sensor for modes alone settles" in said.stdout
     found = json.loads((tmp_path / "out" / "separate.json").read_text())
+    assert found["explanations"] == list(EFFECTS)
     assert [a["effect"] for a in found["articles"]] == list(EFFECTS)
     assert all(abs(sum(a["probability"].values()) - 1) < 1e-6 for a in found["articles"])
+
+
+def test_a_wrong_answer_is_not_settled(tests):
+    """Its explanations count as even: what a wrong fit says for its name is no reason to stop."""
+    p = np.array([0.001, 0.999])
+    wrong = replace(tests[0], probability=p if tests[0].names[0] == tests[0].name else p[::-1])
+    made = PlannedTests(tests[0].question, (wrong, tests[1]))
+    assert made.open == ()
+    assert wrong in made.unsettled
+    assert_allclose(made.outlooks(("weighing",))[0].rivals.probability, 0.5)
 
 
 def test_settled_articles_need_no_advice(deck):

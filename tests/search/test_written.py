@@ -17,13 +17,14 @@ from chladni.effects.sheets import StiffnessPatch, ThicknessDistribution
 from chladni.errors import ModelError
 from chladni.fem.modelled import modelled
 from chladni.inference import written_hypothesis
-from chladni.inference.hypothesis_fit import HypothesisFit
+from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.inference.map_fit import fit, prior_residuals
 from chladni.inference.result import Agreement, Scores
 from chladni.inference.written_hypothesis import as_written
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import verdict_models
 from chladni.search.diagnosis import Diagnosis
+from chladni.search.hypotheses import Explanation
 from chladni.search.result_parts import calibrated, foretells_worse
 
 
@@ -200,3 +201,16 @@ def test_a_deck_beats_the_one_before_it_on_data_that_report(scores, named, worse
     said = foretells_worse(scores, named)
     assert len(said) == bool(worse)
     assert all(re.search(worse, why) for why in said)
+
+
+def test_values_are_told_with_errors_about_the_state_of_the_effect(hypothesis):
+    """Errors are largest at its own antiresonances; evidence stays comparable with the null's."""
+    null = evaluate(hypothesis.model, hypothesis.fit.effects[:1], np.zeros(1), False)
+    about = hypothesis.data.allowing_errors(null, 0.003)
+    common = replace(hypothesis, fit=replace(hypothesis.fit, data=about))
+    problem = UpdatingProblem(None, about, None, (), (), None)
+    one = Explanation(SimpleNamespace(prepared=SimpleNamespace(problem=problem)), common)
+    assert one.own.data.about is common.fit.state
+    assert one.own.data.about is not about.about
+    assert one.own.neg2_log_evidence == common.neg2_log_evidence
+    assert one.written.data is one.own.data

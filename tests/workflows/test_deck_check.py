@@ -58,6 +58,16 @@ def test_what_is_not_understood_stands_first_with_its_meaning(deck, tmp_path):
     assert found.cards[0].use == "allowed"
 
 
+def test_units_add_content_size_and_mass(deck):
+    """A square metre of aluminium 2 mm thick weighs 5.4 kg; of no material, it is doubted."""
+    found = check_deck(deck(CARDS), units="SI")
+    assert found.facts[0] == ("holds", "4 grids, 1 shells")
+    assert found.facts[1:] == (("size", "1 x 1 x 0 m"), ("mass", "5.4 kg in the deck"))
+    assert not found.doubt
+    odd = check_deck(deck(CARDS.replace("2700.", "270.")), units="SI")
+    assert "no unit system makes its materials known ones" in odd.doubt
+
+
 def test_a_deck_of_known_cards_that_is_no_structure_is_refused_as_everywhere(deck, tmp_path):
     ran("check", deck(CARDS.replace("1,2,3,4\n", "1,2,3,9\n")), "--out", tmp_path / "x", code=2)
     assert not (tmp_path / "x").exists()

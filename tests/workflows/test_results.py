@@ -88,6 +88,18 @@ def test_a_result_replaces_that_of_its_own_command_alone(case, tmp_path):
         found.plot("nothing")
 
 
+def test_commands_count_the_same_modes_of_a_recording(case, diagnosed):
+    identified = chladni.identify(case).recordings[0]
+    count = int(identified.firm.sum())
+    compared = chladni.correlate(case)
+    assert len(compared.f_test) == count
+    for checks in (identified.screening.checks, compared.screening.checks):
+        (lines,) = (c.result for c in checks if c.name == "lines per half-bandwidth")
+        assert f"of {count} modes" in lines
+    said = f" {count} modes identified between 20 and 170 Hz"
+    assert sum(said in note for note in diagnosed.notes) == 1
+
+
 def test_a_diagnosis_is_saved_as_its_command_does(diagnosed, tmp_path):
     place = diagnosed.save(tmp_path / "out")
     names = {p.name for p in place.iterdir()}

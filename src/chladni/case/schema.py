@@ -25,6 +25,7 @@ _READ = ("test", "identify", *_FRF)
 _RIG = (*_READ, "bench")
 _VARIED = ("study", *_FIT)
 _PLACED = (*_FRF, "bench")
+_PLANNED = ("diagnose", "plan")
 
 FIELDS = ("E", "rho", "nu", "t", "wall", "E1", "E2", "G12", "nu12", "K", "M")
 ALIASES = {  # effects that are a calibration parameter by another name
@@ -62,16 +63,18 @@ class FileWords(TypedDict, total=False):
         "model. Recordings of the same article, level and state with other drive points are "
         "stacked with it, and those with shapes are merged. The others are held out and scored. "
         "`identify` reads all.", kind="list of files")]
-    regions: Annotated[Sequence[str], Key("plan", '["inner", "box 0 0 0 0.4 0.3 0.1"]', ("plan",),
+    regions: Annotated[Sequence[str], Key("plan", '["inner", "box 0 0 0 0.4 0.3 0.1"]', _PLANNED,
         "everywhere", "m",
         "Where sensors, shakers and cords may be: parts, boxes by two opposite corners, or labels. "
+        "The measurements that a diagnosis advises obey it too. "
         "A CSV file with a column `label` or `part` lists some. A place with a label need not be "
         "flat.", kind="list of places")]
-    fixed: Annotated[Sequence[str], Key("plan", '["412:+Z", "sensors.csv"]', ("plan",), "none", "",
-        "Sensors of every layout: labels, or tables of sensors.", kind="list of labels")]
-    forbidden: Annotated[Sequence[str], Key("plan", '["outer", "507:n"]', ("plan",), "none", "m",
+    fixed: Annotated[Sequence[str], Key("plan", '["412:+Z", "sensors.csv"]', _PLANNED, "none", "",
+        "Sensors of every layout and next measurement: labels, or tables of sensors.",
+        kind="list of labels")]
+    forbidden: Annotated[Sequence[str], Key("plan", '["outer", "507:n"]', _PLANNED, "none", "m",
         "Places for no sensor, shaker or cord, written as `regions`.", kind="list of places")]
-    cost: Annotated[Sequence[str], Key("plan", '["inner=3", "costs.csv"]', ("plan",), "1", "",
+    cost: Annotated[Sequence[str], Key("plan", '["inner=3", "costs.csv"]', _PLANNED, "1", "",
         "Cost of a sensor by place: a word of `regions`, `=` and a number. A CSV file of places "
         "has a column `cost`. The last of several holds. The information of a place is divided by "
         "its cost.", kind="list of costs")]

@@ -14,17 +14,34 @@ from ..report.words import counted
 from ..workflows.case_check import check
 from ..workflows.deck_check import check_deck
 from ..workflows.loaded_model import is_case
-from .run import Allow, DeckOrCase, Out, Pictures, opened, say_sections, started
+from .run import (
+    Allow,
+    DeckOrCase,
+    Mass,
+    Out,
+    Pictures,
+    Recordings,
+    SensorTable,
+    Units,
+    opened,
+    say_sections,
+    started,
+    stated,
+)
 
 
 def run(
     source: DeckOrCase,
+    recordings: Recordings = None,
     mesh: Annotated[
         bool,
         typer.Option(
             "--mesh", help="Compare the modes of a case with those of a mesh twice as fine."
         ),
     ] = False,
+    sensors: SensorTable = None,
+    mass: Mass = None,
+    units: Units = None,
     allow: Allow = None,
     pictures: Pictures = False,
     out: Out = None,
@@ -32,16 +49,15 @@ def run(
     """Check a case before a long run: units, mass, size, places, band, words; or a deck's cards."""
     from ..report.check_page import check_page
 
-    if mesh and source.is_file() and not is_case(source):
-        raise FileError("--mesh is of a case; chladni init drafts one of a deck")
-    if source.is_file() and not is_case(source):
-        _deck(source, tuple(allow or ()), out)
+    given = stated(sensors=sensors, mass=mass)
+    if source.is_file() and not is_case(source) and not (recordings or given):
+        if mesh:
+            raise FileError("--mesh is of a case; chladni init drafts one of a deck")
+        _deck(source, tuple(allow or ()), units, out)
         return
-    if allow:
-        raise FileError("--allow is of a bare deck; a case says [model] allow")
-
-    with started("check", source, out, pictures=pictures) as job:
-        case = opened(source)
+    words = given | stated(units=units, allow=allow)
+    with started("check", source, out, pictures=pictures, reads=recordings or ()) as job:
+        case = opened(source, recordings or (), words)
         found = check(case, mesh=mesh, progress=within(job.progress, 0.0, 0.7))
         job.json("check.json", to_json(found))
         job.progress("the picture", 0.7)
@@ -59,10 +75,10 @@ def run(
         raise AccuracyError(f"{source}: {first.text}; {first.remedy}")
 
 
-def _deck(source: Path, allow: tuple[str, ...], out: Path | None) -> None:
-    """The table of a deck's cards: which are read, passed over, not understood."""
+def _deck(source: Path, allow: tuple[str, ...], units: str | None, out: Path | None) -> None:
+    """The table of a deck's cards, with ``units`` its content, size and mass too."""
     with started("check", source, out) as job:
-        found = check_deck(source, allow)
+        found = check_deck(source, allow, units)
         job.json("check.json", asdict(found))
         rows = [(c.name, str(c.count), c.use, c.meaning) for c in found.cards]
         job.lead = f"{counted(len(rows), 'kind', 'kinds')} of cards and commands; " + (
@@ -70,7 +86,10 @@ def _deck(source: Path, allow: tuple[str, ...], out: Path | None) -> None:
         )
         table = Table(("card", "count", "use", "meaning"), rows, words=_WORDS)
         job.section("Cards", [*([Items([found.refused])] if found.refused else []), table])
+        if found.facts:
+            job.section("The structure", [Table(("it", ""), found.facts, ("it", ""))])
         say_sections(job.lead, job.sections)
+        job.note([found.doubt] if found.doubt else [])
     if found.refused:
         raise AccuracyError(found.refused)
 

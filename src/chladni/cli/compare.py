@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import FileError
+from ..errors import FileError, did_you_mean
 from ..report.run_comparison import compared_runs
 from ..report.run_list import FinishedRun, finished_run
 from .run import Out, started
@@ -25,5 +25,7 @@ def run(first: Folder, second: Folder, out: Out = None) -> None:
 def _opened(folder: Path) -> FinishedRun:
     found = finished_run(folder)
     if found is None:
-        raise FileError(f"{folder} is no folder of a run: it has no run.json by chladni")
+        known = [p.name for p in folder.absolute().parent.glob("*") if finished_run(p)]
+        near = did_you_mean(folder.name, known)
+        raise FileError(f"{folder} is no folder of a run: {near}it has no run.json by chladni")
     return found

@@ -1,7 +1,8 @@
 """``chladni correlate``: how far model and recording are apart, before anything is changed."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,11 +13,28 @@ from ..report.result_json import to_json
 from ..workflows.correlate import correlate
 from ..workflows.loaded_model import is_case, load_model
 from ..workflows.other_modes import other_modes
-from .run import Allow, DeckOrCase, Out, Pictures, Run, Units, opened, started
+from .run import (
+    Allow,
+    DeckOrCase,
+    Mass,
+    Out,
+    Pictures,
+    Recordings,
+    Run,
+    SensorTable,
+    Units,
+    opened,
+    started,
+    stated,
+)
+
+if TYPE_CHECKING:
+    from ..case.schema import CaseWords
 
 
 def run(
     source: DeckOrCase,
+    recordings: Recordings = None,
     modes: Annotated[
         Path | None,
         typer.Option(
@@ -24,6 +42,8 @@ def run(
             "program, or another deck, as one with a joint left out."
         ),
     ] = None,
+    sensors: SensorTable = None,
+    mass: Mass = None,
     units: Units = None,
     allow: Allow = None,
     pictures: Pictures = False,
@@ -31,28 +51,30 @@ def run(
 ) -> None:
     """Compare model and test without a fit: paired modes, MAC, deviation Q by channel and band.
 
-    A case is compared with its recording. With --modes, a case or a bare deck is compared with
-    the modes of another program or of another deck.
+    A case is compared with its recording, a deck with the recording after it. With --modes, a case
+    or a bare deck is compared with the modes of another program or of another deck.
     """
-    with started("correlate", source, out, pictures=pictures) as job:
-        if modes is not None:
-            _with_other_modes(job, source, modes, units, allow or [])
+    test = stated(sensors=sensors, mass=mass)
+    with started("correlate", source, out, pictures=pictures, reads=recordings or ()) as job:
+        if modes is None:
+            words = test | stated(units=units, allow=allow)
+            _with_test(job, source, recordings or (), words)
             return
-        if units is not None or allow:
-            raise FileError("--units and --allow apply to a bare deck, which needs --modes")
-        _with_test(job, source)
+        if recordings or test:
+            raise FileError("--modes stands for the test; leave out recording, --sensors, --mass")
+        _with_other_modes(job, source, modes, units, allow or [])
 
 
-def _with_test(job: Run, source: Path) -> None:
+def _with_test(job: Run, source: Path, recordings: Sequence[Path], words: "CaseWords") -> None:
     from ..report.correlation_page import correlation_page
 
-    if source.is_file() and not is_case(source):
+    if source.is_file() and not is_case(source) and not recordings:
         refuse_foreign(source)
         raise FileError(
-            f"{source} is a deck; give a case with a recording, or --modes with another deck or "
-            "the modes from another program"
+            f"{source} is a deck; give its recording after it, a case with a recording, or --modes "
+            "with another deck or the modes from another program"
         )
-    case = opened(source)
+    case = opened(source, recordings, words)
     found = correlate(case, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)

@@ -26,7 +26,6 @@ from ..search.next_measurement import (
     Outlook,
     advised,
     read_outlook,
-    with_common_candidates,
 )
 from ..workflows.before_any_test import PlannedTests, before_any_test
 from ..workflows.loaded_model import model_in_si, opened
@@ -112,15 +111,15 @@ def run(
             found, names, layout, top=top, articles=articles, seed=seed, odds=odds,
             progress=progress,
         )  # fmt: skip
-        _known([t.outlook for t in made.open], barred)
-        every = made.advised(count, barred)
+        together = made.outlooks()
+        _known(together, barred)
+        every = advised(together, count, odds, barred) if together else ()
     _planned(made)
-    if made.open:
+    if together:
         _tell(names, every, odds)
     drawn = list[Section]()
-    if out and made.open:
+    if out and together:
         model = model_in_si(found, "next")[0]
-        together = with_common_candidates([t.outlook for t in made.open])
         drawn = _page(mesh_of(model.seen, model.assembly), together, every, odds)
     _write(out, source, names, every, drawn)
 
@@ -135,8 +134,9 @@ def _planned(made: PlannedTests) -> None:
     )
     for t in made.tests:
         say(f"an article with {t.name}: odds of the right name {odds_of(t.of_truth)}")
-    n = len(made.tests) - len(made.open)
-    say(f"the planned test settles {n} of {len(made.tests)} articles at {made.odds:g} : 1")
+    n, wrong = len(made.tests) - len(made.unsettled), len(made.unsettled) - len(made.open)
+    said = f"the planned test settles {n} of {len(made.tests)} articles at {made.odds:g} : 1"
+    say(said + (f", and {wrong} wrongly" if wrong else ""))
 
 
 def _known(every: Sequence[Outlook], barred: Sequence[str]) -> None:
@@ -156,7 +156,8 @@ def _tell(names: Sequence[str], every: Sequence[NextMeasurement], odds: float) -
         say(table.caption)
         say_table(table)
     else:
-        say(f"none of the candidates tells {' and '.join(names)} apart")
+        does = "narrows an interval" if len(names) == 1 else f"tells {' and '.join(names)} apart"
+        say(f"none of the candidates {does}")
 
 
 def _page(

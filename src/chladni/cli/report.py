@@ -13,12 +13,16 @@ from ..report.page import write_page
 from .console import say_results
 from .run import folder_named
 
+_OUT = "Folder for the page; default: RUN_FOLDER, in place of the page there."
+
 
 def run(
-    folder: Annotated[Path, typer.Argument(metavar="RUN_FOLDER", help="Folder of a diagnosis.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="RUN_FOLDER", help="Results of diagnose or calibrate.")
+    ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Path of the page.", metavar="DIR", parser=folder_named),
+        typer.Option("--out", help=_OUT, metavar="DIR", parser=folder_named),
     ] = None,
     title: Annotated[str, typer.Option(help="Title of the page.")] = "",
 ) -> None:

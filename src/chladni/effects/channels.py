@@ -1,10 +1,11 @@
-"""A wrong gain or sign of a measurement channel."""
+"""Errors of measurement channels: gain and sign, and the place and direction of a force."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy.sparse as sp
 
-from .effect import ChannelChange, Effect, Parameter, Traits
+from .effect import ChannelChange, Effect, Parameter, ShapeChange, Traits
 from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
@@ -37,6 +38,27 @@ def channel_gain(n_outputs: int, sd: float) -> ChannelGain:
     """The unknown gain e^x, common to all channels."""
     unknown = Parameter("gain", "-", 0.0, sd, step=1.0)
     return ChannelGain((unknown,), "every channel", mask=np.ones(n_outputs))
+
+
+@dataclass(frozen=True, eq=False)
+class GaugeErrors(Effect):
+    """Tilt and place of a force gauge: the motion there is φ_i + Σ_k x_k r_k, x ~ N(0, I).
+
+    They change all lines and channels at once. H is linear in them, but ln H is not. If the gauge
+    is near a node line, the response to a force at a small distance is several times as large.
+    """
+
+    name = "gauge-errors"
+    claim = "the force does not act exactly where and in the direction that the test states"
+    kind = "nuisance"
+
+    rows: tuple[sp.csr_array, ...] = ()  # r_k (1, n), motion added by a standard deviation
+    shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 1)))  # 1 at its place, else 0
+
+    def terms(self, x: np.ndarray) -> tuple[ShapeChange, ...]:
+        """x_k r_k at the place of the gauge."""
+        each = zip(self.rows, x.tolist(), np.eye(len(x)), strict=True)
+        return tuple(ShapeChange(r, self.shapes, value, unit) for r, value, unit in each)
 
 
 @dataclass(frozen=True, eq=False)

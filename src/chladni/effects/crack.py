@@ -1,8 +1,9 @@
 """A crack: bending stiffness lost along a line of shells, with mass and membrane unchanged.
 
 It may be a crack, a bead ground off, an annealed bend or a score. All act as a hinge with a spring
-(Adams, Cawley, Pye and Stone 1978, J. Mech. Eng. Sci. 20, 93-100). The loss depends on the width of
-the shells that hold it. Therefore it is reported as their bending ratio 12I/T3.
+(Adams, Cawley, Pye and Stone 1978, J. Mech. Eng. Sci. 20, 93-100). The deck holds it as the bending
+ratio 12I/T3 = f of shells of width w. This ratio depends on the mesh. The hinge does not: it turns
+as much as a length w (1/f - 1) of the sheet bends.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ from .family import Article, Family
 from .joint_stiffness import within_shear
 from .search_context import Candidate, ResponseScan, SearchContext, best_places
 
-LEAST_LEFT = 0.1  # of the bending stiffness always remains, so that K stays positive
+LEAST_LEFT = 0.01  # of the bending stiffness always remains, so that K stays positive
 SHELLS = 3  # in a line at least
 REACH = 0.55  # of a shell's size times ``SHELLS``: half the least length
 WIDE = 0.75  # of a shell's size: half the width of a line, so that no corner bridges an oblique one
@@ -53,6 +54,7 @@ class Line:
     through: int  # its part, and the shell whose middle it goes through
     direction: np.ndarray  # (3,) unit vector along it there
     times: float  # its length, in units of the usual one
+    width: float  # [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,9 @@ class LineFinder:
         shells = np.flatnonzero(inside & (self.part == p))
         if len(shells) < SHELLS or np.ptp(d[shells] @ along) < least:
             return None
-        return Line(shells, self.middle[shells].mean(axis=0), p, shell, along, times)
+        own, length = self.width[shells], np.ptp(d[shells] @ along)
+        width = float((own**2).sum() / (length + own.mean()))
+        return Line(shells, self.middle[shells].mean(axis=0), p, shell, along, times, width)
 
     def half(self, shell: int, times: float) -> float:
         """Half of ``times`` the usual length [m]."""
@@ -146,7 +150,7 @@ def far_apart(score: np.ndarray, centre: np.ndarray, wanted: int) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class Crack(Effect):
-    """K - (1 - f) Σ_line B_e, B_e the bending stiffness, f = 0.1 + 0.9 / (1 + e^x) the rest of it.
+    """K - (1 - f) Σ_line B_e, B_e the bending stiffness, f = 0.01 + 0.99 / (1 + e^x) the rest.
 
     A change of thickness, modulus or shear of the sheet multiplies B_e (:class:`.effect.Within`).
     """
@@ -186,8 +190,10 @@ class Crack(Effect):
         return cracked(assembly, self.shells, left(x[0]))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """Remaining 12I/t³ with its 95 % interval."""
-        return (self.estimate(x, sd, lambda y: left(y[0])),)
+        """Remaining 12I/t³, and the length of sheet that bends as much as the hinge turns."""
+        width = self.line.width
+        hinge = self.estimate(x, sd, lambda y: width * (1 / left(y[0]) - 1), "hinge", "m")
+        return self.estimate(x, sd, lambda y: left(y[0])), hinge
 
 
 def left(x: float) -> float:
@@ -255,17 +261,13 @@ def _at_rest(
 
     Return the final lines and the number of lines tried.
     """
-    known: dict[bytes, float] = {}
+    tried: set[bytes] = set()
 
     def scores(drawn: Sequence[Line]) -> np.ndarray:
         """Score of each line; a line that would gain stiffness explains nothing."""
-        keys = [line.shells.tobytes() for line in drawn]
-        fresh = {key: line.shells for key, line in zip(keys, drawn, strict=True)}
-        fresh = {key: shells for key, shells in fresh.items() if key not in known}
-        amount, score = scan.bending_scores(about, list(fresh.values()))
-        score = np.where(amount < 0, score, np.inf)
-        known.update(zip(fresh, map(float, score), strict=True))
-        return np.array([known[key] for key in keys])
+        tried.update(line.shells.tobytes() for line in drawn)
+        amount, score = scan.bending_scores(about, [line.shells for line in drawn])
+        return np.where(amount < 0, score, np.inf)
 
     score = scores(first)
     begun = far_apart(score, np.array([line.centre for line in first]), BEGUN)
@@ -281,7 +283,7 @@ def _at_rest(
             if own[best] < own[0] - WORTH:
                 ends[k] = each[best]
                 moving.append(k)
-    return _different(ends), len(known)
+    return _different(ends), len(tried)
 
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:

@@ -78,6 +78,7 @@ class FieldChange:
     field: str
     value: np.ndarray  #: (n_groups,)
     gradient: np.ndarray  #: (n_groups, n_parameters)
+    of: np.ndarray | None = None  #: (n_elements,) group of each, where it needs its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -358,6 +359,7 @@ def of(kind: type[Kind], terms: Sequence[Term]) -> list[Kind]:
     return [term for term in terms if isinstance(term, kind)]
 
 
-def changes_channels(effect: Effect) -> bool:
-    """True for an effect of the test on its channels."""
-    return bool(of(ChannelChange, effect.terms(np.zeros(len(effect.parameters)))))
+def of_test(effect: Effect) -> bool:
+    """True for an effect of the test: it changes what is measured, and not the structure."""
+    every = effect.terms(np.zeros(len(effect.parameters)))
+    return bool(every) and all(isinstance(t, (ChannelChange, ShapeChange)) for t in every)

@@ -110,9 +110,38 @@ class ElementGroups:
     area: np.ndarray  # (g,) [m²] (of a beam: length times the root of A), [kg]
     weight: np.ndarray  # (g,) [m²] (of a beam: length times the root of A), [kg]
     part: np.ndarray  # (g,) position of the group's part
+    each: "_Each"  # of the elements
+    whole: Self | None = None  # the groups, some of which were divided into these
 
     def __len__(self) -> int:
         return len(self.area)
+
+    @property
+    def undivided(self) -> "ElementGroups":
+        """The groups before any of them was divided."""
+        return self if self.whole is None else self.whole
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """One element of each group (g,)."""
+        return np.unique(self.group, return_index=True)[1]
+
+    def divided(self, of: np.ndarray) -> "ElementGroups":
+        """The groups divided where their elements have different labels ``of`` (m,)."""
+        both = np.unique(np.stack([self.group, of]), axis=1, return_inverse=True)[1].ravel()
+        made = _collected(self.structure, (self.linear, self.cubic, self.mass), self.nodes,
+                          self.each, both)  # fmt: skip
+        return replace(made, whole=self.undivided)
+
+    def finer(self, near: np.ndarray, edge: float) -> "ElementGroups":
+        """The groups, those of a mask (g,) divided into pieces of an edge length [m]."""
+        of = np.zeros(len(self.group), dtype=int)
+        for g in np.flatnonzero(near):
+            own = np.flatnonzero(self.group == g)
+            pieces = _pieces(own, self.each, int(np.ceil(self.area[g] / edge**2)))
+            for k, piece in enumerate(pieces):
+                of[piece] = k
+        return self.divided(of)
 
     @cached_property
     def dofs(self) -> np.ndarray:
@@ -159,34 +188,46 @@ class ElementGroups:
             yield name, (A, B)
 
     def project(
-        self, kinds: Sequence[np.ndarray], basis: Basis, last: int | None = None
-    ) -> list[np.ndarray]:
-        """Φᵀ A_g W of every group g (n_groups, r, last), for each kind of element matrices.
+        self, kinds: Sequence[np.ndarray], basis: Basis, last: int | None = None,
+        groups: Sequence[int] | None = None,
+    ) -> list[np.ndarray]:  # fmt: skip
+        """Φᵀ A_g W of some groups g (n_groups, r, last), for each kind of element matrices.
 
-        W are the ``last`` columns of Φ; by default all of them.
+        W are the ``last`` columns of Φ; by default all of them, of all groups.
         """
-        r = basis.shape[1]
+        r, some = basis.shape[1], range(len(self)) if groups is None else groups
         k = r if last is None else last
-        out = [np.empty((len(self), r, k)) for _ in kinds]
-        for g, place in enumerate(self._places):
+        out = [np.empty((len(some), r, k)) for _ in kinds]
+        for row, g in enumerate(some):
+            place = self._place(g)
             V = place.motion(basis)
             for stack, matrices in zip(out, kinds, strict=True):
                 own = V.T @ place.forces(matrices, V[:, r - k :])
-                stack[g] = own if k < r else (own + own.T) / 2
+                stack[row] = own if k < r else (own + own.T) / 2
         return out
 
     def inertia_of_motion(self, basis: Basis, motion: np.ndarray) -> np.ndarray:
         """Φᵀ m_g R (n_groups, r, k) of each group g, for a motion R (6 n_points, k) of points."""
         of_each = [
             place.motion(basis).T @ place.forces(self.mass, motion[place.dofs])
-            for place in self._places
+            for place in map(self._place, range(len(self)))
         ]
         return np.array(of_each).reshape(len(self), basis.shape[1], motion.shape[1])
 
+    def _place(self, g: int) -> "_Place":
+        """The elements and dofs of a group."""
+        if g not in self._places:
+            on = self._elements[g]
+            self._places[g] = _Place.of(on, self.dofs[on], self.structure.T)
+        return self._places[g]
+
     @cached_property
-    def _places(self) -> list["_Place"]:
-        """The elements and dofs of every group."""
-        return [_Place.of(on, self.dofs[on], self.structure.T) for on in alike(self.group)]
+    def _places(self) -> dict[int, "_Place"]:
+        return {}
+
+    @cached_property
+    def _elements(self) -> list[np.ndarray]:
+        return alike(self.group)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,15 +274,20 @@ def group_of_shells(
     share = np.bincount(part, area) / area.sum()
     count = 0
     for p in np.unique(part):
-        pieces = [np.flatnonzero(part == p)]
-        wanted = min(max(1, round(most * share[p])), len(pieces[0]))
-        while len(pieces) < wanted:
-            k = int(np.argmax([area[piece].sum() * (len(piece) > 1) for piece in pieces]))
-            pieces += _halves(pieces.pop(k), centre)
-        for piece in pieces:
+        wanted = max(1, round(most * share[p]))
+        for piece in _pieces(np.flatnonzero(part == p), _Each(centre, area, part), wanted):
             out[piece] = count
             count += 1
     return out
+
+
+def _pieces(on: np.ndarray, each: "_Each", wanted: int) -> list[np.ndarray]:
+    """Divide some elements into pieces: the largest is halved until there are so many."""
+    pieces = [on]
+    while len(pieces) < min(wanted, len(on)):
+        k = int(np.argmax([each.area[piece].sum() * (len(piece) > 1) for piece in pieces]))
+        pieces += _halves(pieces.pop(k), each.centre)
+    return pieces
 
 
 def _halves(piece: np.ndarray, centre: np.ndarray) -> list[np.ndarray]:
@@ -258,29 +304,45 @@ def element_groups(structure: Structure, most: int = 64) -> ElementGroups:
     """
     shells = _shells(structure.assembly)
     beams = _beams(structure.assembly, shells.nodes.shape[1])
-    linear, cubic, mass, nodes, centre, area, of = (
+    linear, cubic, mass, nodes, *each = (
         _stacked(*pair) for pair in zip(shells, beams, strict=True)
     )
     first = group_of_shells(shells.centre, shells.part, shells.area, most)
     second = group_of_shells(beams.centre, beams.part, beams.area, most)
     group = np.concatenate([first, second + first.max(initial=-1) + 1])
+    return _collected(structure, (linear, cubic, mass), nodes, _Each(*each), group)
+
+
+def _collected(
+    structure: Structure, matrices: tuple[np.ndarray, np.ndarray, np.ndarray], nodes: np.ndarray,
+    each: "_Each", group: np.ndarray,
+) -> ElementGroups:  # fmt: skip
+    """Elements in their groups; linear, cubic and mass are the ``matrices``."""
     n = group.max(initial=-1) + 1
-    extent = np.bincount(group, area, minlength=n)
+    extent = np.bincount(group, each.area, minlength=n)
     middle = np.stack(
-        [np.bincount(group, area * centre[:, k], minlength=n) / extent for k in range(3)], axis=1
+        [np.bincount(group, each.area * x, minlength=n) / extent for x in each.centre.T], axis=1
     )
-    weight = mass[:, ::6, ::6].sum(axis=(1, 2))  # of a unit translation along x
+    weight = matrices[2][:, ::6, ::6].sum(axis=(1, 2))  # of a unit translation along x
     part = np.zeros(n, dtype=int)
-    part[group] = of
+    part[group] = each.part
     return ElementGroups(
-        structure, linear, cubic, mass, nodes, group, middle, extent,
-        np.bincount(group, weight, minlength=n), part,
+        structure, *matrices, nodes, group, middle, extent,
+        np.bincount(group, weight, minlength=n), part, each,
     )  # fmt: skip
 
 
 def _stacked(of_shells: np.ndarray, of_beams: np.ndarray) -> np.ndarray:
     """Stack both kinds; without beams the large matrices of the shells are not copied."""
     return np.concatenate([of_shells, of_beams]) if len(of_beams) else of_shells
+
+
+class _Each(NamedTuple):
+    """Centres (m, 3) [m], areas (m,) [m²] and parts (m,) of elements."""
+
+    centre: np.ndarray
+    area: np.ndarray
+    part: np.ndarray
 
 
 class _Elements(NamedTuple):

@@ -24,6 +24,7 @@ from .search_context import Candidate, SearchContext, best_places, valleys
 BANDS = 6  # properties between zero and the largest value of the field
 BELL, RIMMED = (0.0, 0.3), (float(np.log(2.0)), 0.5)  # ln p and sd: pressed; cut or glued on
 RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
+REACH, EDGE = 2.0, 0.5  # of the radius: groups nearer than that are divided into such pieces
 TRIED = 30  # groups that are evaluated one by one if only natural frequencies are known
 
 
@@ -127,6 +128,7 @@ class SheetPatch(Effect):
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # grids of the sheet
     ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     spacing: float = 0.0  # of these grids [m]
+    of: np.ndarray | None = None  # (n_elements,) group of each, where they are its own
 
     @classmethod
     def strength(cls, groups: ElementGroups) -> Parameter:
@@ -188,7 +190,17 @@ class SheetPatch(Effect):
         slope = np.stack(
             [(self.log(x + h * e) - self.log(x - h * e)) / (2 * h) for e in np.eye(5)], 1
         )
-        return (FieldChange(self.quantity, self.log(x), slope),)
+        return (FieldChange(self.quantity, self.log(x), slope, self.of),)
+
+    def resolved(self, groups: ElementGroups, x: np.ndarray) -> Self:
+        """The patch at x over groups near it that are small for its radius."""
+        R, edge = self.radius_at(x), np.sqrt(groups.area)
+        far = np.linalg.norm(groups.centre - self.at(x), axis=1) - edge / 2
+        fine = groups.finer((self.inside > 0) & (far < REACH * R), EDGE * R)
+        return replace(
+            self, of=fine.group, inside=self.inside[groups.group[fine.first]], centre=fine.centre,
+            variance=fine.area / 12, **self.more(fine),
+        )  # fmt: skip
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """The centre in the basic frame (3,) [m]."""
@@ -247,7 +259,7 @@ class SheetPatch(Effect):
             for k in valleys(score, centre, taken, cls.followed):
                 taken.append(k)
                 start = np.array([cls.begun(float(amount[k])), *starts[k][1:]])
-                out.append(Candidate(effects[k], start, base))
+                out.append(Candidate(effects[k].resolved(groups, start), start, base))
         return out
 
 

@@ -259,7 +259,8 @@ class MassPatch(SheetPatch):
         g = int(sheet[np.linalg.norm(groups.centre[sheet] - point, axis=1).argmin()])
         effect = cls.on(groups, g, len(set(groups.connected[sheet].tolist())))
         ln_m = np.log(mass / effect.parameters[0].scale)
-        return effect, np.array([ln_m, np.log(RADII[0]), 0.0, 0.0, cls.rim[0]])
+        x = np.array([ln_m, np.log(RADII[0]), 0.0, 0.0, cls.rim[0]])
+        return effect.resolved(groups, x), x
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write new properties with more mass per area, in bands."""

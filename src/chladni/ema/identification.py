@@ -69,6 +69,12 @@ class Identified(ShownBriefly):
         return (self.band[0] <= self.frequency) & (self.frequency <= self.band[1])
 
     @property
+    def firm(self) -> np.ndarray:
+        """True for poles known to 2 % in frequency and to half their damping (r,)."""
+        known = self.frequency_sd < 0.02 * self.frequency
+        return known & (self.damping_sd < 0.5 * self.damping)
+
+    @property
     def by_channel(self) -> np.ndarray:
         """The residues, a column a channel (r, n_out n_in); of no poles too."""
         return self.residues.reshape(self.order, self.lower.size)

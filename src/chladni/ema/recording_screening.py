@@ -41,6 +41,7 @@ def screened(
     use: np.ndarray | None = None,
     calmer: Sequence[Recording] = (),
     alone: bool = True,
+    spurious: np.ndarray | None = None,
 ) -> Screening:
     """Screen a recording: channels, overload, levels, and phases of the modes.
 
@@ -52,6 +53,7 @@ def screened(
     use : (n_f,) bool, lines of that identification, default all; used again for a repetition
     calmer : more recordings of the test: a channel that works at a lower level is not dead
     alone : False where a model follows, which tells how the numbers are to be read
+    spurious : (r,) bool, poles of ``found`` that are known to be no modes
     """
     frf = recording.frf
     if frf is None:
@@ -76,12 +78,12 @@ def screened(
     more, check = levels_checked(recording, others)
     findings += more
     checks += check
-    more, one = roving_mass(frf, found)
+    strong = None if found is None else strong_modes(found)
+    read = other_readings(frf, strong, use) if strong is not None and alone else []
+    more, one = roving_mass(frf, None if read else found)  # misread, each output has other poles
     findings += more
     checks.append(one)
-    if found is not None:
-        strong = strong_modes(found)
-        read = other_readings(frf, strong, use) if alone else []
+    if found is not None and strong is not None:
         said = f"the identified modes leave {number(strong.chi, 3)} times the noise"
         failed = Check("phase of the modes", said, False)
         more, one = (read, failed) if read else _phases(frf, strong, use)
@@ -91,7 +93,9 @@ def screened(
             more, one = axis_check(frf, found, use)
             findings += more
             checks.append(one)
-        checks.append(_lines(strong, frf.frequency))
+        real = True if spurious is None else ~spurious
+        modes = found.sel(found.inside & found.firm & real)
+        checks.append(_lines(modes, frf.frequency))
     return Screening(recording.name, tuple(findings), tuple(checks))
 
 

@@ -55,6 +55,12 @@ class MeasuredDofs(ShownBriefly):
         """The first n of them; all but the last -n for a negative n."""
         return MeasuredDofs(*(value[:n] for value in vars(self).values()))
 
+    def only(self, chosen: np.ndarray) -> "MeasuredDofs":
+        """A selection of them, by a mask (k,)."""
+        labels = tuple(np.array(self.labels, dtype=object)[chosen])
+        arrays = {name: value[chosen] for name, value in vars(self).items() if name != "labels"}
+        return MeasuredDofs(labels, **arrays)
+
     def joined(self, other: "MeasuredDofs") -> "MeasuredDofs":
         """These, and others whose labels are new."""
         new = [k for k, name in enumerate(other.labels) if name not in self.labels]

@@ -106,11 +106,10 @@ class _Linear(LinearModel):
 
 def _along_lines(z: np.ndarray) -> np.ndarray:
     """White noise (n_f, ...) made similar on neighbouring lines; its variance stays one."""
-    from scipy.signal import lfilter
-
-    scale = np.sqrt(1 - ALIKE**2)
-    fresh = np.concatenate([z[:1], scale * z[1:]])
-    return np.asarray(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0))
+    out = np.concatenate([z[:1], np.sqrt(1 - ALIKE**2) * z[1:]])
+    for k in range(1, len(out)):
+        out[k] += ALIKE * out[k - 1]
+    return out
 
 
 STATISTICS = ("error of form", "misfit", "worst line", "worst channel")

@@ -72,7 +72,7 @@ def chain_faults(
     best = min(tried, key=lambda h: h.share)
     late = [h for h in tried if h.finding.kind == "delay" and h.share <= 1]
     said = (
-        f"Q {declared:.2g} as declared, {best.Q:.2g} for the best of {len(tried)} other "
+        f"smoothed Q {declared:.2g} as declared, {best.Q:.2g} for the best of {len(tried)} other "
         "interpretations"
     )
     answers = without_modes(frf, lines) > FLAT
@@ -95,8 +95,8 @@ def _applicable(best: Hypothesis, tried: Sequence[Hypothesis]) -> Hypothesis:
 
 def _nothing_fits(declared: float, best: Hypothesis) -> Finding:
     text = (
-        f"recording and model are unlike: Q is {declared:.2g} where responses with random phases "
-        f"have {CHANCE:.2g}, and no other interpretation of the recording fits (the best, "
+        f"recording and model are unlike: smoothed Q is {declared:.2g} where responses with random "
+        f"phases have {CHANCE:.2g}, and no other interpretation of the recording fits (the best, "
         f"{best.finding.kind}, {best.Q:.2g})."
     )
     mend = (
@@ -170,8 +170,8 @@ def _read_otherwise(
 
     def of(Q: float, error: Misreading) -> Hypothesis:
         said = (
-            f"{error.text}: with this interpretation Q against the model is {Q:.2g}, as declared "
-            f"{declared:.2g}."
+            f"{error.text}: with this interpretation smoothed Q against the model is {Q:.2g}, as "
+            f"declared {declared:.2g}."
         )
         found = Finding(error.kind, said, "fault", (), error.repair, mend=error.mend)
         return Hypothesis(Q, Q / declared, found)

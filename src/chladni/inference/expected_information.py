@@ -173,8 +173,9 @@ class OpenQuantity:
 
 
 def chosen(
-    information: Callable[[Sequence[int]], float], cost: np.ndarray, count: int, most: float
-) -> list[int]:
+    information: Callable[[Sequence[int]], float], cost: np.ndarray, count: int, most: float,
+    first: Sequence[int] = (),
+) -> list[int]:  # fmt: skip
     """Choose measurements one after the other, each with the most information for its cost.
 
     Parameters
@@ -182,9 +183,11 @@ def chosen(
     information : [nat] of some measurements together, by their positions
     cost : (c,) of each; inf excludes it
     most : the most information that there is
+    first : chosen before, and first of the list
     """
-    out: list[int] = []
-    now, left = 0.0, [int(k) for k in np.flatnonzero(np.isfinite(cost))]
+    out = list(first)
+    now = information(out) if out else 0.0
+    left = [int(k) for k in np.flatnonzero(np.isfinite(cost)) if k not in out]
     while len(out) < count and left and now <= (1 - SETTLED) * most:
         after = np.array([information([*out, k]) for k in left])
         best = int(np.argmax((after - now) / cost[left]))

@@ -13,6 +13,7 @@ from ..effects.estimate import Remarks
 from ..effects.family import Family
 from ..effects.registry import catalogue
 from ..errors import ModelError
+from ..reduced.local_effect import LocalEffect
 from ..reduced.reduced_model import Reduced, State, evaluate
 from ..reduced.reduced_problem import ReducedProblem
 from .complex_modes import ModeCoupling
@@ -198,18 +199,23 @@ class UpdatingProblem:
         return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
 
     def own_optimum(
-        self, effect: Effect, start: np.ndarray, bases: Sequence[np.ndarray], model: Reduced
-    ) -> tuple[LocalOptimum, np.ndarray]:
+        self, effect: Effect, start: np.ndarray, bases: Sequence[np.ndarray]
+    ) -> tuple[LocalOptimum, np.ndarray, Reduced | None]:
         """Optimise one effect from a start, the base linear about the best of some (n_base,).
 
-        The second value is the base that goes with it.
+        The second value is the base that goes with it, the third the model if it needed its own.
         """
-        kept = self.without(effect)
+        kept, model = self.without(effect), self.reduced.model
         inside = self._positions(kept)
         about = [self._about(tuple(kept), tuple(x[inside].tolist())) for x in bases]
+        state, x = about[0].state, about[0].x
+        assert state is not None
+        local = LocalEffect.of(self.reduced, kept, effect, state, x, start)
+        if local is None:
+            model = self.reduced.model_for(effect, start)
         data, mass, whole = self.data.rebased(model), self.mass_measurement, bases[0].copy()
-        found, whole[inside] = own_optimum(model, kept, effect, data, mass, about, start)
-        return found, whole
+        found, whole[inside] = own_optimum(model, kept, effect, data, mass, about, start, local)
+        return found, whole, None if local else model
 
     def _positions(self, kept: Sequence[Effect]) -> np.ndarray:
         """Mask over the parameters of the base of some of its effects."""
@@ -219,8 +225,11 @@ class UpdatingProblem:
         """The responses of some base effects linear about x; computed once."""
         if (kept, x) not in self._linear:
             at = np.array(x)
-            J = self.data.scaled_slopes(evaluate(self.reduced.model, kept, at))
-            self._linear[kept, x] = LinearModel(self.data.error, J, np.zeros((0, len(x)))), at
+            state = evaluate(self.reduced.model, kept, at)
+            linear = LinearModel(
+                self.data.error, self.data.scaled_slopes(state), np.zeros((0, len(x)))
+            )
+            self._linear[kept, x] = Base(linear, at, state.without_slopes())
         return self._linear[kept, x]
 
     @cached_property
@@ -270,16 +279,20 @@ def _fit_responses(
 ) -> Fit:  # fmt: skip
     """Fit parameters and the size δ of the model's error in turn; evidence integrates δ out."""
     assert data.error is not None
+    error, begun = data.error, None
     for _ in range(ROUNDS):
-        found, there = linearised_fit(model, effects, data, mass_measurement, x, max_steps)
+        found, there = linearised_fit(
+            model, effects, data, mass_measurement, x, max_steps, begun=begun
+        )
         likely = there.model.learned(there.r, there.r0)
-        change = abs(np.log(likely.delta / data.error.delta))
-        data = replace(data, error=data.error.with_delta(likely.delta))
+        change = abs(np.log(likely.delta / error.delta))
+        error = error.with_delta(likely.delta)
+        data = replace(data, error=error)
         S = likely.neg2_log_evidence + constants(effects)
         found = replace(found, neg2_log_evidence=S, data=data)
         if max_steps <= ROUGH or change < CLOSE:
             break
-        x = found.x
+        x, begun = found.x, there.under(error)
     return found
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.effect import Effect, changes_channels
+from ..effects.effect import Effect, of_test
 from ..reduced.reduced_model import State
 from .hypothesis_fit import HypothesisFit
 from .linear_model import Squares
@@ -116,7 +116,7 @@ def _positions(
 
 def of_the_object(effect: Effect) -> bool:
     """True where an effect belongs to the object in all its states, not to one test of it."""
-    return effect.kind in ("calibration", "nuisance") and not changes_channels(effect)
+    return effect.kind in ("calibration", "nuisance") and not of_test(effect)
 
 
 def _of_state(

@@ -16,6 +16,7 @@ from ..effects.effect import Effect, Parameter
 from ..errors import ModelError
 from ..reduced.effect_dofs import slices
 from ..reduced.reduced_model import Reduced, State, evaluate
+from .discrepancy import Discrepancy
 from .likelihood import Data
 from .linear_model import LinearModel, Squares, cost
 
@@ -147,6 +148,12 @@ class LinearPosterior:
     r: np.ndarray
     r0: np.ndarray
 
+    def under(self, error: Discrepancy) -> "Point":
+        """The posterior at the same x with errors of form of another size."""
+        linear = replace(self.model, error=error, within=self.model)
+        squares, there = linear.squares(self.r, self.r0), replace(self, model=linear)
+        return Point(squares.cost, lambda: (squares, there))
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -208,14 +215,15 @@ def fit(
 def linearised_fit(
     model: Reduced, effects: Sequence[Effect], data: Data,
     mass_measurement: MassMeasurement | None, start: np.ndarray, max_steps: int, tol: float = 0.05,
+    begun: Point | None = None,
 ) -> tuple[Fit, LinearPosterior]:  # fmt: skip
-    """Fit as :func:`fit`, and keep the linear model at the end."""
+    """Fit as :func:`fit`, and keep the linear model at the end; ``begun`` is at the start."""
     limit = np.array([p.step for p in unknowns(effects)])
 
     def objective(x: np.ndarray) -> Point:
         return posterior(model, effects, data, mass_measurement, x)
 
-    x, found, there, status = descend(objective, start, limit, max_steps, tol)
+    x, found, there, status = descend(objective, start, limit, max_steps, tol, begun)
     A = found.information
     S = found.cost + np.linalg.slogdet(A)[1] + constants(effects)
     misfit = found.cost - float(there.r0 @ there.r0)

@@ -2,31 +2,34 @@
 
 Residuals of data and priors are r(y) + J d.  y are the effect's own parameters, d is a change of
 the base parameters, and J are the slopes by these at one state of the base.  d is eliminated for
-every y (Golub and Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432): only slopes by y are computed.
+every y (Golub and Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432): only slopes by y are computed,
+by differences where an effect is local (:mod:`..reduced.local_effect`).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..effects.effect import Effect
 from ..errors import ModelError
-from ..reduced.reduced_model import Reduced, evaluate
+from ..reduced.local_effect import LocalEffect
+from ..reduced.reduced_model import Reduced, State, evaluate
 from .likelihood import Data
-from .linear_model import LinearModel, Squares
+from .linear_model import LinearModel, Squares, cost
 from .map_fit import (
     MassMeasurement,
     Objective,
     Point,
     constants,
     descend,
-    posterior,
     prior_residuals,
 )
 
 STEPS, CLOSE = 12, 2.0  # most steps; improvement of -2 ln posterior by a step that is the last
+NEAR = 1e-4  # of the prior sd of a parameter: the step of slopes by differences
 SHARES = (1.0, 0.3)  # of the linear change of the base: the first that improves is taken
 
 
@@ -62,32 +65,60 @@ def distinct(
     return out
 
 
-Base = tuple[LinearModel, np.ndarray]  # responses of the base alone, linear about parameters (n,)
+class Base(NamedTuple):
+    """Responses of the base alone, linear about parameters x (n,), and its state there."""
+
+    alone: LinearModel
+    x: np.ndarray
+    state: State | None = None  # for effects that are added to it
 
 
 def own_optimum(
     model: Reduced, base: Sequence[Effect], effect: Effect, data: Data,
     mass_measurement: MassMeasurement | None, about: Sequence[Base], start: np.ndarray,
+    local: LocalEffect | None = None,
 ) -> tuple[LocalOptimum, np.ndarray]:  # fmt: skip
     """Optimise an effect from a start, with the base linear about the best of some states.
 
     The evidence is that of responses linear in the base.  The second value is the base (n,) that
     goes with the optimum. A strong effect spoils the base of a fit without it; that of the deck is
     then the nearer.
+
+    Parameters
+    ----------
+    local : adds the effect to a state of the base; without it ``model`` must represent the effect
     """
-    ways = [_objective(model, base, effect, data, mass_measurement, each) for each in about]
+    effects = [*base, effect]
+
+    def state_of(x: np.ndarray, y: np.ndarray, alone: State | None = None) -> State:
+        if local is None:
+            return evaluate(model, effects, np.concatenate([x, y]))
+        return local.added(alone or evaluate(model, base, x, False), x, y)
+
+    def slopes(at: Base, y: np.ndarray, state: State, r: np.ndarray) -> np.ndarray:
+        if local is None:
+            return data.scaled_slopes(state.of_last(len(y)))
+        steps = NEAR * np.array([p.sd for p in effect.parameters])
+        near = [data.scaled(state_of(at.x, y + dy, at.state), False)[0] for dy in np.diag(steps)]
+        return (np.array(near) - r).T / steps
+
+    def objective(at: Base) -> Objective:
+        return _objective(effects, data, mass_measurement, at, state_of, slopes)
+
+    ways = [objective(each) for each in about]
     begun = [way(start) for way in ways]
     best = int(np.argmin([point.cost for point in begun]))
     limit = np.array([p.step for p in effect.parameters])
     y, _, (whole, r, r0), _ = descend(ways[best], start, limit, STEPS, CLOSE, begun[best])
-    x, squares, effects = about[best][1], whole.squares(r, r0), [*base, effect]
+    x, squares = about[best].x, whole.squares(r, r0)
     n, moved = len(x), x
     step = np.linalg.solve(squares.information[:n, :n], squares.gradient[:n])
     for share in SHARES:
         with suppress(ModelError):
             there = x - share * step
-            z = np.concatenate([there, y])
-            if posterior(model, effects, data, mass_measurement, z).cost < squares.cost:
+            state, z = state_of(there, y), np.concatenate([there, y])
+            rest = prior_residuals(effects, mass_measurement, z, state)[0]
+            if cost(data.error, data.scaled(state, False)[0], rest) < squares.cost:
                 moved = there
                 break
     S = whole.neg2_log_evidence(r, r0) + constants(effects)
@@ -96,23 +127,22 @@ def own_optimum(
 
 
 def _objective(
-    model: Reduced, base: Sequence[Effect], effect: Effect, data: Data,
-    mass_measurement: MassMeasurement | None, about: Base,
+    effects: Sequence[Effect], data: Data, mass_measurement: MassMeasurement | None, about: Base,
+    state_of: Callable[..., State], slopes: Callable[..., np.ndarray],
 ) -> Objective:  # fmt: skip
     """-2 ln posterior of own parameters, the base eliminated; its second value is the whole."""
-    (alone, x), effects = about, [*base, effect]
-    n = len(x)
+    alone, n = about.alone, len(about.x)
 
     def objective(y: np.ndarray) -> Point:
-        z = np.concatenate([x, y])
-        state = evaluate(model, effects, z)
+        state = state_of(about.x, y, about.state)
         r = data.scaled(state, False)[0]
+        z = np.concatenate([about.x, y])
         r0, J0 = prior_residuals(effects, mass_measurement, z, state)
         frozen = replace(alone, J0=J0[:, :n], within=alone)
 
         def sloped() -> tuple[Squares, tuple[LinearModel, np.ndarray, np.ndarray]]:
-            J = data.scaled_slopes(state.of_last(len(y)))
-            whole = replace(frozen, J=np.concatenate([alone.J, J], axis=1), J0=J0, within=frozen)
+            J = np.concatenate([alone.J, slopes(about, y, state, r)], axis=1)
+            whole = replace(frozen, J=J, J0=J0, within=frozen)
             return whole.squares(r, r0).profiled(n), (whole, r, r0)
 
         return Point(frozen.squares(r, r0).profiled(n).cost, sloped)

@@ -53,8 +53,8 @@ def relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list
         return []
     rows = [f"{labels[k]} that of {labels[place[k]]}" for k in moved]
     text = (
-        f"{len(moved)} of {len(labels)} outputs have exchanged labels: after the exchange Q "
-        f"against the model is {Q:.2g}, as declared {declared:.2g}."
+        f"{len(moved)} of {len(labels)} outputs have exchanged labels: after the exchange smoothed "
+        f"Q against the model is {Q:.2g}, as declared {declared:.2g}."
     )
     mend = f"in sensors.csv give each the grid and direction of the other: {listed(rows, 6)}"
     channels = tuple(labels[k] for k in moved)
@@ -70,8 +70,8 @@ def _exchanged(
     Q, declared = float(after.mean()), float(before.mean())
     names = tuple(labels[k] for k in pair)
     text = (
-        f"outputs {names[0]} and {names[1]} are exchanged: after the exchange mean Q against the "
-        f"model is {Q:.2g}, as declared {declared:.2g}."
+        f"outputs {names[0]} and {names[1]} are exchanged: after the exchange mean smoothed Q "
+        f"against the model is {Q:.2g}, as declared {declared:.2g}."
     )
     mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
     found = Finding("swapped channels", text, "fault", names, mend, mend=("exchanged", *names))
@@ -104,7 +104,7 @@ def driven_elsewhere(seen: Smoothed, model: Modelled, inputs: MeasuredDofs) -> l
         off = float(np.linalg.norm(at[k] - inputs.points[j]))
         text = (
             f"the force {label} acts near grid {grids[k]}, {off:.3g} m from the declared place: "
-            f"there Q against the model is {Q[k]:.2g}, as declared {declared:.2g}."
+            f"there smoothed Q against the model is {Q[k]:.2g}, as declared {declared:.2g}."
         )
         mend = f"in sensors.csv give input {label} the grid {grids[k]}, or its true place"
         found = Finding("misplaced force", text, "fault", (label,), mend, float(grids[k]))
@@ -153,7 +153,7 @@ def _two_forces(
     labels = tuple(label for label, m in zip(outputs.labels, moved, strict=True) if m)
     text = (
         f"{len(labels)} of {len(moved)} outputs ({listed(labels, 6)}) belong to another force "
-        f"than {inputs.labels[j]}, one near grid {grid}: mean Q against the model is then "
+        f"than {inputs.labels[j]}, one near grid {grid}: mean smoothed Q against the model is then "
         f"{best:.2g}, as declared {declared:.2g}."
     )
     mend = "give the outputs of each force a recording, or an input, of their own"
@@ -191,7 +191,7 @@ def mirrored(
     Q, _, axes = best
     text = (
         f"deck and sensors are mirrored against each other along {axes}: with sensors and force at "
-        f"the mirror images of their places Q against the model is {Q:.2g}, as declared "
+        f"the mirror images of their places smoothed Q against the model is {Q:.2g}, as declared "
         f"{declared:.2g}."
     )
     mend = f"reverse {axes} of all places in sensors.csv, or of all grids in the deck"

@@ -52,7 +52,7 @@ def residual_localisation(
     hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
 ) -> ResidualLocalisation | None:
     """The map of one hypothesis; None where frequencies were compared or all places are blind."""
-    data, fit, groups = hypothesis.data, hypothesis.fit, hypothesis.model.groups
+    data, fit, groups = hypothesis.data, hypothesis.fit, hypothesis.model.groups.undivided
     if not isinstance(data, Responses) or data.error is None or not len(groups):
         return None
     base = baseline(hypothesis.model, fit.effects, data, mass_measurement, fit.x)

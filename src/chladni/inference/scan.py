@@ -187,7 +187,7 @@ class _Probe(Effect):
 
 def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.ndarray:
     """∂r/∂ln t, E or rho of every group, including the row of the weighing (n, n_groups)."""
-    groups = range(len(model.groups))
+    groups = range(len(model.groups.undivided))
     unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in groups)
     return effect_slopes(base, model, data, _Probe(unknown, field=field))
 

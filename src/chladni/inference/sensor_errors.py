@@ -1,15 +1,16 @@
 """Errors of sensors and force gauges themselves: gain, tilt and place of each.
 
 A model need not explain these errors, and parameters should not adapt to them. They are small,
-independent and of known size, and their effect on log10 H is linear. Let e be the relative error of
-the gain, θ the tilt, x the error of the place, and u, v normal to the direction n = u x v:
+independent and of known size. Let e be the relative error of the gain, θ the tilt, x the error of
+the place, and u, v normal to the direction n = u x v:
 
 d(ln H) = e + (θ_u H_u + θ_v H_v + x_u ∂H/∂u + x_v ∂H/∂v) / H.
 
 H_u is the response along u.  The slopes of the sheet ∂H/∂u = -φ_v, ∂H/∂v = φ_u follow from its
-rotations (w(x + dx) = w + θ × dx · n). The covariance V Vᵀ of the errors is whitened out of the
-residuals before anything is fitted (C = I + V Vᵀ). The five errors of each output come first, one
-channel at a time.  The errors of the inputs follow, which act on all channels.
+rotations (w(x + dx) = w + θ × dx · n). V Vᵀ is the covariance of the errors of the outputs and of
+the gains of the gauges. It is whitened out of the residuals before anything is fitted
+(C = I + V Vᵀ). Tilt and place of a gauge act on all channels: they are unknowns of every fit
+(:class:`..effects.channels.GaugeErrors`).
 """
 
 from dataclasses import dataclass, replace
@@ -18,19 +19,21 @@ from typing import Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..effects.channels import GaugeErrors
+from ..effects.effect import Parameter
 from ..ema.setup import SensorAccuracy
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
 from ..reduced.reduced_model import Reduced, State
 from .discrepancy import Lines
 
-WAYS = 4  # tilts about u and v, places along u and v
+WAYS = ("tilt about u", "tilt about v", "place along u", "place along v")
 LN10 = np.log(10.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Errors of the outputs, or of the inputs.
+    """Errors of measured dofs.
 
     Attributes
     ----------
@@ -62,35 +65,48 @@ def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: Sens
     with_base = np.stack(
         [turn * u.moved_with_base(inputs), turn * v.moved_with_base(inputs), still, still]
     )
-    return Side(known.gain, tuple(map(sp.csr_array, rows)), with_base, np.zeros((WAYS, 0, 0)))
+    return Side(known.gain, tuple(map(sp.csr_array, rows)), with_base, np.zeros((len(WAYS), 0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
 class SensorErrors:
-    """Errors of all sensors and of all force gauges."""
+    """Errors of all sensors, and the relative standard deviation of the gain of a force gauge."""
 
     outputs: Side
-    inputs: Side
+    gain: float
 
     def rebased(self, model: Reduced) -> Self:
         """The errors with their rows in the basis of this model."""
-        return replace(self, outputs=self.outputs.rebased(model), inputs=self.inputs.rebased(model))
+        return replace(self, outputs=self.outputs.rebased(model))
 
 
 def sensor_errors(
     outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
 ) -> SensorErrors:
-    """Expected errors of sensors and force gauges of this accuracy."""
-    return SensorErrors(side(outputs, inputs, built, known), side(inputs, inputs, built, known))
+    """Expected errors of sensors of this accuracy, and of the gains of force gauges."""
+    return SensorErrors(side(outputs, inputs, built, known), known.gain)
+
+
+def gauge_errors(
+    outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
+) -> list[GaugeErrors]:
+    """Tilt and place of every force gauge; a moving base has none."""
+    n, found = len(outputs.labels), list[GaugeErrors]()
+    unknown = tuple(Parameter(way, "-", 0.0, 1.0, kind="linear", step=0.5) for way in WAYS)
+    rows = side(inputs, inputs, built, known).rows
+    for k in np.flatnonzero(~inputs.base).tolist():
+        at = np.eye(n + len(inputs.labels))[:, [n + k]]
+        own = tuple(sp.csr_array(row[[k]]) for row in rows)
+        found.append(GaugeErrors(unknown, f"gauge {inputs.labels[k]}", rows=own, shapes=at))
+    return found
 
 
 def columns(
     errors: SensorErrors, data: Lines, state: State, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Columns d ln H / scale per sd: for each output (5, *H), for the inputs (k, *H)."""
-    H = data.model(state)
-    outputs = _of_outputs(errors.outputs, data, state, H, scale)
-    return outputs, _of_inputs(errors.inputs, data, state, H, scale)
+    """Columns d ln H / scale per sd: of each output (5, *H), of the gain of each input (k, *H)."""
+    outputs = _of_outputs(errors.outputs, data, state, data.model(state), scale)
+    return outputs, errors.gain / scale * np.eye(scale.shape[-1])[:, None, None]
 
 
 def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
@@ -108,20 +124,4 @@ def _of_outputs(
     for modal, with_base in zip(errors.modal, errors.with_base, strict=True):
         G = state.between(data.s, d, modal @ state.phi, phi_i)
         out.append((data.s[:, None, None] ** data.power * G + with_base) / (H * scale))
-    return np.stack(out)
-
-
-def _of_inputs(
-    errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
-) -> np.ndarray:
-    """Change by the errors of each input, zero for other inputs; a moving base has gain alone."""
-    phi_o, phi_i, d = data.modal(state)
-    out = []
-    for i in range(len(phi_i)):
-        one = np.arange(len(phi_i)) == i
-        out.append(errors.gain / scale * one)
-        for modal in errors.modal[:, i] if state.drive is None else ():
-            G = state.between(data.s, d, phi_o, (modal @ state.phi)[None])
-            z = data.s[:, None, None] ** data.power * G / (H * scale)
-            out.append(z * one)
     return np.stack(out)

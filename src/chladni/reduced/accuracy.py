@@ -117,7 +117,7 @@ def products(
         v = v + modes @ (each.W @ (rows @ v))
     K, M = system.elastic @ v, system.M @ u
     split = "" not in model.linear
-    fields, slopes = log_fields(acting, len(groups), len(x), split)
+    fields, slopes = log_fields(acting, groups, len(x), split)
     logs = {k: f[groups.group, None, None] for k, f in fields.items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces():

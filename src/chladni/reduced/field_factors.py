@@ -12,24 +12,27 @@ from .effect_dofs import Acting
 Fields = dict[str, np.ndarray]
 
 
-def log_fields(acting: Acting, n: int, n_p: int, split: bool) -> tuple[Fields, Fields]:
-    """Sum of the log fields (n,) over the groups and their gradients (n, n_p), by name.
+def log_fields(
+    acting: Acting, groups: ElementGroups, n_p: int, split: bool
+) -> tuple[Fields, Fields]:
+    """Sum of the log fields (g,) over the groups and their gradients (g, n_p), by name.
 
     Raises
     ------
     ModelError
         If a component of the plane stiffness changes in a model that is not split into components.
     """
-    logs = {name: np.zeros(n) for name in ("t", "E", "rho", "bending", *COMPONENTS)}
-    slopes = {name: np.zeros((n, n_p)) for name in logs}
+    logs = {name: np.zeros(len(groups)) for name in ("t", "E", "rho", "bending", *COMPONENTS)}
+    slopes = {name: np.zeros((len(groups), n_p)) for name in logs}
     for effect, at, terms in acting:
         for change in of(FieldChange, terms):
             if change.field in COMPONENTS and not split:
                 raise ModelError(
                     f"{effect.name} changes {change.field}; the model needs with_components()"
                 )
-            logs[change.field] = logs[change.field] + change.value
-            slopes[change.field][:, at] += change.gradient
+            mine = (groups.undivided.group if change.of is None else change.of)[groups.first]
+            logs[change.field] = logs[change.field] + change.value[mine]
+            slopes[change.field][:, at] += change.gradient[mine]
     return logs, slopes
 
 

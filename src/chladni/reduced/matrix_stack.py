@@ -4,7 +4,7 @@ Every hypothesis has a basis of its own: the common one and a few further vector
 of its matrices is its own.  The common block is held once for all hypotheses.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +32,31 @@ class MatrixStack:
     def bordered(self, border: np.ndarray) -> "MatrixStack":
         """Extend the stack by the columns (g, r + k, k) of further basis vectors."""
         return MatrixStack((*self.blocks, border))
+
+    def divided(self, parent: np.ndarray, pieces: np.ndarray, of: np.ndarray) -> "MatrixStack":
+        """Matrices of other groups: the p-th is that of ``parent[p]``, pieces have their own.
+
+        Parameters
+        ----------
+        pieces : positions (k,) of the groups with matrices ``of`` (k, r, r)
+        """
+        out = []
+        for at, block in self._placed():
+            made = block[parent]
+            made[pieces] = of[:, : at.stop, at]
+            out.append(made)
+        return MatrixStack(tuple(out))
+
+    def alike(self, values: np.ndarray) -> "MatrixStack":
+        """The stack of other symmetric matrices (g, r, r), in the same blocks."""
+        return MatrixStack(tuple(
+            np.ascontiguousarray(values[:, : at.stop, at]) for at, _ in self._placed()
+        ))  # fmt: skip
+
+    def less(self, others: Iterable["MatrixStack"]) -> "MatrixStack":
+        """The rest of it without others of the same blocks."""
+        every = zip(self.blocks, *(other.blocks for other in others), strict=True)
+        return MatrixStack(tuple(own - sum(taken) for own, *taken in every))
 
     def weighted(self, weights: np.ndarray) -> np.ndarray:
         """Σ_g w_g A_g (r, r) of weights (g,)."""

@@ -129,7 +129,7 @@ class Reduced:
         if r == self.vectors.shape[1]:  # the same basis: only clamps were released
             return old
         border = vectors.bordering(A)
-        return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
+        return np.block([[old, border[:r]], [border[:r].T, (border[r:] + border[r:].T) / 2]])
 
     @property
     def deformation(self) -> Basis:
@@ -225,19 +225,48 @@ class Reduced:
         return {}
 
     def split_for(self, effect: Effect, x: np.ndarray) -> Self:
-        """The model, split into components where the effect changes one of them."""
-        split = any(change.field in COMPONENTS for change in of(FieldChange, effect.terms(x)))
-        return self.with_components(effect.axis_1) if split and "" in self.linear else self
+        """The model, split into components and divided into groups as the effect needs it."""
+        changes, model = of(FieldChange, effect.terms(x)), self
+        if "" in self.linear and any(change.field in COMPONENTS for change in changes):
+            model = self.with_components(effect.axis_1)
+        for change in changes:
+            if change.of is not None:
+                model = model.divided(change.of)
+        return model
+
+    def divided(self, of: np.ndarray) -> Self:
+        """The model with groups divided where their elements have different labels ``of`` (m,)."""
+        groups = self.groups.divided(of)
+        parent = self.groups.group[groups.first]
+        pieces = np.flatnonzero(np.bincount(parent)[parent] > 1)
+        if not len(pieces):
+            return self
+        linear, cubic = dict[str, MatrixStack](), dict[str, MatrixStack]()
+        for name, pair in self.pieces():
+            A, B, m = groups.project(
+                [*pair, self.groups.mass], self.vectors, groups=pieces.tolist()
+            )
+            linear[name] = self.linear[name].divided(parent, pieces, A)
+            cubic[name] = self.cubic[name].divided(parent, pieces, B)
+            mass = self.mass.divided(parent, pieces, m)
+        base = self.base and participation(groups, self.vectors, self.base.motion)
+        return replace(
+            self, groups=groups, linear=linear, cubic=cubic, mass=mass, base=base, _seen={},
+            _within=self,
+        )  # fmt: skip
 
     def with_components(self, axis: np.ndarray | None = None) -> Self:
         """The model with plane stiffness in four components; one copy serves all its users."""
         key = "" if axis is None else str(axis.tolist())
         if (known := self._split.get(key)) is not None:
             return known
-        linear: dict[str, MatrixStack] = {}
-        cubic: dict[str, MatrixStack] = {}
-        for name, pair in self.groups.components(axis):
-            linear[name], cubic[name] = map(stacked, self.groups.project(pair, self.vectors))
+        linear, cubic = dict[str, MatrixStack](), dict[str, MatrixStack]()
+        *others, rest = COMPONENTS  # the last is what the others leave of the whole
+        for name, (_, pair) in zip(others, self.groups.components(axis), strict=False):
+            A, B = self.groups.project(pair, self.vectors)
+            linear[name], cubic[name] = self.linear[""].alike(A), self.cubic[""].alike(B)
+        linear[rest] = self.linear[""].less(linear.values())
+        cubic[rest] = self.cubic[""].less(cubic.values())
         made = self._split[key] = replace(self, linear=linear, cubic=cubic, axis=axis)
         return made
 
@@ -272,7 +301,7 @@ def evaluate(
     n_p = count(effects)
     acting = acting_at(effects, x)
     split = "" not in model.linear
-    logs, slopes = log_fields(acting, len(model.groups), n_p, split)
+    logs, slopes = log_fields(acting, model.groups, n_p, split)
     r, n_own = len(model.K0), sum(effect.traits.own_dofs for effect in effects)
     sums = RunningSums.of_fields(
         *model.with_fields(logs), (model.linear, model.cubic), model.mass, logs, slopes, n_own
@@ -336,7 +365,8 @@ def _moved(
             whole = change.shapes @ (model.rows(change.rows, strained=True) @ phi)
             value = change.coefficient * whole
             total = value if total is None else total + value
-            slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
+            for p in np.flatnonzero(change.gradient).tolist():
+                slopes[at.start + p] = slopes.get(at.start + p, 0.0) + change.gradient[p] * whole
     return total, slopes
 
 
@@ -368,7 +398,3 @@ def _weight(
 ) -> tuple[float, np.ndarray]:
     w = model.groups.weight * np.exp(mass_log(logs))
     return float(model.weight0 + w.sum()), np.asarray(w @ mass_log(slopes))
-
-
-def _symmetric(A: np.ndarray) -> np.ndarray:
-    return np.asarray(A + A.T) / 2

@@ -24,7 +24,6 @@ class Text:
     """Paragraphs."""
 
     paragraphs: Sequence[str]
-    kind: str = "text"
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,6 @@ class Items:
     """A list of sentences."""
 
     items: Sequence[str]
-    kind: str = "items"
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,6 @@ class Facts:
     """Main numbers: (name, value)."""
 
     facts: Sequence[tuple[str, str]]
-    kind: str = "facts"
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,6 @@ class Table:
     opens: str = ""  # drawing that a click on a row opens
     at: Sequence[int | None] = ()  # part of it that belongs to each row: a mode, a channel
     links: Sequence[str] = ()  # page to which the first cell of each row leads
-    kind: str = "table"
 
     def opened(self, row: int) -> int | None:
         """The part that a click on a row opens."""
@@ -68,7 +64,6 @@ class Picture:
     path: Path
     caption: str = ""
     wide: bool = True
-    kind: str = "picture"
 
     @property
     def uri(self) -> str:
@@ -115,7 +110,6 @@ class Drawing:
     first: str = ""  # still of the first screen, which every page holds
     place: str = ""  # section of a diagnosis
     wide: bool = True  # False: next to another one, where there is room
-    kind: str = "drawing"
 
     @property
     def pictures(self) -> Mapping[str, Still]:
@@ -148,7 +142,6 @@ class Links:
     """Files in the folder of the page: (name, description)."""
 
     files: Sequence[tuple[str, str]]
-    kind: str = "links"
 
 
 @dataclass(frozen=True)
@@ -156,7 +149,6 @@ class Code:
     """Commands, word for word."""
 
     lines: Sequence[str]
-    kind: str = "code"
 
 
 Block = Text | Items | Facts | Table | Picture | Drawing | Links | Code

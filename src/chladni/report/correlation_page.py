@@ -111,7 +111,7 @@ def _responses(case: Case, found: Correlation) -> tuple[list[Block], dict[str, i
     at = {name.split(",")[0]: k for k, (name, *_) in enumerate(rows)}
     for k, (_, output, _) in enumerate(rows):
         at.setdefault(output, k)
-    return [Drawing("frf", chart, frf_charts.CAPTION, stills)], at
+    return [Drawing("frf", chart, f"{frf_charts.CAPTION} {frf_charts.OF_CURVES}", stills)], at
 
 
 def in_words(found: Correlation) -> PageParts:
@@ -233,7 +233,7 @@ def _scores(found: Correlation, at: Mapping[str, int] = MappingProxyType({})) ->
         for (low, high), x in zip(q.bands, q.band, strict=True)
     ]
     facts = [
-        ("Q", number(q.Q)),
+        ("Q", f"{number(q.Q)}, of all {len(found.channels)} channels"),
         ("magnitude, phase", f"{number(q.magnitude, 3)}, {number(q.phase, 3)}"),
         ("Σ|δ|², not averaged", number(q.total)),
     ]

@@ -30,8 +30,8 @@ _SHAPES = 6  # in a picture
 MOST_ENERGY = 0.98  # share of the shells whose colours are within the limits
 _FRF = (
     f"{frf_charts.CAPTION} White: fitted; grey: not fitted. Each mode of a deck has the damping "
-    "identified for its partner in the test; without a partner, the damping of the case. Q belongs "
-    "to the channel, over all lines."
+    "identified for its partner in the test; without a partner, the damping of the case. "
+    f"{frf_charts.OF_CURVES}"
 )
 _ONLY_SHOWN = " Frequencies were compared, not responses."
 _LEFT = (

@@ -23,6 +23,10 @@ _LINES = 300  # at least, of every channel
 _GRID = 8  # channels in the overview
 Row = tuple[str, str, float]  # name of a view, its output, Q of the last curve
 CAPTION = "Drag to zoom, double-click to see all, click a name to hide its curve."
+OF_CURVES = (
+    "Q of curves: of the channel, over all lines, with the damping as drawn; scores have one "
+    "damping for all."
+)
 
 
 def typical(chart: Chart, rows: Sequence[Row], outputs: Sequence[str] = ()) -> Still:
@@ -67,7 +71,8 @@ def responses(
     f, held = test.frequency[lines], set(held_out)
     names = {}
     for i, j in channels:
-        q = "".join(f", Q {name} {number(v[i, j], 3)}" for name, v in off.items())
+        each = ", ".join(f"{name} {number(v[i, j], 3)}" for name, v in off.items())
+        q = f", Q of curves: {each}" if each else ""
         out = " (held out)" if test.outputs[i] in held else ""
         names[i, j] = f"{test.outputs[i]} from {test.inputs[j]}{out}{q}"
     shown = {names[c]: {n: (f, r.values[lines, *c]) for n, r in curves.items()} for c in channels}

@@ -3,6 +3,7 @@
 GLOSSARY = {
     "Q": "Mean over channels and lines of |log10(H model / H test)|²; 0 is perfect, 0.1 a factor "
     "of 2 (rms).",
+    "Q of": "The data over which the mean goes.",
     "MAC": "Modal assurance criterion: squared cosine between two shapes at the sensors; 1: the "
     "same shape.",
     "CoMAC": "MAC at one sensor over all paired modes. A low value may mean a wrong place or "
@@ -24,6 +25,7 @@ GLOSSARY = {
 _HEADS = {  # heads of tables and names of facts that hold a word of the glossary
     "Q, fitted data": "Q", "Q, held-out data": "held out", "Held-out deviation Q": "held out",
     "Q fitted": "Q", "Q held out": "held out", "MAC before": "MAC", "MAC after": "MAC",
+    "Q before": "Q", "Q after": "Q",
     "found (95 % interval)": "95 % interval",
     "compared with the best": "Bayes factor", "damping [%]": "damping", "off ": "off",
 }  # fmt: skip

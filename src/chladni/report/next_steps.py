@@ -8,6 +8,7 @@ from ..errors import named
 from ..inference.result import CalibratedParameter
 from ..search.next_measurement import ODDS
 from ..workflows.diagnosis_result import DiagnosisResult
+from .sentence import against
 from .words import interval, percent, quantity
 
 _FAR = 0.05  # relative change of a calibration parameter that is worth a measurement
@@ -108,9 +109,8 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
         return []
     if result.distrust:
         return [f"Do not use {deck} before the reasons for doubt are settled."]
-    error = result.frequency_error
-    if result.compared == "frequencies" and error and (error.after or 0) >= (error.before or 0):
-        return [f"Do not use {deck}: its frequencies are no nearer to the test."]
+    if worse := against(result):
+        return [f"Do not use {deck}: {worse}."]
     if lost:
         use = f"Use {deck} for the structure without {named(lost)}, which no card of it holds"
     else:

@@ -26,8 +26,9 @@ def compared_runs(a: FinishedRun, b: FinishedRun, place: Path) -> PageParts:
         ("case", a.source, b.source),
         ("written", *(f"{r.written:%Y-%m-%d %H:%M} UTC" for r in (a, b))),
         ("result", a.lead, b.lead),
-        ("Q before", *(number(r.q()[0], 3) for r in (a, b))),
-        ("Q after", *(number(r.q()[1], 3) for r in (a, b))),
+        ("Q of", *(r.q()[0] for r in (a, b))),
+        ("Q before", *(number(r.q()[1], 3) for r in (a, b))),
+        ("Q after", *(number(r.q()[2], 3) for r in (a, b))),
     ]
     heads = ("", *names)
     values = [dict(_values(r)) for r in (a, b)]

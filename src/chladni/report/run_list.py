@@ -23,7 +23,7 @@ from .words import number, percent
 
 _LONGEST = 300  # letters of a lead
 _LEAD = re.compile(r"<h1>(.*?)</h1>", re.DOTALL)
-_HEADS = ("written", "command", "case", "result", "Q before", "Q after", "change")
+_HEADS = ("written", "command", "case", "result", "Q of", "Q before", "Q after", "change")
 
 
 @dataclass(frozen=True)
@@ -57,14 +57,18 @@ class FinishedRun:
         page = self.folder / "report.html"
         return Path(os.path.relpath(page if page.exists() else self.folder, place)).as_posix()
 
-    def q(self) -> tuple[float | None, float | None]:
-        """Q of the given deck and of the last, held out where data were; of a correlation one."""
+    def q(self) -> tuple[str, float | None, float | None]:
+        """Data of Q, and Q of the given deck and of the last; a correlation has one.
+
+        A diagnosis has it of held-out data, if there are any.
+        """
         if self.diagnosis is not None:
             scores = self.diagnosis.agreement or Agreement()
-            sides = [(s.nominal, s.after) for s in (scores.held_out, scores.fitted)]
-            return next((s for s in sides if None not in s), (None, None))
+            sides = {"held-out data": scores.held_out, "fitted data": scores.fitted}
+            known = [(name, s.nominal, s.after) for name, s in sides.items()]
+            return next((s for s in known if None not in s), ("", None, None))
         held = contents(self, "correlation.json").get("Q")
-        return (held["mean"] if isinstance(held, dict) else None), None
+        return ("all data", held["mean"], None) if isinstance(held, dict) else ("", None, None)
 
 
 def contents(run: FinishedRun, name: str) -> dict[str, Any]:
@@ -109,15 +113,15 @@ def index_page(folder: Path, place: Path) -> PageParts:
         raise FileError(f"{folder} holds no run of chladni: no folder with a {LIST}")
     rows = []
     for run in runs:
-        before, after = run.q()
+        data, before, after = run.q()
         date = f"{run.written:%Y-%m-%d %H:%M}"
         cells = number(before, 3), number(after, 3), percent(after, before)
-        rows.append((date, run.command, run.source, run.lead, *cells))
+        rows.append((date, run.command, run.source, run.lead, data, *cells))
     caption = (
-        "Times are UTC. Q of the given deck and of the last, on held-out data where there are "
-        "any. A click on a head sorts."
+        "Times are UTC. Q of the given deck and of the last; on other data it is another number. A "
+        "click on a head sorts."
     )
-    table = Table(_HEADS, rows, _HEADS[:4], caption, links=[r.page_from(place) for r in runs])
+    table = Table(_HEADS, rows, _HEADS[:5], caption, links=[r.page_from(place) for r in runs])
     more = "chladni compare A B puts two of these folders next to each other."
     counted = f"{len(runs)} run{'s' * (len(runs) > 1)} in {folder.resolve().name}"
     return PageParts(f"{counted}.", [Section("Runs", [table, Items([more])])])

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from ..effects.registry import families
-from ..inference.result import NamedEffect, Scores
+from ..inference.result import FrequencyError, NamedEffect, Scores
+from ..search.result_parts import last_step_in_words
 from ..workflows.diagnosis_result import DiagnosisResult
 from .words import number
 
@@ -17,15 +18,23 @@ def sentence(result: DiagnosisResult) -> str:
 
 
 def _sentence(result: DiagnosisResult) -> str:
-    """State the verdict in one sentence."""
-    verdict, gain = result.verdict, _gain(result)
-    what = _each(result.effects)
+    """State the verdict in one sentence.
+
+    A claim is plain only if the result is trusted and no score of the written decks is against it.
+    The sentence then says which score is.
+    """
+    verdict, worse = result.verdict, against(result)
+    plain, gain = not (worse or result.distrust), _gain(result, worse)
+    what, gain_of_one = _each(result.effects), gain if worse or not result.one_of else ""
     if verdict == "missing physics":
-        return f"{'; and '.join(_lacks(result))}{'' if result.one_of else gain}."
+        lacks = _lacks(result, "The model lacks" if plain else "The model may lack")
+        return f"{'; and '.join(lacks)}{gain_of_one}."
     if verdict == "measurement fault" and result.one_of:
-        return f"The recording or the model is wrong; the data cannot distinguish: {_tied(result)}."
+        tied = f"the data cannot distinguish: {_tied(result)}"
+        return f"The recording or the model is wrong; {tied}{gain_of_one}."
     if verdict == "measurement fault":
-        return f"The recording is wrong, not the model: {what}{gain}."
+        wrong = "is wrong, not the model" if plain else "may be wrong, and not the model"
+        return f"The recording {wrong}: {what}{gain}."
     if verdict == "nonlinear":
         signs = ", ".join(dict.fromkeys(t.signature for t in result.levels if t.sentence))
         why = what or signs or "no linear model fits"
@@ -38,10 +47,8 @@ def _sentence(result: DiagnosisResult) -> str:
             f"No effect is named; {better} explains the recording better than calibration alone, "
             f"but the evidence does not decide{gain}."
         )
-    if verdict in ("calibration only", "nothing missing") and result.distrust:
-        sure = verdict == "calibration only" and result.compared == "responses"
-        known = "Calibration explains the recording" * sure
-        return f"{known or 'No effect is named'}, but physics may still be missing{gain}."
+    if verdict in ("calibration only", "nothing missing") and not plain:
+        return f"No effect is named, but physics may still be missing{gain}."
     if verdict == "calibration only":
         return f"Calibration explains the recording; no physics is missing{gain}."
     if verdict == "nothing missing":
@@ -55,6 +62,21 @@ def _sentence(result: DiagnosisResult) -> str:
         near = f": {what}" if what else ""
         return f"The model lacks physics that is not in the catalogue{near}."
     return verdict
+
+
+def against(result: DiagnosisResult) -> str:
+    """Statement that the written deck is worse than one before it; "" where it is not."""
+    said = last_step_in_words(result.agreement, bool(result.effects))
+    if said or result.compared == "responses" or not (off := _off_by_deck(result)):
+        return said
+    last, after = off.popitem()
+    best = min(off, key=lambda deck: off[deck])
+    if after <= off[best]:
+        return ""
+    return (
+        f"the frequencies of the {last} deck are farther from the test than those of the {best} "
+        f"deck ({number(after, 2)} %, {number(off[best], 2)} % before)"
+    )
 
 
 def _off(result: DiagnosisResult) -> str:
@@ -74,7 +96,7 @@ def _each(effects: Sequence[NamedEffect]) -> str:
     return "; and ".join(words)
 
 
-def _lacks(result: DiagnosisResult) -> list[str]:
+def _lacks(result: DiagnosisResult, claim: str) -> list[str]:
     """List the missing effects, the tied ones, and the faulty channels."""
     tied = result.one_of[0] if result.one_of else ()
     one = next((e for e in reversed(result.effects) if e.name in tied), None)
@@ -82,9 +104,9 @@ def _lacks(result: DiagnosisResult) -> list[str]:
     of_test = {known.name for known in families() if known.effect.kind == "test"}
     faults = [e for e in sure if e.name in of_test]
     physics = [e for e in sure if e.name not in of_test]
-    words = [f"The model lacks {_each(physics)}"] if physics or not (tied or faults) else []
+    words = [f"{claim} {_each(physics)}"] if physics or not (tied or faults) else []
     if tied:
-        begun = "one of" if physics else "The model lacks one of"
+        begun = "one of" if physics else f"{claim} one of"
         words.append(f"{begun} these, which the data cannot distinguish: {_tied(result)}")
     return [*words, f"the recording is wrong too: {_each(faults)}"] if faults else words
 
@@ -97,34 +119,46 @@ def _tied(result: DiagnosisResult) -> str:
     return ", ".join(names) + "".join(f"; to settle it, {check}" for check in checks)
 
 
-def _gain(result: DiagnosisResult) -> str:
-    """State Q of the last deck and of the one before it, on data that only report."""
+def _gain(result: DiagnosisResult, worse: str) -> str:
+    """State the scores of the last deck and of the one before it, on data that only report.
+
+    ``worse`` says that the last one is worse.
+    """
     held = Scores() if result.agreement is None else result.agreement.held_out
-    if result.compared != "responses":
-        return _closer(result)
     (one, before), (last, after) = held.last_step(bool(result.effects)).items()
-    if not before or after is None:
-        return ""
     known, said = held.with_nuisances, ""
-    if known is not None and known < before < after:
+    if known is not None and before and after is not None and known < before < after:
         said = (
             f", and to {number(known, 3)} with errors of mesh, joints and scatter, which a deck "
             "cannot contain"
         )
+    if worse:
+        return f"; {worse}{said}"
+    if result.compared != "responses":
+        return _of_frequencies(result)
+    if not before or after is None:
+        return ""
     return (
         f"; on held-out data the deviation Q goes from {number(before, 3)} ({one} deck) to "
         f"{number(after, 3)} ({last} deck){said}"
     )
 
 
-def _closer(result: DiagnosisResult) -> str:
-    """State the deviation of all frequencies: one or two held-out ones prove little."""
-    error = result.frequency_error
-    if error is None or error.calibrated is None or error.after is None:
+def _off_by_deck(result: DiagnosisResult) -> dict[str, float]:
+    """Deviation of all frequencies [%] by deck: one or two held-out ones prove little."""
+    error, named = result.frequency_error or FrequencyError(), bool(result.effects)
+    off = {"given": error.before, "calibrated": error.calibrated if named else error.after}
+    if named:
+        off["updated"] = error.after
+    known = {deck: x for deck, x in off.items() if x is not None}
+    return known if len(known) == len(off) else {}
+
+
+def _of_frequencies(result: DiagnosisResult) -> str:
+    if not (off := _off_by_deck(result)):
         return ""
-    named, count = bool(result.effects), sum(bool(r.after_hz) for r in result.frequencies)
-    before, after = (error.calibrated if named else error.before), error.after
-    one, last = ("calibrated", "updated") if named else ("given", "calibrated")
+    count = sum(bool(r.after_hz) for r in result.frequencies)
+    (one, before), (last, after) = list(off.items())[-2:]
     return (
         f"; {count} frequencies are {number(before, 2)} % from the test (rms) with the {one} deck, "
         f"{number(after, 2)} % with the {last} deck"

@@ -325,16 +325,15 @@ def _scores(result: DiagnosisResult) -> list[Block]:
         return []
     columns = ("model", "Q fitted", "change", "Q held out", "change ")
     what = f"Held out: {result.agreement.what}. " if result.agreement.what else ""
-    return [Table(columns, rows, ("model",), what + _MEANING[result.compared])]
+    what += f"Q: mean {_MEANING[result.compared]}; lower is better. "
+    what += "Every run of the same deck gives the same Q."
+    return [Table(columns, rows, ("model",), what)]
 
 
 _MEANING = {
-    "responses": "Q: mean over channels and lines of |log10(H model / H test)|²; lower is "
-    "better. Every run of the same deck gives the same Q.",
-    "frequencies": "Q: mean over the paired frequencies of |log10(f model / f test)|²; lower is "
-    "better. Every run of the same deck gives the same Q.",
-    "modes": "Q: mean over the paired modes of |log10(f model / f test)|² + (1 - MAC)/ln²10; lower "
-    "is better. Every run of the same deck gives the same Q.",
+    "responses": "over channels and lines of |log10(H model / H test)|²",
+    "frequencies": "over the paired frequencies of |log10(f model / f test)|²",
+    "modes": "over the paired modes of |log10(f model / f test)|² + (1 - MAC)/ln²10",
 }
 
 

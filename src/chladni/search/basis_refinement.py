@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import scipy.sparse as sp
 
-from ..effects.effect import changes_channels
+from ..effects.effect import of_test
 from ..errors import ModelError
 from ..fem.modelled import modelled
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
@@ -115,12 +115,11 @@ def _on_new_structure(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,
     )  # fmt: skip
-    of_test = [e for e in old.nuisance if changes_channels(e)]
     fresh = updating_problem(
         changed,
         reduced,
         data.rebased(reduced.model),
-        [*nuisances(reduced, model, mesh, None if rows else f_max), *of_test],
+        [*nuisances(reduced, model, mesh, None if rows else f_max), *filter(of_test, old.nuisance)],
         f_max,
     )
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))

@@ -14,7 +14,6 @@ from ..effects.joints import Connection
 from ..effects.search_context import Candidate
 from ..inference.hypothesis_fit import FAILED, HypothesisFit, UpdatingProblem
 from ..inference.likelihood import Responses
-from ..inference.local_scores import local_scores
 from ..inference.pole_data import Poles
 from ..inference.scan import (
     Baseline,
@@ -28,6 +27,7 @@ from ..inference.scan import (
     spin_scores,
 )
 from ..parallel import in_parallel
+from ..reduced.local_effect import LocalEffect
 from ..reduced.reduced_model import evaluate
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .pole_starts import global_starts
@@ -222,21 +222,23 @@ class UpdatingContext:
 
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
-        base, reduced, data = self.baselines[about], self.problem.reduced, self.problem.data
-        if extended and isinstance(data, Responses):
-            local = local_scores(base, reduced, data, effect, starts)
-            if local is not None:
-                return local[None]
-        wider = extended or effect.release is not None
-        widened = reduced.model_for if wider else reduced.model.split_for
-        model = widened(effect, starts[0])
+        base, reduced, local = self.baselines[about], self.problem.reduced, None
+        model = reduced.model
+        if extended and isinstance(self.problem.data, Responses):
+            local = LocalEffect.of(reduced, base.effects, effect, base.state, base.x, starts[0])
+        if local is None:
+            wider = extended or effect.release is not None
+            model = (reduced.model_for if wider else model.split_for)(effect, starts[0])
         data = self.problem.data.rebased(model)
         ways = WIDE if isinstance(data, Poles) else (0.0,)
         out = np.full((len(ways), len(starts)), np.inf)
         for k, start in enumerate(starts):
             x = np.concatenate([base.x, start])
             try:
-                state = evaluate(model, [*base.effects, effect], x, False)
+                if local is None:
+                    state = evaluate(model, [*base.effects, effect], x, False)
+                else:
+                    state = local.added(base.state, base.x, start)
             except FAILED:
                 continue
             if isinstance(data, Poles):
@@ -329,9 +331,21 @@ class UpdatingContext:
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,)."""
-        base, model = self.baselines[about], self.problem.reduced.model
-        return direction_scores(base, bending_slopes(base, model, self.data, sets))
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
+
+        Several families try the same lines of shells.
+        """
+        base, model, known = self.baselines[about], self.problem.reduced.model, self._bent
+        keys = [(about, each.tobytes()) for each in sets]
+        fresh = {key: each for key, each in zip(keys, sets, strict=True) if key not in known}
+        slopes = bending_slopes(base, model, self.data, list(fresh.values()))
+        known |= zip(fresh, np.transpose(direction_scores(base, slopes)), strict=True)
+        amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
+        return amount, score
+
+    @cached_property
+    def _bent(self) -> dict[tuple[int, bytes], np.ndarray]:
+        return {}
 
 
 def _prior(effect: Effect, x: np.ndarray) -> float:

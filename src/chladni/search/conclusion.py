@@ -31,7 +31,9 @@ def concluded(case: Hypotheses, decision: Decision) -> tuple[Diagnosis, tuple[st
         return said, tuple(_doubts(case, decision))
     halved = (*found.halved, lead.halved) if found.halved else ()
     gains = lead.together.gains if lead.together else ()
-    return replace(said, written=lead.written, halved=halved, gains=gains), lead.distrust
+    fits = (lead.own, *said.hypotheses[1:])
+    said = replace(said, hypotheses=fits, written=lead.written, halved=halved, gains=gains)
+    return said, lead.distrust
 
 
 def _doubts(case: Hypotheses, decision: Decision) -> Iterator[str]:

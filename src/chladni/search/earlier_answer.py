@@ -254,9 +254,9 @@ def read_earlier(folder: Path) -> EarlierAnswer:
         )
     try:
         held = json.loads(path.read_text(encoding="utf-8"))
-        shared = {(n, t, int(k)): (float(m), float(s)) for n, t, k, m, s in held["shared"]}
+        shared = {(n, t, int(k)): (_finite(m), _positive(s)) for n, t, k, m, s in held["shared"]}
         effects = tuple(_read(held["effects"]))
-        mass = None if held["mass"] is None else float(held["mass"])
+        mass = None if held["mass"] is None else _positive(held["mass"])
         return EarlierAnswer(
             str(held["said"]), shared, effects, mass, dict(held["data"]), str(folder)
         )
@@ -267,9 +267,24 @@ def read_earlier(folder: Path) -> EarlierAnswer:
 def _read(rows: Sequence[dict[str, Any]]) -> Iterator[KnownEffect]:
     for row in rows:
         point = row["point_m"]
+        if point is not None:
+            x, y, z = map(_finite, point)
+            point = x, y, z
         yield KnownEffect(
-            str(row["name"]), float(row["two_log_odds"]), str(row["text"]),
-            None if point is None else tuple(float(v) for v in point), float(row["radius_m"]),
-            tuple(KnownParameter(str(p["name"]), *(float(p[k]) for k in ("mean", "sd", "scale")))
-                  for p in row["parameters"]),
+            str(row["name"]), _finite(row["two_log_odds"]), str(row["text"]), point,
+            _finite(row["radius_m"]),
+            tuple(KnownParameter(str(p["name"]), _finite(p["mean"]), _positive(p["sd"]),
+                                 _finite(p["scale"])) for p in row["parameters"]),
         )  # fmt: skip
+
+
+def _finite(value: Any) -> float:
+    if not np.isfinite(number := float(value)):
+        raise ValueError(f"{value} is no number")
+    return number
+
+
+def _positive(value: Any) -> float:
+    if not (number := _finite(value)) > 0:
+        raise ValueError(f"{value} is not above 0")
+    return number

@@ -71,14 +71,26 @@ class Explanation:
         return held_out_evidence(prepared.problem, unseen, without, s.own, s.about)
 
     @cached_property
+    def own(self) -> HypothesisFit:
+        """The fit that tells values: errors of form and of sensors spread from its own state.
+
+        They are largest at antiresonances. A strong effect moves these: where those of the null
+        are, its data would be lost, and where its own are, they would count fully. The evidence
+        stays that of the common errors, on which hypotheses are compared.
+        """
+        own = self.case.prepared.problem.about_itself(self.fit)
+        same = replace(own.fit, neg2_log_evidence=self.fit.fit.neg2_log_evidence)
+        return self.fit.refitted(same)
+
+    @cached_property
     def written(self) -> HypothesisFit:
         """The hypothesis in the form of a deck."""
-        return as_written(self.fit, self.case.prepared.problem.mass_measurement)
+        return as_written(self.own, self.case.prepared.problem.mass_measurement)
 
     @cached_property
     def halved(self) -> HypothesisFit:
         """The hypothesis in the form of a deck with every shell halved."""
-        return as_written(self.fit, self.case.prepared.problem.mass_measurement, halved=True)
+        return as_written(self.own, self.case.prepared.problem.mass_measurement, halved=True)
 
     @cached_property
     def Q(self) -> tuple[tuple[float, float], ...]:
@@ -150,7 +162,7 @@ class Explanation:
     def forget_model(self) -> None:
         """Keep the fit, not the vectors that were added to the basis for it."""
         self.fit = on_common_basis(self.case.prepared.problem, self.fit)
-        for form in ("written", "halved"):
+        for form in ("own", "written", "halved"):
             vars(self).pop(form, None)
         self.forgotten = True
 

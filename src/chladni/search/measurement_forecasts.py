@@ -15,13 +15,14 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.effect_context import ElementGrids
 from ..errors import ModelError
+from ..fem.measured_dofs import MeasuredDofs
 from ..inference.discrepancy import Form, columns, curvature, form
 from ..inference.expected_information import OpenQuantity, Predicted, Rivals
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import prior_residuals
 from ..reduced.reduced_model import Reduced, State, evaluate
-from .next_measurement import FurtherTest, Outlook
+from .next_measurement import FurtherPlaces, FurtherTest, Outlook
 
 COSTS = {"sensor": 1.0, "drive": 2.0, "mass": 2.0, "band": 1.5, "weighing": 0.5}
 LINES = 24  # of a recording at which a new channel is forecast
@@ -124,6 +125,7 @@ class Rival:
 def outlook(
     problem: UpdatingProblem, hypotheses: Sequence[HypothesisFit], names: Sequence[str],
     probability: np.ndarray, kinds: Collection[str] = tuple(COSTS),
+    allowed: FurtherPlaces | None = None,
 ) -> Outlook | None:  # fmt: skip
     """Forecast every candidate measurement under each hypothesis; None without responses.
 
@@ -132,11 +134,12 @@ def outlook(
     hypotheses : each with its own model; of one alone, its least known quantity is forecast
     names, probability : of each
     kinds : of the candidates
+    allowed : where they may be; default anywhere
     """
     if not hypotheses or not isinstance(problem.data, Responses):
         return None
     rivals = [Rival(problem, h) for h in hypotheses]
-    found = list(measurements(problem, rivals, kinds))
+    found = list(measurements(problem, rivals, kinds, allowed))
     kept = _kept([seen for _, seen in found])
     seen = tuple(
         Predicted(
@@ -180,18 +183,27 @@ Seen = list[tuple[np.ndarray, np.ndarray]]  # of each rival: mean and factor
 
 
 def measurements(
-    problem: UpdatingProblem, rivals: Sequence[Rival], kinds: Collection[str] = tuple(COSTS)
-) -> Iterator[tuple[FurtherTest, Seen]]:
+    problem: UpdatingProblem, rivals: Sequence[Rival], kinds: Collection[str] = tuple(COSTS),
+    allowed: FurtherPlaces | None = None,
+) -> Iterator[tuple[FurtherTest, Seen]]:  # fmt: skip
     """Every candidate of some kinds, with its prediction under each rival."""
     data, places = rivals[0].data, problem.reduced.candidates
+    price = dict[int, float]()
+    if allowed is not None:
+        every = problem.reduced.grids
+        places = every.only(np.isin(every.grids, allowed.grids))
+        price = dict(zip(allowed.grids.tolist(), allowed.cost.tolist(), strict=True))
     places = places.only(places.spread(PLACES))
     few = places.only(places.spread(MASSES))
     lines = data.s[np.unique(np.linspace(0, len(data.s) - 1, LINES).astype(int))]
+    if "sensor" in kinds and allowed is not None and allowed.fixed.labels:
+        yield from _fixed(problem, rivals, lines, allowed.fixed)
     if "sensor" in kinds:
         sensors = [_new(r, rivals[0], lines, places.rows, data.inputs) for r in rivals]
         for k in range(len(places)):
             seen = [each.of_output(k) for each in sensors]
-            yield _placed("sensor", "a sensor at", places, k), seen
+            test = _placed("sensor", "a sensor at", places, k)
+            yield replace(test, cost=test.cost * price.get(int(places.grids[k]), 1.0)), seen
     if "drive" in kinds and not np.any(data.direct):
         drives = [_new(r, rivals[0], lines[::FEW], data.outputs, few.rows) for r in rivals]
         for k in range(len(few)):
@@ -210,6 +222,19 @@ def measurements(
     if "weighing" in kinds:
         what = f"a weighing to {1e3 * WEIGHED:.2g} g"
         yield FurtherTest("weighing", what, cost=COSTS["weighing"]), [r.weight() for r in rivals]
+
+
+def _fixed(
+    problem: UpdatingProblem, rivals: Sequence[Rival], lines: np.ndarray, held: MeasuredDofs
+) -> Iterator[tuple[FurtherTest, Seen]]:
+    """Sensors that every further test has."""
+    rows = held.rows(problem.reduced.structure)
+    sensors = [_new(r, rivals[0], lines, rows, rivals[0].data.inputs) for r in rivals]
+    for k, (label, point) in enumerate(zip(held.labels, held.points, strict=True)):
+        x, y, z = point.tolist()
+        what = f"a sensor at {label}"
+        test = FurtherTest("sensor", what, label, (x, y, z), COSTS["sensor"], fixed=True)
+        yield test, [each.of_output(k) for each in sensors]
 
 
 def _wider_band(rivals: Sequence[Rival]) -> tuple[FurtherTest, Seen]:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
+from ..fem.measured_dofs import MeasuredDofs
 from ..inference.expected_information import (
     Forecast,
     OpenQuantity,
@@ -43,6 +44,7 @@ class FurtherTest:
     point_m : (3,) [m], where it has a place
     cost : in units of one more sensor
     amount : [kg] of a mass, [Hz] of the top of a band
+    fixed : of every further test
     """
 
     kind: str
@@ -51,6 +53,16 @@ class FurtherTest:
     point_m: tuple[float, float, float] | None = None
     cost: float = 1.0
     amount: float = 0.0
+    fixed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherPlaces:
+    """Where further sensors, drives and masses may be."""
+
+    grids: np.ndarray  # (k,) ids
+    cost: np.ndarray  # (k,) of a sensor there, in units of one anywhere else
+    fixed: MeasuredDofs  # sensors of every further test, wherever they are
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,6 +83,11 @@ class Outlook(ShownBriefly):
     candidates: tuple[FurtherTest, ...]
     seen: tuple[Predicted, ...]
     unknown: OpenQuantity | None = None
+
+    @property
+    def costs(self) -> np.ndarray:
+        """Cost of each candidate (c,)."""
+        return np.array([c.cost for c in self.candidates])
 
     def made(self, measurements: Sequence[int]) -> Predicted:
         """The data of some candidates together."""
@@ -105,6 +122,8 @@ def advised(
 ) -> tuple[NextMeasurement, ...]:  # fmt: skip
     """Choose the best few measurements, each with the most information for its cost.
 
+    Fixed ones are first.
+
     Parameters
     ----------
     every : cases that are equally likely, with the same candidates
@@ -112,17 +131,27 @@ def advised(
     without : kinds or labels that cannot be measured
     """
     first, n = every[0], len(every)
-    costs = np.array([c.cost for c in first.candidates])
+    costs = first.costs
     most = np.inf if first.unknown else sum(o.rivals.entropy for o in every) / n
 
     def information(measurements: Sequence[int]) -> float:
         return sum(o.information(measurements) for o in every) / n
 
-    ks = chosen(information, np.where(first.excluded(without), np.inf, costs), count, most)
+    barred = first.excluded(without)
+    fixed = [k for k, c in enumerate(first.candidates) if c.fixed and not barred[k]]
+    ks = chosen(information, np.where(barred, np.inf, costs), count, most, fixed)
+    return outcomes(every, ks, odds)
+
+
+def outcomes(
+    every: Sequence[Outlook], measurements: Sequence[int], odds: float = ODDS
+) -> tuple[NextMeasurement, ...]:
+    """Say of each of some candidates, made one after the other, what it would do."""
+    first, n = every[0], len(every)
     out = []
-    for end in range(1, len(ks) + 1):
-        c, made = first.candidates[ks[end - 1]], ks[:end]
-        bits = information(made) / np.log(2)
+    for end, k in enumerate(measurements, 1):
+        c, made = first.candidates[k], measurements[:end]
+        bits = sum(o.information(made) for o in every) / n / np.log(2)
         found = NextMeasurement(c.kind, c.what, c.label, c.point_m, c.amount, bits)
         if first.unknown is not None:
             narrows = first.unknown.narrowed(first.made(made))
@@ -164,6 +193,7 @@ def arrays_of(known: Outlook) -> dict[str, np.ndarray]:
         "point_m": np.array([c.point_m or nowhere for c in known.candidates]),
         "cost": np.array([c.cost for c in known.candidates]),
         "amount": np.array([c.amount for c in known.candidates]),
+        "fixed": np.array([c.fixed for c in known.candidates]),
         **({} if (x := known.unknown) is None else
            {"unknown": np.array(x.name), "along": np.append(x.along, x.rest)}),
     }  # fmt: skip
@@ -183,10 +213,12 @@ def read_outlook(folder: Path) -> Outlook:
     try:
         with np.load(path, allow_pickle=False) as file:
             held = {name: file[name] for name in file.files}
-        held.setdefault("amount", np.zeros(len(held["cost"])))  # of runs before there was one
+        for name, kind in (("amount", float), ("fixed", bool)):  # runs before there was one
+            held.setdefault(name, np.zeros(len(held["cost"]), kind))
         where = [None if np.isnan(p).any() else tuple(p.tolist()) for p in held["point_m"]]
         each = zip(*(held[k].tolist() for k in ("kind", "what", "label")), where,
-                   held["cost"].tolist(), held["amount"].tolist(), strict=True)  # fmt: skip
+                   *(held[k].tolist() for k in ("cost", "amount", "fixed")),
+                   strict=True)  # fmt: skip
         names, rows = tuple(held["names"].tolist()), len(held["ends"])
         columns_ = [held["mean"].T, *(held[f"factor_{j}"] for j in range(len(names)))]
         parts = zip(*(np.split(c.astype(float), held["ends"][:-1]) for c in columns_), strict=True)

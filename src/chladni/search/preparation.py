@@ -31,7 +31,7 @@ from ..inference.least_data import NUMBERS, TAKEN, numbers, too_little
 from ..inference.likelihood import Responses, rms_over_lines
 from ..inference.map_fit import APART, unknowns
 from ..inference.pole_data import Poles
-from ..inference.sensor_errors import sensor_errors
+from ..inference.sensor_errors import gauge_errors, sensor_errors
 from ..progress import Progress, silent, within
 from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
 from ..reduced.reduced_model import evaluate
@@ -119,7 +119,8 @@ def _by_responses(
     lines, low = [f[f > above] for f in lines], max(low, above)
     refuse_silent(nominal, question.outputs, question.inputs)
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
+    test = question.outputs, question.inputs, built, question.accuracy
+    wrong = sensor_errors(*test)
     progress("the error of its mesh", 0.5)
     mesh = mesh_hidden(nominal, f_max, measured_on(question)) if fitted else []
     progress("the reduced model", 0.8)
@@ -140,7 +141,7 @@ def _by_responses(
             direct=question.outputs.moved_with_base(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.rebased(reduced.model))
-    nuisance = nuisances(reduced, nominal, mesh)
+    nuisance = [*nuisances(reduced, nominal, mesh), *gauge_errors(*test)]
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
     problem = updating_problem(question, reduced, data[0], nuisance, f_max)
@@ -150,9 +151,10 @@ def _by_responses(
         problem = replace(problem, data=data[0])
     unseen, held = (left_out.samples(d) for d in data)
     labels = question.outputs.labels
+    firm = int((found.firm & (found.frequency >= low) & (found.frequency <= f_max)).sum())
     notes = [
-        f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
-        f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
+        f"FRFs were compared: {firm} modes identified between {low:g} and {f_max:g} Hz, "
+        f"whitened residual {found.chi:.2f} (1 is the noise)",
         f"model and test were given {100 * ZETA:.0f} % damping for the search and "
         f"{100 * ZETA_Q:.0f} % for Q (damping equalisation): modes need no pairing, and damping "
         "cannot appear as stiffness",

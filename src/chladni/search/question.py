@@ -21,6 +21,7 @@ from ..inference.pole_data import Poles
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_mass_pairs
+from .next_measurement import FurtherPlaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,7 @@ class Question:
     article: str = ""  # of the recording that is fitted
     accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
     effects: tuple[str, ...] = ()  # names of the effects that are tried; empty: all
+    further: FurtherPlaces | None = None  # of sensors that may be added; None: anywhere
 
     def tested(self, assembly: Assembly) -> Assembly:
         """The article with the sensors of known mass on it, as it was measured."""

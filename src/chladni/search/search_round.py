@@ -141,8 +141,8 @@ def _leaders(
     bases, lead = dict[LocalOptimum, np.ndarray](), None
     for c in {(c.effect.text, *c.start): c for c in tried}.values():
         with suppress(*FAILED):
-            model = problem.reduced.model_for(c.effect, c.start)
-            own, base = problem.own_optimum(c.effect, c.start, (null.fit.x, problem.mean()), model)
+            about = null.fit.x, problem.mean()
+            own, base, model = problem.own_optimum(c.effect, c.start, about)
             if all(own.neg2_log_evidence < other.neg2_log_evidence for other in bases):
                 lead = model  # the only one of them that is kept
             bases[own] = base

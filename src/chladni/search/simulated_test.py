@@ -20,19 +20,20 @@ from ..errors import FileError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import modelled
+from ..geometry.grid_normals import normals_at
 from ..geometry.sampling import nearest_points
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import Fit, MassMeasurement, Status
-from ..inference.sensor_errors import sensor_errors
+from ..inference.sensor_errors import gauge_errors, sensor_errors
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
 from .candidates import candidates
 from .diagnosis import without_effects
-from .measurement_forecasts import COSTS, outlook
-from .next_measurement import Outlook
+from .measurement_forecasts import COSTS, WEIGHED, outlook
+from .next_measurement import FurtherTest, Outlook
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .preparation import (
     SOLVED,
@@ -61,6 +62,7 @@ def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows = question.outputs.rows(built), question.inputs.rows(built)
+    test = question.outputs, question.inputs, built, question.accuracy
     mesh = mesh_hidden(nominal, f_max, measured_on(question))
     reduced = ready_for_responses(question, nominal, f_max)
     f = equalised_lines((low, f_max), question.exclude, ZETA)
@@ -70,9 +72,10 @@ def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
         np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
         noise=np.full(shape, noise / LN10),
         direct=question.outputs.moved_with_base(question.inputs),
-        sensors=sensor_errors(question.outputs, question.inputs, built, question.accuracy),
+        sensors=sensor_errors(*test),
     ).rebased(reduced.model)  # fmt: skip
-    problem = updating_problem(question, reduced, unit, nuisances(reduced, nominal, mesh), f_max)
+    nuisance = [*nuisances(reduced, nominal, mesh), *gauge_errors(*test)]
+    problem = updating_problem(question, reduced, unit, nuisance, f_max)
     state = evaluate(reduced.model, problem.base, problem.mean())
     return replace(problem, data=replace(unit, values=unit.model(state)))
 
@@ -107,7 +110,10 @@ class FirstTest:
 
     def forecasts(self, kinds: Collection[str] = tuple(COSTS)) -> Outlook:
         """Forecasts of further measurements of some kinds."""
-        found = outlook(self.problem, self.hypotheses, self.names, self.probability, kinds)
+        found = outlook(
+            self.problem, self.hypotheses, self.names, self.probability, kinds,
+            self.question.further,
+        )  # fmt: skip
         assert found is not None
         return found
 
@@ -184,23 +190,44 @@ def _tested(
     return FirstTest(name, question, article, *explained(measured, reduced))
 
 
-def with_sensors(
-    test: FirstTest, further: MeasuredDofs, rng: np.random.Generator, noise: float = NOISE
+def with_further(
+    test: FirstTest, made: FurtherTest, rng: np.random.Generator, noise: float = NOISE
 ) -> FirstTest:
-    """The test with further sensors, of gain 1: its data stay, and all effects are fitted anew."""
-    question = replace(test.question, outputs=test.question.outputs.joined(further))
+    """The test with a further measurement: its data stay, and all effects are fitted anew.
+
+    Parameters
+    ----------
+    made : a sensor of gain 1, a drive, a wider band or a weighing
+    """
+    question = _with_further(test.question, made)
     gains = np.ones(len(question.outputs.labels))
-    n = len(test.article.gains)
-    gains[:n] = test.article.gains
+    gains[: len(test.article.gains)] = test.article.gains
     article = replace(test.article, gains=gains)
     problem, reduced = recorded(question, unmeasured(question, noise), article, rng, noise)
-    first, whole = test.problem.data, problem.data
+    first, data = test.problem.data, problem.data
     assert isinstance(first, Responses)
-    assert isinstance(whole, Responses)
-    data = replace(whole, values=np.concatenate([first.values, whole.values[:, n:]], axis=1))
-    weighed = test.problem.mass_measurement
-    problem = replace(problem, data=data, mass_measurement=weighed)
+    assert isinstance(data, Responses)
+    values = data.values.copy()
+    values[tuple(slice(n) for n in first.values.shape)] = first.values
+    problem = replace(problem, data=replace(data, values=values))
+    if made.kind != "weighing":
+        problem = replace(problem, mass_measurement=test.problem.mass_measurement)
     return FirstTest(test.name, question, article, *explained(problem, reduced))
+
+
+def _with_further(question: Question, made: FurtherTest) -> Question:
+    """The question of a test with a further measurement."""
+    if made.kind == "band":
+        return replace(question, band=(question.band[0], made.amount))
+    if made.kind == "weighing":
+        assert question.mass_measurement is not None
+        return replace(question, mass_measurement=replace(question.mass_measurement, sd=WEIGHED))
+    grid, zero = np.array([int(made.label.partition(":")[0])]), np.zeros(1)
+    normal, at = normals_at(question.assembly, grid), question.assembly.rows(grid)
+    place = MeasuredDofs((made.label,), grid, question.assembly.points[at], normal, zero, zero)
+    if made.kind == "drive":
+        return replace(question, inputs=question.inputs.joined(place))
+    return replace(question, outputs=question.outputs.joined(place))
 
 
 def recorded(

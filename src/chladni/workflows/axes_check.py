@@ -14,7 +14,6 @@ from ..ema.mode_pairing import pair
 from ..ema.shapes import driven_shapes
 from ..errors import FileError
 from ..fem.modelled import Modelled
-from .identify import firm
 
 OUTPUTS = 8  # with fewer, shapes along other axes are similar by chance
 SHARE = 0.5  # of the test's modes that must find a partner along the other axes
@@ -30,7 +29,7 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     Measured shapes are compared with the model's along the declared axes. The comparison is
     repeated for the five other orders of X, Y and Z, and for the normals of the surface.
     """
-    found = found.sel(firm(found))
+    found = found.sel(found.firm)
     if len(case.outputs.labels) < OUTPUTS or not found.order:
         return
     ways = case.outputs.directions

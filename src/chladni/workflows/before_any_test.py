@@ -1,7 +1,7 @@
 """Measurements that would keep explanations from being tied, before anything is measured."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,24 @@ from ..dynamics.modes import rigid_modes
 from ..effects.registry import family
 from ..errors import ArgumentError, FileError
 from ..fem.measured_dofs import MeasuredDofs
+from ..inference.expected_information import Rivals
 from ..inference.result import NextMeasurement
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
-from ..search.next_measurement import ADVISED, ODDS, advised, with_common_candidates
+from ..search.measurement_forecasts import COSTS
+from ..search.next_measurement import (
+    ADVISED,
+    ODDS,
+    FurtherPlaces,
+    Outlook,
+    advised,
+    with_common_candidates,
+)
 from ..search.question import Question
 from ..search.simulated_test import FirstTest, first_tests
 from .frf import layout_places
 from .loaded_model import DeckModels, Model, as_model, model_in_si, opened
+from .place_words import further_places
 
 MODES = 12  # elastic modes in the band of a planned test
 BELOW, ABOVE = 0.7, 1.05  # times the first and the last of them
@@ -46,14 +56,32 @@ class PlannedTests:
         """Tests that settle no explanation."""
         return tuple(t for t in self.tests if not t.settled(self.odds))
 
+    @property
+    def unsettled(self) -> tuple[FirstTest, ...]:
+        """Tests that do not settle the concealed effect: open ones, and wrong ones."""
+        return tuple(t for t in self.tests if not (t.right and t.settled(self.odds)))
+
+    def outlooks(self, kinds: Collection[str] = tuple(COSTS)) -> tuple[Outlook, ...]:
+        """Forecasts for the unsettled tests, with the candidates that all of them have.
+
+        After a wrong answer all explanations are even, as before the test.
+        """
+        every = []
+        for t in self.unsettled:
+            found = t.forecasts(kinds)
+            if t.settled(self.odds):
+                n = len(t.names)
+                found = replace(found, rivals=Rivals(np.full(n, 1 / n)))
+            every.append(found)
+        return with_common_candidates(every)
+
     def advised(
         self, count: int = ADVISED, without: Sequence[str] = ()
     ) -> tuple[NextMeasurement, ...]:
-        """The best further measurements over the articles that the planned test leaves open."""
-        if not self.open:
+        """The best further measurements over the articles that the planned test does not settle."""
+        if not self.unsettled:
             return ()
-        every = with_common_candidates([t.outlook for t in self.open])
-        return advised(every, count, self.odds, without)
+        return advised(self.outlooks(), count, self.odds, without)
 
 
 def before_any_test(
@@ -61,6 +89,7 @@ def before_any_test(
     sensors: Path | Any = None,
     *, top: float | None = None, articles: int = 1, seed: int = 0, odds: float = ODDS,
     units: str | None = None, allow: Sequence[str] = (), progress: Progress = silent,
+    further: FurtherPlaces | None = None,
 ) -> PlannedTests:  # fmt: skip
     """Test articles with each of the effects on a planned layout, and fit all effects to each.
 
@@ -72,6 +101,7 @@ def before_any_test(
         the case
     top : highest frequency [Hz]; default the band of the case, else the first ``MODES`` modes
     articles : with each effect
+    further : where further sensors may be; default by [plan] of the case
     """
     if len(set(effects)) < 2:
         raise FileError("--effects needs two and more effects, as weld-missing,adhesive-stiffness")
@@ -92,6 +122,7 @@ def before_any_test(
         band=band,
         hangers=case.setup.hangers if case else (),
         sensor_masses=sensor_masses(model.assembly, outputs, inputs),
+        further=further_places(case) if case and not further else further,
     )
     with one_blas_thread():
         tests = first_tests(question, effects, articles, seed=seed, progress=progress)

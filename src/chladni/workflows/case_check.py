@@ -18,6 +18,7 @@ from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import solved
 from ..geometry.nearest import ShellSurface
+from ..model.assembly import Assembly
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent, within
 from ..results import Result
@@ -171,8 +172,8 @@ NO_RECORDING = "all commands need one except modes, frf, plan, bench, render and
 BLOCKS = "nothing can be fitted until this is corrected"
 
 
-def _facts(case: Case) -> list[tuple[str, str]]:
-    made, mass = case.assembly, mass_properties(case.assembly)[0]
+def contents(made: Assembly) -> tuple[tuple[str, str], ...]:
+    """Grids and elements of a structure, its size and its mass, in words."""
     count = {
         "shells": len(made.shells), "solids": sum(map(len, made.solids)),
         "beams": len(made.beams), "springs and bushes": len(made.springs) + len(made.bushes),
@@ -180,14 +181,23 @@ def _facts(case: Case) -> list[tuple[str, str]]:
     }  # fmt: skip
     held = ", ".join(f"{n} {what}" for what, n in count.items() if n)
     size = " x ".join(f"{x:.3g}" for x in np.ptp(made.points, axis=0))
-    weighed = "not weighed"
+    return (
+        ("holds", f"{len(made.ids)} grids, {held}"),
+        ("size", f"{size} m"),
+        ("mass", f"{mass_properties(made)[0]:.5g} kg in the deck"),
+    )
+
+
+def _facts(case: Case) -> list[tuple[str, str]]:
+    content, size, mass_in_deck = contents(case.assembly)
+    mass, weighed = mass_properties(case.assembly)[0], "not weighed"
     if case.setup.mass is not None:
         away = f" ({100 * (case.setup.mass / mass - 1):+.2g} %)" if mass > 0 else ""
         weighed = f"{case.setup.mass:.5g} kg weighed{away}"
     out = [
-        ("deck", f"{case.deck.path.name} in {case.units.name}: {len(made.ids)} grids, {held}"),
-        ("size", f"{size} m"),
-        ("mass", f"{mass:.5g} kg in the deck, {weighed}"),
+        ("deck", f"{case.deck.path.name} in {case.units.name}: {content[1]}"),
+        size,
+        ("mass", f"{mass_in_deck[1]}, {weighed}"),
         *(("recording", said_of(r)) for r in case.recordings),
         *([] if case.recordings else [("recording", f"none yet: {NO_RECORDING}")]),
         ("sensors", f"{_several(case.outputs, 'output')}, {_several(case.inputs, 'input')}"),

@@ -32,7 +32,6 @@ from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
 from .given_case import Source, given_case
-from .identify import firm
 from .output_only import with_natural_frequencies
 from .question_of_case import nothing_measured, question_of
 from .screening_of_case import screened_by_model
@@ -134,7 +133,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     found = identified(test, case.band, use=use)
     screening = screened_by_model(case, found, model, use)
     q, notes = _quality(case, model, found, _band(case, test))
-    found = found.sel(firm(found) & found.inside)
+    found = found.sel(found.firm & found.inside)
     refuse_turned_axes(case, found, model)
     phi, psi = case.outputs.rows(model.structure) @ near.shapes, driven_shapes(found)
     alike = _Alike.of(phi, psi, near.frequency, found.frequency)
@@ -353,7 +352,8 @@ def _quality(
     except ChladniError as error:
         return None, (f"Q could not be calculated: {error}.",)
     note = (
-        f"Q compares responses with {100 * ZETA_Q:.0f} % damping on both sides, as in a diagnosis."
+        f"Q compares responses with {100 * ZETA_Q:.0f} % damping on both sides, as in a diagnosis. "
+        "Here it is of all channels; a diagnosis has it of fitted and of held-out data."
     )
     if case.gain_known:
         return quality(delta, f, bands), (note,)

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import FileError
+from ..units import units as unit_system
+from .case_check import contents
+from .unit_guess import doubt_of_units
 
 
 @dataclass(frozen=True)
@@ -23,15 +26,18 @@ class DeckCheck:
 
     cards: tuple[CardUse, ...]
     refused: str
+    facts: tuple[tuple[str, str], ...] = ()  # what of the structure, in words; needs its units
+    doubt: str = ""  # against these units
 
 
-def check_deck(path: Path, allow: Sequence[str] = ()) -> DeckCheck:
+def check_deck(path: Path, allow: Sequence[str] = (), units: str | None = None) -> DeckCheck:
     """List the cards of a deck, those not understood first, and try to make a structure of it.
 
     Raises
     ------
     FileError, ModelError
-        If the text is no deck, or its cards are understood and make no structure.
+        If the text is no deck, its cards are understood and make no structure, or its materials
+        are known only in another unit system than ``units``.
     """
     from ..io.nastran import assembly
     from ..io.nastran.read.analysis_requests import LEFT_OUT
@@ -62,5 +68,8 @@ def check_deck(path: Path, allow: Sequence[str] = ()) -> DeckCheck:
         refuse_unknown(deck, found)
     except FileError as error:
         return DeckCheck(tuple(out), str(error))
-    assembly(deck)
-    return DeckCheck(tuple(out), "")
+    made = assembly(deck, units)
+    if units is None:
+        return DeckCheck(tuple(out), "")
+    doubt = doubt_of_units(made, str(path), unit_system(units))
+    return DeckCheck(tuple(out), "", contents(made), doubt)

@@ -231,7 +231,8 @@ def _apply_held_out(
     found, distrust = concluded(case, decision)
     ahead = None
     if diagnosing:
-        ahead = outlook(prepared.problem, *open_explanations(case, decision, found))
+        rivals = open_explanations(case, decision, found)
+        ahead = outlook(prepared.problem, *rivals, allowed=made.question.further)
     plain = refined(made.question, prepared, found.plain, written=True)
     found = replace(found, plain=plain.hypothesis)
     if found.found is not None:

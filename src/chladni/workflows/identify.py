@@ -59,7 +59,7 @@ class RecordingModes:
     @property
     def firm(self) -> np.ndarray:
         """Among ``modes``, the ones known accurately enough to be reported as modes (r,) bool."""
-        return firm(self.modes) & ~self.struck
+        return self.modes.firm & ~self.struck
 
     @property
     def modal(self) -> ModalModel:
@@ -237,21 +237,16 @@ def _modes(
         frf, band, averages=averages, use=use,
         states=choice.states, drop=choice.drop, pick=choice.pick, progress=progress,
     )  # fmt: skip
+    diagram = stabilisation(frf, found, use, averages)
     if all(name.startswith(RELEASE) for name in frf.inputs):
         found = found.sel(~found.inside | clear(found))
         screening = Screening(recording.name)  # there is no force to hold channels against
     else:
         compared, calmer = others
-        screening = screened(recording, found, compared, calmer=calmer)
-    diagram = stabilisation(frf, found, use, averages)
+        spurious = ghosts(found, diagram)
+        screening = screened(recording, found, compared, calmer=calmer, spurious=spurious)
     found = without_window(found, recording.added_damping)
     return RecordingModes(recording, found, screening, diagram)
-
-
-def firm(modal: Identified) -> np.ndarray:
-    """Select poles known to 2 % in frequency and to half their damping: (r,) bool."""
-    known = modal.frequency_sd < 0.02 * modal.frequency
-    return known & (modal.damping_sd < 0.5 * modal.damping)
 
 
 def clear(found: Identified) -> np.ndarray:

@@ -10,7 +10,7 @@ from ..ema.identification import identify as identified
 from ..ema.response_correlations import free_decays, one_sided, responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
-from .identify import clear, firm
+from .identify import clear
 
 HIGHEST = 0.8  # of the highest frequency a record holds: above it filters fall off
 
@@ -46,7 +46,7 @@ def _identified(case: Case, recording: Recording) -> tuple[Identified, str]:
     found = identified(frf, (low, high), use=case.lines(frf.frequency))
     free = found.poles + sigma  # without what the window adds
     found = replace(found, poles=free)
-    known = found.sel(found.inside & firm(found) & (free.real < 0) & clear(found))
+    known = found.sel(found.inside & found.firm & (free.real < 0) & clear(found))
     if not known.order:
         raise FileError(
             f"{recording.name}: no natural frequency is above the noise of its {len(used)} "

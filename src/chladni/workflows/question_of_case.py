@@ -11,6 +11,7 @@ from ..errors import FileError
 from ..inference.map_fit import MassMeasurement
 from ..search.preparation import prepare
 from ..search.question import OtherRecording, Prepared, Question
+from .place_words import further_places
 from .unit_check import refuse_other_units
 
 
@@ -48,6 +49,7 @@ def question_of(case: Case) -> Question:
         sensor_masses=case.sensor_masses,
         accuracy=case.setup.accuracy,
         effects=case.effects,
+        further=further_places(case),
     )
     if frfs:
         first = case.recordings[0]

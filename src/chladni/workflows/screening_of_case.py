@@ -74,7 +74,8 @@ def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Fi
         said = f"the sensors weigh {sensor_masses:.3g} kg in all, the structure {deck:.3g} kg"
         if grams:
             said += (
-                f"; with a thousandth of that, Q against the model is {less:.2g}, as given {Q:.2g}"
+                f"; with a thousandth of that, smoothed Q against the model is {less:.2g}, as "
+                f"given {Q:.2g}"
             )
         if grams or sensor_masses > deck:
             heaviest = max(m for _, m in case.sensor_masses)

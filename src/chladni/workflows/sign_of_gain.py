@@ -34,7 +34,8 @@ def with_sign_of_gain(case: Case, model: Modelled | None = None) -> Case:
     Q = [min(seen.score(sign * H) for H in seen.answers()) for sign in (1, -1)]
     if Q[0] <= Q[1]:
         return case
-    return _negative(case, f"Q against the model is then {Q[1]:.2g}, as recorded {Q[0]:.2g}")
+    why = f"smoothed Q against the model is then {Q[1]:.2g}, as recorded {Q[0]:.2g}"
+    return _negative(case, why)
 
 
 def _negative(case: Case, why: str) -> Case:

@@ -13,9 +13,13 @@ from itertools import combinations
 import numpy as np
 
 from chladni.errors import ShapeError
+from chladni.inference.expected_information import SETTLED
 from chladni.search.next_measurement import ODDS, Outlook, with_common_candidates
 
-from .information import Candidates, candidates
+from .deletion import greedy
+from .exchange import exchange
+from .information import Candidates, candidates, value
+from .layout_rules import Rules, too_near
 
 
 def separating(every: Outlook | Sequence[Outlook], odds: float = ODDS) -> Candidates:
@@ -45,6 +49,29 @@ def separating(every: Outlook | Sequence[Outlook], odds: float = ODDS) -> Candid
     shape = np.max([r.shape for each in rows for r in each], axis=0)
     padded = np.array([[_padded(r, shape) for r in each] for each in rows])
     return candidates(padded, prior=np.ones(int(shape[1])))
+
+
+def separating_layout(
+    every: Sequence[Outlook], most: int, odds: float = ODDS, spacing: float = 0.0
+) -> tuple[list[int], float]:
+    """Positions of the fewest candidates that tell nearly all there is to tell, and their d.
+
+    Parameters
+    ----------
+    every : with the same candidates, all of them sensors
+    most : number of sensors
+    spacing : least distance between two [m]
+    """
+    plain = separating(every, odds)
+    c = candidates(plain.rows / np.sqrt(every[0].costs)[:, None, None], prior=plain.prior)
+    due = (1 - SETTLED) * sum(o.rivals.entropy for o in every)
+    rules = Rules(near=too_near(np.array([s.point_m for s in every[0].candidates]), spacing))
+    for n in range(1, min(most, len(c)) + 1):
+        begun = greedy(c, n, criterion="S", rules=rules)
+        kept = exchange(c, begun, criterion="S", rules=rules).tolist()
+        if sum(o.information(kept) for o in every) >= due:
+            break
+    return kept, float(np.sqrt(np.expm1(value("S", plain.fisher(np.array(kept))))))
 
 
 def _rows(known: Outlook, k: int, i: int, j: int) -> np.ndarray:

@@ -11,8 +11,8 @@ from chladni.errors import ChladniError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import write_assembly
 from chladni.view.surface import surface
+from chladni.workflows.place_words import centre_ids, further_places, place_rules
 from chladni_planning import PlanSettings, find_sensor_candidates, mounts_at, plan_test, sensors_csv
-from chladni_planning.place_words import centre_ids, place_rules
 from chladni_planning.plan_page import in_words
 from chladni_planning.plan_summary import summary
 from chladni_specimens.forms import FORMS
@@ -170,6 +170,29 @@ def test_a_case_states_the_same_words(tmp_path):
     (tmp_path / "case.toml").write_text(case.replace("here.csv", "../here.csv"))
     with pytest.raises(ChladniError, match=r"case.toml, line 5: \[plan\] regions"):
         chladni.plan(tmp_path, **few)
+
+
+def test_a_diagnosis_advises_what_the_case_allows(tmp_path):
+    """Allowed grids with their costs, and fixed sensors that have not measured yet."""
+    write_assembly(PANEL, tmp_path / "panel.bdf")
+    (tmp_path / "sensors.csv").write_text("label,role\n34:+X,output\n239:n,input\n")
+    case = '[model]\ndeck = "panel.bdf"\nunits = "SI"\n[test]\nsensors = "sensors.csv"\n'
+    (tmp_path / "case.toml").write_text(case)
+    assert further_places(chladni.load_case(tmp_path)) is None
+    plan = (
+        '[plan]\nregions = ["panel", "flanges"]\nforbidden = ["313:n"]\ncost = ["402:n=3"]\n'
+        'fixed = ["34:-X", "34:+Y"]\n'
+    )
+    (tmp_path / "case.toml").write_text(case + plan)
+    found = further_places(chladni.load_case(tmp_path))
+    at = dict(zip(found.grids.tolist(), found.cost.tolist(), strict=True))
+    assert 313 not in at
+    assert (at[402], at[187]) == (3.0, 1.0)
+    assert set(at) < set(PANEL.ids.tolist())
+    assert found.fixed.labels == ("34:+Y",)  # along X the grid has a sensor
+    (tmp_path / "case.toml").write_text(case + plan.replace("313", "9313"))
+    with pytest.raises(ChladniError, match=r"case.toml, \[plan\]: forbidden '9313:n'"):
+        further_places(chladni.load_case(tmp_path))
 
 
 def test_the_page_draws_allowed_places(tmp_path):

@@ -8,20 +8,26 @@ cost is a word with ``=`` and a number behind it, or a CSV file that has a colum
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from chladni.arrays import real_number
-from chladni.case.sensor_places import placed
-from chladni.ema.setup import Sensor
-from chladni.errors import LabelError
-from chladni.fem.measured_dofs import MeasuredDofs
-from chladni.io.tables.csv_table import read_table
-from chladni.io.tables.sensor_table import direction, read_sensors
-from chladni.model.assembly import Assembly
-from chladni.view.surface import Surface
+from ..arrays import real_number
+from ..case import Case
+from ..case.sensor_places import placed
+from ..ema.setup import Sensor
+from ..errors import LabelError
+from ..fem.measured_dofs import MeasuredDofs
+from ..io.tables.csv_table import read_table
+from ..io.tables.sensor_table import direction, read_sensors
+from ..model.assembly import Assembly
+from ..search.next_measurement import FurtherPlaces
+from ..view.surface import Surface, surface
 
 FILES = (".csv",)
+PLACES = ("regions", "fixed", "forbidden", "cost")  # keys of [plan]
+ONE_WAY = 0.99  # cosine of two directions that one sensor measures
+SAME_PLACE = 1e-3  # [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +38,45 @@ class PlaceRules:
     named: np.ndarray  # (n + m,) bool, allowed by its label: it need not be flat or off edges
     cost: np.ndarray  # (n + m,) of a sensor there, relative to other places
     fixed: MeasuredDofs  # sensors of every layout, wherever they are
+
+
+def stated_places(case: Case) -> dict[str, list[str]]:
+    """The words on places that [plan] of a case states, with the paths of its files."""
+    asked = case.asked
+    words: Mapping[str, Any] = asked.said.words
+    at = asked.said.places
+
+    def resolved(name: str, text: str) -> str:
+        return str(asked.file(text, at[name])) if text.lower().endswith(FILES) else text
+
+    return {name: [resolved(name, text) for text in words[name]]
+            for name in PLACES if name in words}  # fmt: skip
+
+
+def further_places(case: Case) -> FurtherPlaces | None:
+    """Where [plan] of a case lets further sensors be, without those that measured already."""
+    if not (stated := stated_places(case)):
+        return None
+    made = case.assembly
+    try:
+        rules = place_rules(made, surface(made), **stated)
+    except LabelError as error:
+        raise LabelError(f"{case.path}, [plan]: {error}") from None
+    return allowed_places(made, rules, case.outputs)
+
+
+def allowed_places(
+    assembly: Assembly, rules: PlaceRules, measured: MeasuredDofs | None = None
+) -> FurtherPlaces:
+    """The grids that rules allow, and their fixed sensors that have not measured."""
+    n = len(assembly.points)
+    free, held = rules.allowed[:n], rules.fixed
+    new = np.ones(len(held.labels), bool)
+    if measured is not None and len(measured.labels):
+        here = np.linalg.norm(held.points[:, None] - measured.points, axis=2) <= SAME_PLACE
+        along = np.abs(held.directions @ measured.directions.T) >= ONE_WAY
+        new = ~(here & along).any(axis=1)
+    return FurtherPlaces(assembly.ids[free], rules.cost[:n][free], held.only(new))
 
 
 def labels_not_allowed(
