@@ -155,3 +155,12 @@ def test_scatter_is_that_of_the_recording():
     ratio = 0.006 * (1 + 0.35 * share) * np.exp(0.08 * rng.normal(size=14))
     assert np.log(ratio).std() < SCATTER
     assert damping(np.linspace(70, 300, 14), ratio).following(share)[0] < LEAST_P
+
+
+def test_foam_that_damps_low_modes_many_times_is_found():
+    """Damping grows with the share, its logarithm less: a line through it would leave scatter."""
+    rng = np.random.default_rng(14)
+    f = np.geomspace(25, 270, 10)
+    share = np.minimum(1, rng.chisquare(1, size=10) * (30 / f) ** 2)
+    ratio = 0.008 * np.exp(0.25 * rng.normal(size=10)) + 0.3 * share
+    assert damping(f, ratio).following(share)[0] < LEAST_P

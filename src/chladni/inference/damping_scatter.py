@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
 
 from ..effects.identified_damping import SCATTER, TAILS, IdentifiedDamping, paired_with
 from ..ema.identification import Identified
@@ -23,6 +22,7 @@ FEWEST = 5  # modes below which the scatter is not tested
 UNSURE = 0.3  # sd of ln ζ from the identification above which a mode is left out
 STRONG = 0.02  # of the median share of χ²: a weaker pole may be spurious
 DRAWS = 4000
+STEEP = np.geomspace(0.3, 300, 13)  # times the damping that all modes share, of the largest share
 LEAST_LEFT = 0.1  # of a damping ratio remains at least when an effect's dissipation is removed
 
 
@@ -60,21 +60,30 @@ class ModalDamping(IdentifiedDamping):
     def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
         """P-value that damping follows a share (n,) of the modes by scatter alone; its statistic.
 
-        The statistic is exp of the component of ln ζ along the share, scaled to unit norm.  It is
-        the factor by which modes with more of the share are damped more.  The scatter is that of
-        the other components, as ``TAILS`` more modes of usual scatter would join them: Student's t.
-        A mean and a trend over ln f, as materials and air have it, are taken off both.
+        The curves are ln(ζ_0 + c share), c in ``STEEP``.  The statistic is the largest Student's t
+        of ln ζ along one of them, the scatter being that of the rest with ``TAILS`` more modes of
+        usual scatter.  A mean and a trend over ln f, as materials and air have it, are taken off.
         """
         f = np.log(self.frequency)
         common, _ = np.linalg.qr(np.column_stack([np.ones_like(f), f]))
-        along, rest = (y - common @ (common.T @ y) for y in (share, np.log(self.ratio)))
-        along = along / max(float(np.linalg.norm(along)), 1e-300)
-        grown, free = float(rest @ along), len(f) - 3 + TAILS
-        usual = SCATTER**2 + along**2 @ self.sd**2
-        sd = np.sqrt((rest @ rest - grown**2 + TAILS * usual) / free)
-        low, high = np.exp(sd * stdtrit(free, [0.005, 0.995]))
-        row = FitStatistic("damping where it is compliant", np.exp(grown), 1.0, low, high)
-        return float(stdtr(free, -grown / sd)), row
+        curve = np.log1p(STEEP[:, None] * share / max(float(share.max()), 1e-300))
+        curve = curve - curve @ common @ common.T
+        curve /= np.maximum(np.linalg.norm(curve, axis=1, keepdims=True), 1e-9)
+
+        def steepest(y: np.ndarray) -> np.ndarray:
+            y = y - y @ common @ common.T
+            along = y @ curve.T
+            left = (y**2).sum(axis=1, keepdims=True) - along**2 + TAILS * SCATTER**2
+            return np.asarray((along / np.sqrt(left / (len(f) - 3 + TAILS))).max(axis=1))
+
+        rng = np.random.default_rng(20250105)
+        scatter = SCATTER * np.exp(LOG_SD * rng.normal(size=(DRAWS, 1)))
+        own = steepest(np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(f))))
+        seen = float(steepest(np.log(self.ratio)[None])[0])
+        median, low, high = np.quantile(own, (0.5, 0.005, 0.995))
+        each = np.exp(np.array([seen, median, low, high]) - median)
+        row = FitStatistic("damping where it is compliant", *map(float, each))
+        return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
 
     def said(self) -> tuple[str, str, tuple[float, ...]]:
         """Sentence on the modes that stand out, their place, and their frequencies [Hz]."""
