@@ -39,7 +39,7 @@ TURNS = (-np.pi / 8, -np.pi / 16, np.pi / 16, np.pi / 8)
 STRETCHED = (0.7, 1.4)  # times its length
 NEIGHBOUR_DISTANCE = 1.7  # of a shell's size: distance of its neighbours
 WORTH = 0.05  # least gain of a move in -2 ln posterior
-FOLLOWED = 2  # lines that are fitted
+FOLLOWED = 8  # lines whose own optima are found; a score about the null tells them apart badly
 STEPS, BETTER = 4, 0.5  # moves of a fitted line, and the least gain of each in -2 ln posterior
 AROUND = (-0.7, 0.0, 0.7)  # strengths about that of the fit
 
@@ -251,7 +251,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if first and context.scan is not None:
         ends, tried = _at_rest(context.scan, len(context.bases) - 1, lines, first)
     effects = [crack(groups, line, tried) for line in ends]
-    return best_places(context, effects, FOLLOWED)
+    return best_places(context, effects, FOLLOWED, anywhere=True)
 
 
 def _at_rest(
