@@ -132,7 +132,7 @@ def _plain(block: Block) -> dict[str, Any]:
     """A block as JSON; a picture by its name in the folder."""
     if isinstance(block, Picture):
         block = replace(block, path=Path(block.path.name))
-    return asdict(block)
+    return {"kind": type(block).__name__.lower(), **asdict(block)}
 
 
 def _block(data: Mapping[str, Any], folder: Path) -> Block:

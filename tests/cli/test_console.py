@@ -111,16 +111,6 @@ def test_words_that_no_command_takes_are_one_sentence(words, said, more):
     assert line.endswith(f"; see `{' '.join(['chladni', more]).strip()} --help`")
 
 
-def test_a_command_that_takes_a_case_drafts_one_of_a_deck_and_a_recording(deck, tmp_path):
-    (tmp_path / "rec 1.uff").write_text("")
-    done = call("correlate", deck, tmp_path / "rec 1.uff", "--units", "mm-t-s")
-    assert (done.exit_code, done.stdout) == (2, "")
-    assert done.stderr == (
-        f"chladni: correlate takes a case; draft one: chladni init {deck} '{tmp_path}/rec 1.uff' "
-        f"--units mm-t-s --out {deck.stem}\n"
-    )
-
-
 @pytest.mark.parametrize("words", [[], ["blind"], ["--help"], ["modes", "--help"]])
 def test_who_asks_for_nothing_is_shown_the_help(words):
     done = call(*words)

@@ -6,7 +6,6 @@ import inspect
 import math
 import os
 import re
-import shlex
 import signal
 import sys
 import threading
@@ -28,7 +27,6 @@ from ..extensions import installed
 from .console import console, opened_console, say
 
 GROUP = "chladni.commands"
-OF_A_CASE = ("correlate", "check")  # commands that compare, and take no deck with a recording
 BUILT_IN = (  # each a module here with a function ``run``, or ``STEPS`` of a command with several
     "diagnose",
     "init",
@@ -77,14 +75,13 @@ class OneSentenceGroup(TyperGroup):
         try:
             code = super().main(*args, **options)
         except _UsageError as error:
-            given = options.get("args", args[0] if args else None)
-            code = _misused(error, sys.argv[1:] if given is None else list(given))
+            code = _misused(error)
         except typer.Abort:
             code = INTERRUPTED
         raise SystemExit(code or DONE)
 
 
-def _misused(error: Any, given: list[str]) -> int:
+def _misused(error: Any) -> int:
     """Report an error in a command line, and the command that lists the valid words."""
     text, at = error.format_message(), error.ctx
     if at is None or text == at.get_help():  # asked for nothing: the help itself
@@ -92,8 +89,6 @@ def _misused(error: Any, given: list[str]) -> int:
         return AT_FAULT
     known = at.command.list_commands(at) if isinstance(at.command, TyperGroup) else []
     there = f"; there are {', '.join(known)}" if known else ""
-    if case := _case_of(at, given):
-        return _said(f"{at.info_name} takes a case; draft one: {case}", AT_FAULT)
     words: list[str] = []
     while at.parent is not None:
         words, at = [at.info_name, *words], at.parent
@@ -101,15 +96,6 @@ def _misused(error: Any, given: list[str]) -> int:
     text = _TOO_MANY.sub(r"too many words: \1", text)
     text = text[:1].lower() + text[1:].rstrip(".").replace(". Did you", "; did you")
     return _said(f"{text}{there}; see `{shown}`".replace("?;", "?"), AT_FAULT)
-
-
-def _case_of(at: Any, words: list[str]) -> str:
-    """The command that drafts a case of the files and units of a command line; "" without files."""
-    files = [w for w in words if Path(w).is_file() and Path(w).suffix != ".toml"]
-    if len(files) < 2 or at.info_name not in OF_A_CASE:
-        return ""
-    units = words[words.index("--units") :][:2] if "--units" in words else []
-    return shlex.join(["chladni", "init", *files, *units, "--out", Path(files[0]).stem])
 
 
 def application(only: str | None = None) -> typer.Typer:
