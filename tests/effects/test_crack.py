@@ -203,6 +203,19 @@ def test_a_sheet_too_coarse_for_a_line_has_none():
     assert candidates(context) == []
 
 
+def test_two_lines_are_followed_where_each_is_fitted_jointly():
+    """Natural frequencies alone have no own optima of an effect next to a linear base."""
+    groups = element_groups(structure(plate(0.4, 0.3, 24, 18, 1.5e-3)))
+
+    def scores(effect, starts, extended=False):
+        return np.array([[np.sin(40 * effect.point[0]) + np.cos(50 * effect.point[1])]])
+
+    context = SimpleNamespace(
+        scan=None, where=SimpleNamespace(groups=groups), scores=scores, bases=(None,)
+    )
+    assert len(candidates(context)) == 2
+
+
 def test_something_is_always_left():
     x = np.linspace(-50, 50, 11)
     assert all(LEAST_LEFT <= left(v) <= 1 for v in x)

@@ -251,6 +251,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if first and context.scan is not None:
         ends, tried = _at_rest(context.scan, len(context.bases) - 1, lines, first)
     effects = [crack(groups, line, tried) for line in ends]
+    if context.scan is None:  # every candidate is fitted jointly
+        return best_places(context, effects)
     return best_places(context, effects, FOLLOWED, anywhere=True)
 
 
