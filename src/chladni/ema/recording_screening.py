@@ -20,6 +20,7 @@ from .channel_delays import channel_delays
 from .finding import Check, Finding, Screening
 from .frf_maps import Misreading, mapped, misreadings
 from .identification import Identified, identify
+from .roving_mass import NAME as ROVING
 from .roving_mass import roving_mass
 from .screening import levels_checked
 from .setup import Recording
@@ -80,7 +81,10 @@ def screened(
     checks += check
     strong = None if found is None else strong_modes(found)
     read = other_readings(frf, strong, use) if strong is not None and alone else []
-    more, one = roving_mass(frf, None if read else found)  # misread, each output has other poles
+    if read:  # each output has other poles
+        more, one = [], Check(ROVING, "needs the recording in its right reading", None)
+    else:
+        more, one = roving_mass(frf, found)
     findings += more
     checks.append(one)
     if found is not None and strong is not None:
