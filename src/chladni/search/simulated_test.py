@@ -187,7 +187,7 @@ def _tested(
     except (ModelError, ValueError, IndexError) as error:
         raise FileError(f"{name}: this deck has nothing that it acts on ({error})") from error
     measured, reduced = recorded(question, problem, article, rng, noise)
-    return FirstTest(name, question, article, *explained(measured, reduced))
+    return explained(name, question, article, measured, reduced)
 
 
 def with_further(
@@ -212,7 +212,7 @@ def with_further(
     problem = replace(problem, data=replace(data, values=values))
     if made.kind != "weighing":
         problem = replace(problem, mass_measurement=test.problem.mass_measurement)
-    return FirstTest(test.name, question, article, *explained(problem, reduced))
+    return explained(test.name, question, article, problem, reduced)
 
 
 def _with_further(question: Question, made: FurtherTest) -> Question:
@@ -253,9 +253,10 @@ def recorded(
 
 
 def explained(
-    measured: UpdatingProblem, reduced: ReducedProblem
-) -> tuple[UpdatingProblem, ReducedProblem, tuple[HypothesisFit, ...], tuple[str, ...], np.ndarray]:
-    """Fit all families of a problem to its recording: the last five fields of a test."""
+    name: str, question: Question, article: Article, measured: UpdatingProblem,
+    reduced: ReducedProblem,
+) -> FirstTest:  # fmt: skip
+    """The test of an article, with all families of the problem fitted to its recording."""
     measured, null = without_effects(measured)
     found = search_round(measured, null, candidates(measured, null), silent)
     by_name = {h.effect.name: h for h in found}
@@ -265,7 +266,7 @@ def explained(
     fits = tuple(by_name[n] for n in names)
     S = np.array([h.neg2_log_evidence for h in fits])
     p = np.maximum(np.exp(-(S - S.min()) / 2), LEAST)
-    return measured, reduced, fits, names, p / p.sum()
+    return FirstTest(name, question, article, measured, reduced, fits, names, p / p.sum())
 
 
 def _article(question: Question, made: Assembly) -> Article:
