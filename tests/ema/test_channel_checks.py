@@ -181,8 +181,9 @@ def test_a_wrong_quantity_is_named(quantity: str) -> None:
     modes = identify(wrong, use=np.arange(len(F)) % 3 == 0)
     screening = screened(Recording("a", wrong), modes)
     found = screening.findings
-    roving = next(c for c in screening.checks if c.name == "one mass at all outputs")
-    assert (roving.passed, "right reading" in roving.result) == (None, True)
+    if quantity == "mobility":  # found by reading it otherwise; a receptance by its level
+        roving = next(c for c in screening.checks if c.name == "one mass at all outputs")
+        assert (roving.passed, "right reading" in roving.result) == (None, True)
     for known in (True, False):
         more, _ = level_checks(*gains(wrong, modes), known_gain=known, outputs=N)
         named = [f for f in (*found, *more) if f.kind == "wrong quantity"]
