@@ -242,8 +242,16 @@ def test_of_one_explanation_the_least_known_quantity_is_narrowed(problem, tied, 
     ],
 )
 def test_a_quantity_is_named_once(parameter, text, said):
-    effect = SimpleNamespace(text=text, name="suspension")
-    assert quantity_of(effect, parameter) == said
+    nowhere = SimpleNamespace(point_m=None, text="")
+    effect = SimpleNamespace(text=text, name="suspension", location=lambda x: nowhere)
+    assert quantity_of(effect, parameter, np.zeros(1)) == said
+
+
+def test_a_quantity_is_named_where_its_effect_was_found():
+    """A fit moves an effect from the place where it began."""
+    found = SimpleNamespace(point_m=(0.0, 0.3, 0.0), text="near grid 18")
+    effect = SimpleNamespace(text="at grid 58", name="point-mass", location=lambda x: found)
+    assert quantity_of(effect, "M", np.zeros(3)) == "M near grid 18"
 
 
 def test_a_mean_over_cases_is_advised(found):

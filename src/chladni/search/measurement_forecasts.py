@@ -163,7 +163,7 @@ def _unknown(rival: Rival, kept: np.ndarray, seen: Sequence[Predicted]) -> OpenQ
     own = rival.hypothesis.effects
     own = own if any(e.parameters for e in own) else fit.effects
     wanted = [e in own and (e.kind != "nuisance") for e in fit.effects for _ in e.parameters]
-    names = [quantity_of(e, p.name) for e in fit.effects for p in e.parameters]
+    names = [quantity_of(e, p.name, fit.of(e)) for e in fit.effects for p in e.parameters]
     along = L[: len(names)] @ kept
     total = (L[: len(names)] ** 2).sum(axis=1)
     taken = sum(
@@ -173,9 +173,11 @@ def _unknown(rival: Rival, kept: np.ndarray, seen: Sequence[Predicted]) -> OpenQ
     return OpenQuantity(names[k], along[k], float(max(total[k] - along[k] @ along[k], 0.0)))
 
 
-def quantity_of(effect: Effect, parameter: str) -> str:
-    """A parameter and where it acts; the text of a calibration effect begins with its own."""
+def quantity_of(effect: Effect, parameter: str, x: np.ndarray) -> str:
+    """A parameter and where it acts at x; the text of a calibration effect begins with its own."""
+    found = effect.location(x)
     text = effect.text or effect.name
+    text = text if found.point_m is None else found.text
     return text if text.startswith(f"{parameter} of ") else f"{parameter} {text}".strip()
 
 
