@@ -318,15 +318,28 @@ class UpdatingContext:
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
         """Score of each fastener with some of its stiffness left (n, k)."""
-        base, reduced = self.baselines[about], self.problem.reduced
-        return fastener_scores(base, reduced, self.data, self.loosened, left)
+        return self._loosened_once(about, self.loosened, left, (about,))
 
     def run_scores(
         self, about: int, row: int, first: int, last: int, left: np.ndarray
     ) -> np.ndarray:
         """Score of a run of a row with some of its stiffness left (k,)."""
-        base, run = self.baselines[about], self.fastener_rows[row].run(first, last)
-        return fastener_scores(base, self.problem.reduced, self.data, [run], left[None])[0]
+        run = self.fastener_rows[row].run(first, last)
+        return self._loosened_once(about, [run], left[None], (about, row, first, last))[0]
+
+    def _loosened_once(
+        self, about: int, joints: Sequence[Loosened], left: np.ndarray, key: tuple[int, ...]
+    ) -> np.ndarray:
+        """Scores (n, k) of joints that ``key`` names; several families try the same ones."""
+        known, key_too = self._loose, (key, left.tobytes())
+        if key_too not in known:
+            base, reduced = self.baselines[about], self.problem.reduced
+            known[key_too] = fastener_scores(base, reduced, self.data, joints, left)
+        return known[key_too]
+
+    @cached_property
+    def _loose(self) -> dict[tuple[tuple[int, ...], bytes], np.ndarray]:
+        return {}
 
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
