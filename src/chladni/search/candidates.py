@@ -28,7 +28,7 @@ from ..inference.scan import (
 )
 from ..parallel import in_parallel
 from ..reduced.local_effect import LocalEffect
-from ..reduced.reduced_model import evaluate
+from ..reduced.reduced_model import Reduced, evaluate
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .pole_starts import global_starts
 
@@ -229,6 +229,8 @@ class UpdatingContext:
         if local is None:
             wider = extended or effect.release is not None
             model = (reduced.model_for if wider else model.split_for)(effect, starts[0])
+            if "" not in model.linear:
+                self._components[effect.text] = model  # every start of the effect is scored on it
         data = self.problem.data.rebased(model)
         ways = WIDE if isinstance(data, Poles) else (0.0,)
         out = np.full((len(ways), len(starts)), np.inf)
@@ -250,6 +252,10 @@ class UpdatingContext:
                 r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
+
+    @cached_property
+    def _components(self) -> dict[str, Reduced]:
+        return {}
 
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
