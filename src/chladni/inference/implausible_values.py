@@ -38,8 +38,8 @@ def in_doubt(plain: Fit, null: Fit, coarse: bool = False) -> tuple[str, ...]:
     if coarse and own and not (implausible_values(null) or _far_together(null)):
         return (
             f"{'; '.join(far)}: that is the mesh of the deck, whose frequencies are off by up to "
-            f"{100 * _of_mesh(null):.2g} %; refine it and diagnose again, because an effect smaller "
-            "than this error is not seen",
+            f"{100 * _of_mesh(null):.2g} %; refine it and diagnose again, because an effect "
+            "smaller than this error is not seen",
         )
     return (
         f"calibration alone explains the recording, but {'; '.join(far)}: measure it first, and "
