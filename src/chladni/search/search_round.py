@@ -59,8 +59,8 @@ def search_round(
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
         give_back_freed_memory()
     worst = BEHIND + min((t.neg2_log_evidence for t in hypotheses), default=0.0)
-    further = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
-    hypotheses = _lighter(problem, by_family([t for fits in further for t in fits]), whole)
+    more = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
+    hypotheses = _lighter(problem, by_family([t for fits in more for t in fits]), whole)
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(hypotheses, null.neg2_log_evidence)
     progress("refining the place", 0.8)
