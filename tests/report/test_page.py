@@ -179,7 +179,7 @@ def test_a_mesh_too_coarse_is_told_where_the_updated_deck_is_worse(written, told
     """Named it may be for all that: the error of the mesh is in both models then."""
     held = {**DIAGNOSIS["fit"]["held_out"], "Q_with_effect": written, "Q_with_nuisances": 0.009}
     d = {**DIAGNOSIS, "fit": {**DIAGNOSIS["fit"], "held_out": held}}
-    assert ("and to 0.009 with errors of mesh" in sentence(from_json(d))) == told
+    assert ("; Q is 0.009 with errors of mesh" in sentence(from_json(d))) == told
 
 
 def test_a_missing_picture_is_a_sentence_and_no_page(tmp_path):
