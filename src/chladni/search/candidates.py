@@ -251,6 +251,17 @@ class UpdatingContext:
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
 
+    def own(self, effect: Effect, start: np.ndarray) -> tuple[float, np.ndarray]:
+        """-2 ln evidence at the own optimum of an effect, and the optimum; inf without one."""
+        if self.scan is None:
+            return float(self.scores(effect, [start], True).min()), start
+        bases = (self.null, self.bases[0]) if self.about is None else (self.about,)
+        try:
+            found, *_ = self.problem.own_optimum(effect, start, bases)
+        except FAILED:
+            return np.inf, start
+        return found.neg2_log_evidence, found.x
+
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
         base, model = self.baselines[-1], self.problem.reduced.model
