@@ -287,7 +287,7 @@ def _with_doubt(case: Hypotheses, decision: Decision) -> Decision:
     """
     plainly = decision.verdict in ("nothing missing", "calibration only")
     small = not plainly and decision.reason is Reason.NOTHING_DUE
-    unfit = small or not plainly and decision.reason in (Reason.TOO_LITTLE, Reason.WORSE)
+    unfit = small or (not plainly and decision.reason in (Reason.TOO_LITTLE, Reason.WORSE))
     news = decision.news or 0.0
     if not (decision.order and (plainly or unfit)) or (unfit and news < 0):
         return decision
