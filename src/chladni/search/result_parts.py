@@ -321,6 +321,10 @@ def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
         return "it contains no further information"
     if not diagnosis.hypotheses:
         return "it exceeds the noise; a diagnosis shows whether physics is missing"
+    if diagnosis.unexplained and diagnosis.one_of:
+        return "mesh error and scatter do not account for it, and one of these may: " + ", ".join(
+            diagnosis.one_of
+        )
     if diagnosis.unexplained:
         return "no effect tried accounts for it, nor do mesh error and scatter in the parts"
     lead = diagnosis.hypotheses[0]
