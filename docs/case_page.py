@@ -115,9 +115,9 @@ or sealant on it weighs more than its steel: give rho an `sd` that covers it.
 Without any `[[parameter]]` these are free: E of every part of shells and beams, t of shells, the
 wall of tubes, and rho of every material. Stiffeners on a sheet have their offset as well. A deck
 with neither shells nor beams has all dimensions in its mesh. There E and rho of every material of
-solids are free, those of steel and aluminium by 0.03 and 0.005. Bars between two spiders hold
-sheets together: they are joints, and are
-not freed by themselves.
+solids are free, those of steel and aluminium by 0.03 and 0.005. Bars between two spiders, and short
+ones from sheet to sheet, hold sheets together. They are joints, and are not freed by
+themselves.
 
 | of | can be freed |
 |---|---|

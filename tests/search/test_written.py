@@ -14,6 +14,7 @@ from chladni.effects.joint_stiffness import ADHESIVE, ModelFamily
 from chladni.effects.model_errors import MeshError, mesh_errors
 from chladni.effects.orthotropy import orthotropic
 from chladni.effects.sheets import StiffnessPatch, ThicknessDistribution
+from chladni.effects.user_parameters import freed_effect
 from chladni.errors import ModelError
 from chladni.fem.modelled import modelled
 from chladni.inference import written_hypothesis
@@ -120,6 +121,19 @@ def test_what_was_found_is_told_beside_what_the_written_deck_has(hypothesis):
     assert of_states.estimate.value == of_states.written_value == E.written_value
     (untouched,) = calibrated(replace(named, verdict=LITTLE))
     assert untouched.written_value == untouched.deck_value == nominal
+
+
+def test_each_of_several_values_of_one_parameter_has_its_name(reduced):
+    """The four values of a freed orthotropic sheet are told apart."""
+    sheet = freed_effect(orthotropic(reduced.groups, (0,), np.array([1.0, 0, 0])), "material")
+    x = np.zeros(len(sheet.parameters))
+    fit = SimpleNamespace(effects=(sheet,), of=lambda e: x, sd=lambda e: x + 0.1)
+    one = SimpleNamespace(fit=fit)
+    found = SimpleNamespace(
+        as_deck=None, plain=one, found=None, null=one, verdict=NAMED, shared=False
+    )
+    names = [c.where.split(" of ")[0] for c in calibrated(found)]
+    assert names == ["material: E1", "material: E2", "material: G12", "material: nu mean"]
 
 
 NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"

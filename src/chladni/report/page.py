@@ -45,8 +45,8 @@ def diagnosis_page(
     Parameters
     ----------
     result : DiagnosisResult
-    figures : dict     pictures by name; those of a drawing replace it on paper, known names are put
-                       in their section (``verdict.PLACES``), others at the end
+    figures : dict     pictures by name; those of a drawing replace it on paper, the others stand at
+                       the end
     notes : sentences  what was done and why
     tables : sections  anything more, put before the files
     command : str      the line that makes this run again
@@ -55,7 +55,7 @@ def diagnosis_page(
     """
     from .next_steps import next_steps
     from .sentence import sentence
-    from .verdict import HEADING, TONE, sections, three_numbers
+    from .verdict import TONE, badge, sections, three_numbers
 
     shown = {name: Path(path) for name, path in (figures or {}).items()}
     hero: Block | None = next((d for d in drawn if d.name == "where"), None)
@@ -65,7 +65,7 @@ def diagnosis_page(
         title or "Diagnosis",
         sections(result, shown, notes, tables, command, drawn),
         lead=sentence(result),
-        badge=HEADING.get(result.verdict, result.verdict),
+        badge=badge(result),
         tone="warn" if result.distrust else TONE.get(result.verdict, "neutral"),
         hero=hero,
         facts=three_numbers(result),

@@ -165,7 +165,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     if not diagnosing:
         reasons = compensating(
             found.plain.fit, result.agreement, result.mass, question.mass_measurement,
-            result.residual_localisation,
+            result.residual_localisation, result.compared == "responses",
         )  # fmt: skip
         distrust = (*distrust, *reasons)
         if study is not None:
