@@ -92,7 +92,8 @@ def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, w
     assert done == fitted
     assert found[0].fit.neg2_log_evidence == min(joint[k] for k in fitted)
     known = {found[0].effect.k, *(v.effect.k for v in found[0].optima)}
-    assert known == {k for k in range(3) if expected[k] is not None}
+    left_out = {0, 1} if worst == 29.0 else set()  # a linear 50 is no rival of a joint 60
+    assert known == {k for k in range(3) if expected[k] is not None} - left_out
 
 
 def hypothesis_of(effect, evidence):

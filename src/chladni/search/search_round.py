@@ -136,13 +136,16 @@ class _Others:
     ) -> list[HypothesisFit]:
         """Fit those jointly that may become the best of the family, and better than ``worst``.
 
-        The linear base may be as wrong about another as it was about the best.
+        The linear base may be as wrong about another as it was about the best. What is not fitted
+        is known only where it cannot be better than the best fit.
         """
         fits, slack = [lead], self.slack
         for k, own in enumerate(self.optima):
             expected = own.neg2_log_evidence
-            if expected - slack > min(fits[0].neg2_log_evidence, worst):
-                return [fits[0].knowing(self.optima[k:]), *fits[1:]]
+            best = fits[0].neg2_log_evidence
+            if expected - slack > min(best, worst):
+                behind = [v for v in self.optima[k:] if v.neg2_log_evidence - slack > best]
+                return [fits[0].knowing(behind), *fits[1:]]
             found = _tried(problem, null, own.effect, own.x, self.bases[own])
             slack = max([slack, *(abs(expected - t.neg2_log_evidence) for t in found)])
             fits = sorted([*fits, *found], key=lambda t: t.neg2_log_evidence)
