@@ -106,16 +106,18 @@ Without `sd` the class of the material decides, recognised from the deck's E and
 | aluminium alloys (65 to 76 GPa, 2600 to 2900 kg/m³) | 0.03 | 0.005 | 0.04 | 0.05 |
 | others, solids, and bars that have no wall | 0.06 | 0.06 | 0.05 | 0.05 |
 
-It is 0.1 for nu, 0.2 for nu12 and 0.3 for all else. Sources: JCSS (2001), Probabilistic Model Code,
-parts 2.1 and 3.2; ASM (1990), Metals Handbook; EN 10131 and EN 485-4, whose limits count as two
-standard deviations. A sheet with paint or sealant on it weighs more than its steel: give rho an
-`sd` that covers it.
+It is 0.1 for nu, 0.2 for nu12 and 0.3 for all else. The offset of a stiffener has half the
+thickness of its sheet over the offset: some measure it from the middle of the sheet, some from its
+face. Sources: JCSS (2001), Probabilistic Model Code, parts 2.1 and 3.2; ASM (1990), Metals
+Handbook; EN 10131 and EN 485-4, whose limits count as two standard deviations. A sheet with paint
+or sealant on it weighs more than its steel: give rho an `sd` that covers it.
 
 Without any `[[parameter]]` these are free: E of every part of shells and beams, t of shells, the
-wall of tubes, and rho of every material. A deck with neither shells nor beams has all
-dimensions in its mesh. There E and rho of every material of solids are free, those of steel and
-aluminium by 0.03 and 0.005. Bars between two spiders hold sheets together: they are joints, and are
-not freed by themselves.
+wall of tubes, and rho of every material. Stiffeners on a sheet have their offset as well. A deck
+with neither shells nor beams has all dimensions in its mesh. There E and rho of every material of
+solids are free, those of steel and aluminium by 0.03 and 0.005. Bars between two spiders, and short
+ones from sheet to sheet, hold sheets together. They are joints, and are not freed by
+themselves.
 
 | of | can be freed |
 |---|---|
@@ -123,7 +125,7 @@ not freed by themselves.
 | orthotropic shells | E, rho, t, E1, E2, G12, nu12 |
 | laminates | E (one factor on all moduli), rho, t |
 | solids | E, rho, nu |
-| beams | E, rho |
+| beams | E, rho; offset: one factor on `W1A` to `W3B` where they are given |
 | closed tubes | wall: one factor on A, I1, I2, I12 and J, whatever card they stand in |
 | springs (`PELAS`, `CELAS2`), bushes and connectors (`PBUSH`, `PBUSH1D`, `PWELD`, `PFAST`) | K |
 | `CONM2` | M |

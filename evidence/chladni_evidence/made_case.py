@@ -220,10 +220,11 @@ def _calibration_parameters(deck: Assembly, article: Assembly) -> dict[str, Any]
         else:
             continue
         volume = area[deck.shells.part == k].sum()
-        if isinstance(was.section, BeamSection):  # stringers, which the article has as sheets
+        if isinstance(was.section, BeamSection):
             volume = was.section.area * length[deck.beams.part == k].sum()
-        for q in ("E", "rho"):
-            known[q][p.name] = value(p, q)
+        if isinstance(was.section, type(p.section)):  # E of a bar also stands for a sheet's t
+            known["E"][p.name] = value(p, "E")
+        known["rho"][p.name] = value(p, "rho")
         weight[p.name] = float(volume * value(p, "rho"))
     return {"values": known, "part_mass_kg": weight}
 

@@ -238,11 +238,12 @@ def _refuse_taken(names: Sequence[str], columns: Collection[str]) -> None:
 
 def _choices(assembly: Assembly) -> str:
     """The parameters that can be varied, as advice for an error message."""
-    parts = [p for p in assembly.parts if fields_of(p)]
-    if not parts:
+    having = [(p.name, f) for k, p in enumerate(assembly.parts) if (f := fields_of(assembly, k))]
+    if not having:
         return 'give for example --vary "K=50%:200%"'
-    some = ", ".join(f"{p.name} ({', '.join(fields_of(p))})" for p in parts[:6])
-    return f'give --vary "{fields_of(parts[0])[0]} of {parts[0].name}=90%:110%"; there are {some}'
+    some = ", ".join(f"{name} ({', '.join(fields)})" for name, fields in having[:6])
+    (name, fields), *_ = having
+    return f'give --vary "{fields[0]} of {name}=90%:110%"; there are {some}'
 
 
 def _places(varied: Sequence[Variation], own: np.ndarray) -> np.ndarray:

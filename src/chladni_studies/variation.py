@@ -68,7 +68,7 @@ def of_case(
                 f'(--vary "{free.field}=LOW:HIGH" varies an effect with one number).'
             )
             continue
-        sd = sd_of(assembly.parts, free)
+        sd = sd_of(assembly, free)
         low = float(np.exp(-_SDS * sd)) if free.low is None else free.low
         high = float(np.exp(_SDS * sd)) if free.high is None else free.high
         nominal, unit = _nominal(assembly, free, True)
@@ -147,7 +147,13 @@ def _scale(
     moment = units.force * units.length if unit == "N m/rad" else units.force / units.length
     return {
         **dict.fromkeys(("E", "E1", "E2", "G12"), units.stress),
-        **{"rho": units.density, "t": units.length, "K": moment, "M": units.inertia},
+        **{
+            "rho": units.density,
+            "t": units.length,
+            "offset": units.length,
+            "K": moment,
+            "M": units.inertia,
+        },
     }.get(free.field, 1.0)
 
 

@@ -121,13 +121,16 @@ def test_a_line_that_was_fitted_goes_on_to_a_better_one_beside_it():
     true = lines.through(9 * 24 + 12, turned, 2.4)
     strong = np.array([0.4])
 
-    def scores(effect, starts):
+    def scores(effect, starts, extended):
         far = missed(lines, true, [effect.shells])[0]
         return np.array([[far + (start[0] - strong[0]) ** 2 for start in starts]])
 
+    def own(effect, start):
+        return missed(lines, true, [effect.shells])[0], strong
+
     context = SimpleNamespace(
         scan=bending_slopes, where=SimpleNamespace(groups=groups), bases=(None, "of the fit"),
-        scores=scores,
+        scores=scores, own=own,
     )  # fmt: skip
     effect, x = crack(groups, begun, 100), np.array([-0.3])
     better = closer(context, effect, x)

@@ -171,8 +171,11 @@ def test_a_class_of_alloys_is_known_by_its_modulus_and_density(name):
     for quantity in ("E", "rho", "t"):
         assert prior_sd([part], quantity, [0]) == due[quantity]
         free = FreeParameter(quantity, quantity, positions=(0,))
-        assert sd_of([part], free) == due[quantity]
-        assert sd_of([part], replace(free, sd=0.02)) == 0.02
+        assert sd_of(replace(plate(1.0, 1.0, 1, 1, 1e-3), parts=(part,)), free) == due[quantity]
+        assert (
+            sd_of(replace(plate(1.0, 1.0, 1, 1, 1e-3), parts=(part,)), replace(free, sd=0.02))
+            == 0.02
+        )
 
 
 def test_numbers_of_a_solid_bar_also_stand_for_its_section():

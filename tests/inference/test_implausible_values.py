@@ -8,6 +8,7 @@ import pytest
 from chladni.effects.calibration_parameters import PartScale
 from chladni.effects.effect import Parameter
 from chladni.effects.joint_stiffness import ADHESIVE, ModelFamily
+from chladni.effects.model_errors import MeshError
 from chladni.inference.implausible_values import FAR, in_doubt, strained
 
 
@@ -49,6 +50,21 @@ def test_calibration_that_took_what_no_deck_is_off_by_is_in_doubt(sign):
         assert bool(said) == (away > FAR)
     assert "E of strip" in said[0]
     assert "measure it first" in said[0]
+
+
+def test_numbers_that_only_a_coarse_mesh_takes_far_off_are_said_to_be_the_mesh():
+    """The null has the error of the mesh and plausible numbers; else the numbers are in doubt."""
+    E = PartScale((Parameter("E", "Pa", 0.0, 0.06),), "E of shell")
+    stiffer = np.diag(2 * np.log([0.99, 0.92]))
+    mesh = MeshError((Parameter("mesh", "-", 1.0, 0.3),), omega=np.array([600.0, 900]), log=stiffer)
+    plain = found([E], [1.5 * FAR * 0.06], [0.01])
+    near, far = (found([E, mesh], [away * 0.06, 1.0], [0.01, 0.1]) for away in (0.5, 1.5 * FAR))
+    (said,) = in_doubt(plain, near, coarse=True)
+    assert "off by up to 8 %; refine it" in said
+    assert "E of shell" in said
+    assert in_doubt(near, near, coarse=True) == ()
+    assert in_doubt(plain, near) == in_doubt(plain, far, coarse=True)
+    assert "measure it first" in in_doubt(plain, near)[0]
 
 
 @pytest.mark.parametrize(

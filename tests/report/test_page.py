@@ -18,7 +18,7 @@ from chladni.report.next_steps import next_steps
 from chladni.report.page import write_page, write_sections
 from chladni.report.sentence import sentence
 from chladni.report.states_table import states_table
-from chladni.report.verdict import HEADING, sections
+from chladni.report.verdict import HEADING, badge, sections
 from chladni.view import charts
 from chladni.view.chart_png import png
 from chladni.workflows.diagnosis_pipeline import beyond_calibration
@@ -182,7 +182,7 @@ def test_a_mesh_too_coarse_is_told_where_the_updated_deck_is_worse(written, told
     """Named it may be for all that: the error of the mesh is in both models then."""
     held = {**DIAGNOSIS["fit"]["held_out"], "Q_with_effect": written, "Q_with_nuisances": 0.009}
     d = {**DIAGNOSIS, "fit": {**DIAGNOSIS["fit"], "held_out": held}}
-    assert ("and to 0.009 with errors of mesh" in sentence(from_json(d))) == told
+    assert ("; Q is 0.009 with errors of mesh" in sentence(from_json(d))) == told
 
 
 def test_a_missing_picture_is_a_sentence_and_no_page(tmp_path):
@@ -272,6 +272,24 @@ def test_a_quiet_verdict_that_is_not_trusted_says_so(verdict):
     assert "physics may still be missing" in sentence(doubted)
     tied = replace(doubted, one_of=(("calibration alone", "hem-contact"),))
     assert "hem-contact explains the recording better" in sentence(tied)
+
+
+@pytest.mark.parametrize("verdict", ["missing physics", "calibration only", "nothing missing"])
+def test_the_badge_is_no_surer_than_the_sentence(verdict):
+    found = replace(RESULT, verdict=verdict, effects=RESULT.effects * (verdict[0] == "m"))
+    assert badge(found) == HEADING[verdict]
+    assert badge(replace(found, distrust=("the basis",))) == "Physics may be missing"
+    calibrated = replace(found, distrust=("the basis",), searched=False)
+    assert badge(calibrated) == HEADING[verdict]
+    tied = replace(found, one_of=(("crack", "doubler"),))
+    assert badge(tied) == (HEADING[verdict] if found.effects else "No effect named")
+
+
+def test_a_written_number_that_is_not_the_found_one_has_its_reason(tmp_path):
+    for value, told in ((3.1e9, False), (4.9e9, True)):
+        effect = replace(RESULT.effects[0], written=(value,))
+        text, _ = read(write_page(tmp_path, replace(RESULT, effects=(effect,), calibrated=())))
+        assert ("+58 %: fitted without errors of mesh and scatter" in text) == told
 
 
 @pytest.mark.parametrize("compared", ["responses", "frequencies"])

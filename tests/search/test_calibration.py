@@ -139,10 +139,10 @@ def test_starts_that_end_together_are_one_basin(reduced, columns):
     assert_allclose([b.above for b in found], [0.0, 0.1, 3.0])
 
 
-def calibrated_plate(reduced, x, quantity="E"):
-    """The calibration of one value of a plate, ended at x."""
-    effect = calibration_parameter(reduced.groups, quantity, [0])
-    return Fit((effect,), np.array([x]), np.eye(1), 0.0, 0.0, None, None, Status.CONVERGED)
+def calibrated_plate(reduced, x, sd=0.01):
+    """The calibration of E of a plate, ended at x."""
+    effect = calibration_parameter(reduced.groups, "E", [0])
+    return Fit((effect,), np.array([x]), np.array([[sd**2]]), 0, 0, None, None, Status.CONVERGED)
 
 
 AGREES = Agreement(Scores(1.0, 0.1), Scores(1.0, 0.2))
@@ -151,7 +151,7 @@ SCALES = MassMeasurement(1.4, 0.004)
 
 def test_a_calibration_that_foretells_keeps_the_mass_and_its_priors_is_no_compensation(reduced):
     mass = MassComparison(1.4, 1.405)
-    assert compensating(calibrated_plate(reduced, 0.05), AGREES, mass, SCALES, None) == ()
+    assert compensating(calibrated_plate(reduced, 0.05), AGREES, mass, SCALES, None, True) == ()
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,8 @@ def test_a_calibration_that_foretells_keeps_the_mass_and_its_priors_is_no_compen
 def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
     agreement = replace(AGREES, held_out=Scores(1.0, held))
     mass, spot = MassComparison(1.4, model), SimpleNamespace(parts=("top",))
-    *reasons, stands = compensating(calibrated_plate(reduced, x), agreement, mass, SCALES, spot)
+    plate = calibrated_plate(reduced, x)
+    *reasons, stands = compensating(plate, agreement, mass, SCALES, spot, True)
     assert len(reasons) == 1
     assert said in reasons[0]
     assert f"plate {100 * np.expm1(x):.1f} % stiffer" in stands
@@ -175,9 +176,19 @@ def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
 def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
     """Where the mesh errs by more than any value, nothing changes, and the weighing says so."""
     mass = MassComparison(1.4, 1.5)
-    first, last = compensating(calibrated_plate(reduced, 0.0), AGREES, mass, SCALES, None)
-    assert "weighs 1.5 kg" in first
-    assert "the deck keeps its values" in last
+    for x, sd in ((0.0, 0.01), (-0.05, 0.1)):  # what lies within one sd of it is no change
+        plate = calibrated_plate(reduced, x, sd)
+        first, last = compensating(plate, AGREES, mass, SCALES, None, True)
+        assert "weighs 1.5 kg" in first
+        assert "the deck keeps its values" in last
+
+
+def test_advice_on_level_and_places_goes_to_data_that_have_them(reduced):
+    worse = replace(AGREES, held_out=Scores(1.0, 1.5))
+    plate = calibrated_plate(reduced, 0.05)
+    ways = [compensating(plate, worse, None, None, None, given)[0] for given in (True, False)]
+    assert all("try chladni diagnose" in said for said in ways)
+    assert ["position_sd" in said for said in ways] == [True, False]
 
 
 @pytest.mark.parametrize("sd", [1e-9, 0.02])

@@ -306,6 +306,18 @@ def test_where_calibration_does_not_fit_a_leader_that_gains_little_is_one_of(vot
     assert (found.verdict, found.one_of) == (REST, one_of)
 
 
+def test_where_calibration_does_not_fit_all_that_fits_is_open():
+    """No gain is due, and each of these may be the cause; where none fits, nothing explains it."""
+    gains = {"point-mass": 12.0, "crack": 8.0, "doubler": 3.0, "suspension": 1.0, "cords": -2.0}
+    for p, one_of in ((0.3, ("point-mass", "doubler", BEYOND)), (1e-4, ())):
+        each = {"crack": 1e-4}
+        rows = [row(n, gain, news=0.0, p=each.get(n, p)) for n, gain in gains.items()]
+        found = decide(table(*rows, null=row("", 0.0, p=1e-4)))
+        assert (found.verdict, found.reason, found.one_of) == (REST, R.NOTHING_DUE, one_of)
+        nothing = any("nothing in the catalogue" in said for said in found.sentences)
+        assert nothing == (not one_of)
+
+
 def test_what_relieves_strained_joints_is_one_of_both():
     """What leaves them strained is no rival."""
     rows = (

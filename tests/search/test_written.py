@@ -11,9 +11,10 @@ import scipy.sparse as sp
 from chladni.effects.calibration_parameters import calibration_parameter, random_field
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.joint_stiffness import ADHESIVE, ModelFamily
-from chladni.effects.model_errors import mesh_errors
+from chladni.effects.model_errors import MeshError, mesh_errors
 from chladni.effects.orthotropy import orthotropic
 from chladni.effects.sheets import StiffnessPatch, ThicknessDistribution
+from chladni.effects.user_parameters import freed_effect
 from chladni.errors import ModelError
 from chladni.fem.modelled import modelled
 from chladni.inference import written_hypothesis
@@ -122,6 +123,19 @@ def test_what_was_found_is_told_beside_what_the_written_deck_has(hypothesis):
     assert untouched.written_value == untouched.deck_value == nominal
 
 
+def test_each_of_several_values_of_one_parameter_has_its_name(reduced):
+    """The four values of a freed orthotropic sheet are told apart."""
+    sheet = freed_effect(orthotropic(reduced.groups, (0,), np.array([1.0, 0, 0])), "material")
+    x = np.zeros(len(sheet.parameters))
+    fit = SimpleNamespace(effects=(sheet,), of=lambda e: x, sd=lambda e: x + 0.1)
+    one = SimpleNamespace(fit=fit)
+    found = SimpleNamespace(
+        as_deck=None, plain=one, found=None, null=one, verdict=NAMED, shared=False
+    )
+    names = [c.where.split(" of ")[0] for c in calibrated(found)]
+    assert names == ["material: E1", "material: E2", "material: G12", "material: nu mean"]
+
+
 NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
 
 
@@ -214,3 +228,30 @@ def test_values_are_told_with_errors_about_the_state_of_the_effect(hypothesis):
     assert one.own.data.about is not about.about
     assert one.own.neg2_log_evidence == common.neg2_log_evidence
     assert one.written.data is one.own.data
+
+
+@pytest.mark.parametrize(("finer", "halved"), [(-30.0, True), (30.0, False)])
+def test_the_mesh_of_the_decks_is_chosen_with_the_effect_in_place(
+    monkeypatch, hypothesis, finer, halved
+):
+    """Without a strong effect no mesh fits; the calibrated deck has the mesh of the other."""
+    measured = object()
+    case = SimpleNamespace(
+        plain_halved="calibrated", found=SimpleNamespace(plain="given", halved=()),
+        prepared=SimpleNamespace(problem=SimpleNamespace(mass_measurement=measured)),
+    )  # fmt: skip
+    one = Explanation(case, hypothesis)
+    mesh = MeshError(omega=np.ones(1), log=np.zeros((1, 1)))
+    fit = replace(hypothesis.fit, effects=(*hypothesis.fit.effects, mesh))
+    vars(one)["own"] = own = replace(hypothesis, fit=fit)
+    vars(one)["written"] = written = replace(hypothesis)
+
+    def as_deck(what, mass, halved):
+        assert (what, mass, halved) == (own, measured, True)
+        return replace(written, fit=replace(fit, neg2_log_evidence=fit.neg2_log_evidence + finer))
+
+    monkeypatch.setattr(written_hypothesis, "as_written", as_deck)
+    assert [type(deck) for deck in one.halved] == [str, HypothesisFit] * halved
+    case.plain_halved = None  # no such deck is a structure
+    del vars(one)["halved"]
+    assert one.halved == ()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..effects.beam_offset import offset_of
 from ..effects.registry import families
 from ..effects.weld_patch import PATCHES
 from ..errors import FileError, LabelError, did_you_mean
@@ -80,7 +81,7 @@ def free_parameter(
     if not given:
         positions, lumps = _all_that_have(at["field"], made, deck, field, what)
     for k in positions:
-        _serves(at["field"], made.parts[k], field)
+        _serves(at["field"], made, k, field)
     for family in lumps:
         if _OF_LUMPS[family] != field:
             raise FileError(
@@ -212,7 +213,7 @@ def _all_that_have(
             f"{at} = {what!r} needs the parts that are adhesive; "
             f"solids here are {', '.join(solids) or 'none'}"
         )
-    with_field = [k for k, p in enumerate(made.parts) if field in fields_of(p)]
+    with_field = [k for k in range(len(made.parts)) if field in fields_of(made, k)]
     positions = [k for k in with_field if _value(made.parts[k], field) != 0]
     lumps = {
         family: list(range(len(getattr(made, family))))
@@ -231,10 +232,11 @@ def _all_that_have(
     return positions, lumps
 
 
-def _serves(at: str, part: Part, field: str) -> None:
+def _serves(at: str, made: Assembly, k: int, field: str) -> None:
     """Refuse a field the part has not."""
-    if field not in fields_of(part):
-        have = ", ".join(fields_of(part)) or "no field that can be freed"
+    part, has = made.parts[k], fields_of(made, k)
+    if field not in has:
+        have = ", ".join(has) or "no field that can be freed"
         raise FileError(
             f"{at} = {field!r} cannot be freed of {part.name}, {_kind(part)}, which has {have}"
         )
@@ -254,11 +256,12 @@ def _value(part: Part, field: str) -> float:
     return float(getattr(material, field, 1.0))
 
 
-def fields_of(part: Part) -> tuple[str, ...]:
-    """Fields of a part that can be freed."""
-    section = part.section
+def fields_of(made: Assembly, k: int) -> tuple[str, ...]:
+    """Fields of the k-th part that can be freed."""
+    section = made.parts[k].section
     if isinstance(section, BeamSection):
-        return ("E", "rho", "wall") if section.tube else ("E", "rho")
+        wall, offset = ("wall",) * section.tube, ("offset",) * (offset_of(made, k) > 0)
+        return ("E", "rho", *wall, *offset)
     if isinstance(section, SolidSection):
         return ("E", "rho", "nu") if isinstance(section.material, Isotropic) else ()
     material = section.membrane or section.bending
@@ -270,7 +273,9 @@ def fields_of(part: Part) -> tuple[str, ...]:
 
 
 def _isotropic_shell(part: Part) -> bool:
-    return isinstance(part.section, ShellSection) and "nu" in fields_of(part)
+    section = part.section
+    material = isinstance(section, ShellSection) and (section.membrane or section.bending)
+    return isinstance(material, Isotropic)
 
 
 def _kind(part: Part) -> str:

@@ -27,7 +27,7 @@ _VARIED = ("study", *_FIT)
 _PLACED = (*_FRF, "bench")
 _PLANNED = ("diagnose", "plan")
 
-FIELDS = ("E", "rho", "nu", "t", "wall", "E1", "E2", "G12", "nu12", "K", "M")
+FIELDS = ("E", "rho", "nu", "t", "wall", "offset", "E1", "E2", "G12", "nu12", "K", "M")
 ALIASES = {  # effects that are a calibration parameter by another name
     "global-stiffness": "E",
     "part-stiffness": "E",

@@ -36,6 +36,7 @@ REASONS = {  # of the priors, by the field
     "rho": "steel and aluminium alloys are known to 0.5 %, other materials to 6 %",
     "t": "rolling tolerance is 3 to 5 %; forming thins a sheet and thickens it",
     "wall": "tubes are drawn to 5 to 10 % of their wall",
+    "offset": "stiffeners are measured from the middle of their sheet or from its face",
     "nu": "metals lie between 0.27 and 0.34",
     "K": "the stiffness of a joint is seldom known to a third",
     "R": "nugget and heat-affected zone end within some millimetres of a weld",
@@ -191,6 +192,10 @@ def with_scaled(
     assembly: Assembly, factor: float, quantity: str, positions: Sequence[int]
 ) -> Assembly:
     """Multiply a field of these parts by a factor."""
+    if quantity == "offset":
+        chosen = np.isin(assembly.beams.part, positions)[:, None, None]
+        offset = assembly.beams.offset * np.where(chosen, factor, 1.0)
+        return replace(assembly, beams=replace(assembly.beams, offset=offset))
     parts = list(assembly.parts)
     for k in positions:
         parts[k] = scaled(parts[k], quantity, factor)

@@ -22,7 +22,7 @@ from .element_groups import ElementGroups, shear_matrices
 from .estimate import Estimate, in_mm
 from .family import Article, Family
 from .joint_stiffness import within_shear
-from .search_context import Candidate, ResponseScan, SearchContext, best_places
+from .search_context import Candidate, ResponseScan, SearchContext, best_places, followed
 
 LEAST_LEFT = 0.01  # of the bending stiffness always remains, so that K stays positive
 SHELLS = 3  # in a line at least
@@ -40,8 +40,6 @@ STRETCHED = (0.7, 1.4)  # times its length
 NEIGHBOUR_DISTANCE = 1.7  # of a shell's size: distance of its neighbours
 WORTH = 0.05  # least gain of a move in -2 ln posterior
 FOLLOWED = 8  # lines whose own optima are found; a score about the null tells them apart badly
-STEPS, BETTER = 4, 0.5  # moves of a fitted line, and the least gain of each in -2 ln posterior
-AROUND = (-0.7, 0.0, 0.7)  # strengths about that of the fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,34 +287,22 @@ def _at_rest(
 
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
-    """Move a fitted crack to neighbouring lines, in a few steps, each evaluated exactly."""
+    """Move a fitted crack to neighbouring lines, each evaluated exactly."""
     if not isinstance(effect, Crack) or context.scan is None:
         return None
-    groups, line, tried = context.where.groups, effect.line, effect.trials_factor
-    lines, best = LineFinder.of(groups.structure.assembly), effect
-    least, start = _scored(context, effect, x)
-    for _ in range(STEPS):
-        near = lines.moved(line)
-        every = [crack(groups, other, tried) for other in near]
-        scores = [float(context.scores(other, [start]).min()) for other in every]
-        tried += len(near)
-        if not near:
-            break
-        k = int(np.argmin(scores))
-        score, strength = _scored(context, every[k], start)
-        if score > least - BETTER:
-            break
-        best, line, least, start = every[k], near[k], score, strength
-    if best is effect:
+    groups, tried = context.where.groups, {effect.shells.tobytes()}
+    lines = LineFinder.of(groups.structure.assembly)
+
+    def around(line: Crack) -> list[Crack]:
+        near = [each for each in lines.moved(line.line) if each.shells.tobytes() not in tried]
+        tried.update(each.shells.tobytes() for each in near)
+        return [crack(groups, each, effect.trials_factor) for each in near]
+
+    moved, start = followed(context, effect, x, around)
+    if moved is effect:
         return None
-    return Candidate(replace(best, trials_factor=tried), start, context.bases[-1])
-
-
-def _scored(context: SearchContext, effect: Effect, x: np.ndarray) -> tuple[float, np.ndarray]:
-    """The best score of an effect at some strengths about x, and that strength."""
-    starts = [x + shift for shift in AROUND]
-    scores = context.scores(effect, starts)[0]
-    return float(scores.min()), starts[int(np.argmin(scores))]
+    more = effect.trials_factor + len(tried) - 1
+    return Candidate(replace(moved, trials_factor=more), start, context.bases[-1])
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:

@@ -63,7 +63,15 @@ class MeshError(Effect):
     @property
     def limit(self) -> np.ndarray:
         """Natural frequencies of the modes on an infinitely fine mesh (k,) [Hz], increasing."""
-        w, V = np.linalg.eigh(limit_of(self.order) * self.log)
+        return self._frequency(limit_of(self.order))
+
+    def largest(self, x: float) -> float:
+        """Largest relative change of a natural frequency at x."""
+        return float(np.abs(self._frequency(x) / np.sort(self.omega / (2 * np.pi)) - 1).max())
+
+    def _frequency(self, x: float) -> np.ndarray:
+        """Natural frequencies at x (k,) [Hz], increasing."""
+        w, V = np.linalg.eigh(x * self.log)
         lam = np.linalg.eigvalsh(self.omega[:, None] * ((V * np.exp(w)) @ V.T) * self.omega)
         return np.asarray(np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi))
 

@@ -4,9 +4,9 @@ Effects do not import the search, which is a higher layer; they see it as these 
 calls a service, and the search implements it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from .effect_context import EffectContext, ElementGrids
 from .joints import Connection
 
 NEIGHBOURS = 6  # places round a place of a sheet
+MOVES, NEAREST = 8, 6  # of a line: steps at most, and neighbours whose optima are found in each
+BETTER = 0.5  # least gain of a move in -2 ln evidence
+E = TypeVar("E", bound=Effect)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +172,12 @@ class SearchContext(Protocol):
         of the effect, as for a fit. The static flexibility of few dofs stands for that basis.
         """
 
+    def own(self, effect: Effect, start: np.ndarray) -> tuple[float, np.ndarray]:
+        """-2 ln evidence at the own optimum of an effect from a start, and the optimum (n_p,).
+
+        The base follows linearly. Poles are scored at the start alone.
+        """
+
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
 
@@ -219,6 +228,27 @@ def best_places(
     least = np.array([score for score, _ in options])
     best = np.argsort(least)[:wanted] if anywhere else valleys(least, point, wanted=wanted)
     return [Candidate(effects[k], options[k][1], context.bases[-1]) for k in best]
+
+
+def followed(
+    context: SearchContext, effect: E, start: np.ndarray, around: Callable[[E], Sequence[E]]
+) -> tuple[E, np.ndarray]:
+    """Move an effect to its neighbours while they explain more, each at its own optimum.
+
+    A longer line needs less strength: at the strength of the shorter one it explains nothing. The
+    optima of the ``NEAREST`` neighbours by score are found.
+    """
+    least, x = context.own(effect, start)
+    for _ in range(MOVES):
+        near = around(effect)
+        scores = [float(context.scores(e, [x], True).min()) for e in near]
+        best = [near[k] for k in np.argsort(scores)[:NEAREST]]
+        own = [context.own(e, x) for e in best]
+        k = min(range(len(own)), key=lambda k: own[k][0], default=-1)
+        if k < 0 or own[k][0] > least - BETTER:
+            break
+        effect, (least, x) = best[k], own[k]
+    return effect, x
 
 
 def valleys(

@@ -25,16 +25,14 @@ from .effect import Effect, MatrixTerm, Traits, Weight
 from .effect_context import EffectContext
 from .estimate import in_mm
 from .family import Article, Family
-from .search_context import Candidate, SearchContext, best_places
+from .search_context import Candidate, SearchContext, best_places, followed
 
 BENDING, AREA = 20.0, 4.0  # prior medians over t⁴ and t²: a rib of 2 t by 4 t, or a flat bead
 STRAIGHT = 0.8  # least cosine of an edge to the line: no zigzag along diagonals
 BEGUN = 6  # lines of shells whose grids are tried
 FEW = 16  # middles of lines that are tried if only natural frequencies are known
 FOLLOWED = 2  # lines that are fitted
-STEPS = 6  # moves of a line while it explains more
 LONGER = (1, 3)  # edges by which a move lengthens a line
-BETTER = 0.5  # least gain of a move in -2 ln posterior
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,19 +225,15 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
     """Move a stiffener at x to neighbouring lines of grids while it explains more."""
     assert isinstance(effect, Stiffener)
-    start, first = x, effect
     grids = GridLines.of(context.where.groups.structure.assembly)
-    least = float(context.scores(effect, [start], True).min())
-    for _ in range(STEPS):
-        near = [
-            e for path in grids.moved(effect.grids)
-            if (e := Stiffener.along(context.where, path, effect.trials_factor)) is not None
-        ]  # fmt: skip
-        scores = [float(context.scores(e, [start], True).min()) for e in near]
-        if not scores or min(scores) > least - BETTER:
-            break
-        least, effect = min(scores), near[int(np.argmin(scores))]
-    return None if effect is first else Candidate(effect, start, context.bases[-1])
+
+    def around(line: Stiffener) -> list[Stiffener]:
+        every = (Stiffener.along(context.where, path, line.trials_factor)
+                 for path in grids.moved(line.grids))  # fmt: skip
+        return [e for e in every if e is not None]
+
+    moved, start = followed(context, effect, x, around)
+    return None if moved is effect else Candidate(moved, start, context.bases[-1])
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:

@@ -19,6 +19,7 @@ from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.properties import AnyMaterial, Part, SolidSection
+from .beam_offset import offset_of, offset_scale, offset_sd
 from .calibration_parameters import (
     OF_ALLOYS,
     OF_FIELDS,
@@ -41,7 +42,7 @@ from .joints import solid_parts
 UNITS = {
     **OF_FIELDS,
     **dict.fromkeys(("E1", "E2", "G12"), "Pa"),
-    **{"nu": "-", "nu12": "-", "K": "N/m", "M": "kg"},
+    **{"nu": "-", "nu12": "-", "K": "N/m", "M": "kg", "offset": "m"},
 }
 SD = {"nu": 0.1, "nu12": 0.2}  # prior sd of ln(value / deck's value); others SD_OTHERS
 SD_OTHERS = 0.3  # joints and directional moduli are less certain
@@ -132,7 +133,7 @@ def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
     values = values_of(built.assembly, free)
     alike = len(values) > 0 and np.ptp(values) <= SAME * abs(values[0])
     scale, unit = (values[0], UNITS[free.field]) if alike else (1.0, "of the deck's")
-    sd = sd_of(parts, free)
+    sd = sd_of(built.assembly, free)
     names = tuple(parts[k].name for k in free.positions)
     text = f"{free.field} of {', '.join(free.parts or names) or 'all'}"
     unknown = (Parameter(free.field, unit, 0.0, sd, float(scale), step=min(0.3, 2 * sd)),)
@@ -143,12 +144,15 @@ def user_parameter(groups: ElementGroups, free: FreeParameter) -> UserParameter:
     )  # fmt: skip
 
 
-def sd_of(parts: Sequence[Part], free: FreeParameter) -> float:
+def sd_of(assembly: Assembly, free: FreeParameter) -> float:
     """Standard deviation of ln(value / deck's value): the user's, or else that of the field."""
     if free.sd is not None:
         return free.sd
     if free.field in OF_FIELDS:
-        return prior_sd(parts, free.field, free.positions)
+        return prior_sd(assembly.parts, free.field, free.positions)
+    if free.field == "offset":
+        own = [sd for k in free.positions if (sd := offset_sd(assembly, k)) is not None]
+        return max(own, default=SD_OTHERS)
     return SD.get(free.field, SD_OTHERS)
 
 
@@ -203,7 +207,9 @@ def _lumps(free: FreeParameter) -> tuple[tuple[str, tuple[int, ...]], ...]:
 
 
 def _of_part(built: Structure, k: int, name: str) -> LinearScale:
-    """E or rho of solids, the wall of fasteners, nu, or moduli of an orthotropic sheet."""
+    """E or rho of solids, wall or offset of beams, nu, or moduli of an orthotropic sheet."""
+    if name == "offset":
+        return offset_scale(built, k)
     part, write = built.assembly.parts[k], partial(with_scaled, quantity=name, positions=(k,))
     text = f"{name} of {part.name}"
     if name in TUBE:
@@ -295,6 +301,8 @@ def why_implausible(
 
 def values_of(assembly: Assembly, free: FreeParameter) -> np.ndarray:
     """The deck's values (n,) of all members that share the factor."""
+    if free.field == "offset":
+        return np.array([offset_of(assembly, k) for k in free.positions])
     out = [value(assembly.parts[k], free.field) for k in free.positions]
     out += [float(assembly.springs.value[r]) for r in free.springs]
     stiff = assembly.bushes.stiffness[list(free.bushes)]

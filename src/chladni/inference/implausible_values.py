@@ -8,6 +8,7 @@ from scipy.special import chdtrc
 
 from ..effects.effect import Effect
 from ..effects.joint_stiffness import FAR, JOINTS, ModelFamily
+from ..effects.model_errors import MeshError
 from ..effects.user_parameters import UserParameter
 from .map_fit import Fit
 
@@ -21,22 +22,35 @@ def implausible_values(fit: Fit) -> list[str]:
     ]
 
 
-def in_doubt(plain: Fit, null: Fit) -> tuple[str, ...]:
+def in_doubt(plain: Fit, null: Fit, coarse: bool = False) -> tuple[str, ...]:
     """Reasons why a calibration that explains the whole recording is not to be trusted.
 
     "Nothing is missing" is a claim too.  A number that no structure of this deck has may stand for
     missing physics, in the reported deck or in the null.  Several numbers may do so together,
     although each alone is plausible.  For example, the frequencies of a strip determine only one
-    combination of E, rho and t.
+    combination of E, rho and t.  On a ``coarse`` mesh, one that the data reject, the numbers of the
+    reported deck stand for its mesh, and small effects cannot be seen.
     """
     own = implausible_values(plain) or _far_together(plain)
     far = list(dict.fromkeys((*own, *strained(null))))
     if not far:
         return ()
+    if coarse and own and not (implausible_values(null) or _far_together(null)):
+        return (
+            f"{'; '.join(far)}: that is the mesh of the deck, whose frequencies are off by up to "
+            f"{100 * _of_mesh(null):.2g} %; refine it and diagnose again, because an effect "
+            "smaller than this error is not seen",
+        )
     return (
         f"calibration alone explains the recording, but {'; '.join(far)}: measure it first, and "
         "correct the deck; if it was only guessed, free it by a [[parameter]] with a matching sd",
     )
+
+
+def _of_mesh(null: Fit) -> float:
+    """Largest relative error of a frequency by the fitted error of the elements."""
+    mesh = next(e for e in null.effects if type(e) is MeshError)
+    return mesh.largest(float(null.of(mesh)[0]))
 
 
 def strained(fit: Fit) -> list[str]:

@@ -160,7 +160,7 @@ class CalibratedParameter:
 
     Attributes
     ----------
-    where : the parts or the material
+    where : the parts or the material; one of several parameters has its name before them
     estimate : beside all that is known to err
     deck_value : of the deck that was given
     written_value : of the deck that is written, which has no scatter, joints and folds of its own

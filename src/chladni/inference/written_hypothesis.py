@@ -65,16 +65,16 @@ def as_written(
 
 
 def preferred_mesh(
-    null: HypothesisFit, plain: HypothesisFit, mass_measurement: MassMeasurement | None
+    hypothesis: HypothesisFit, written: HypothesisFit, mass_measurement: MassMeasurement | None
 ) -> HypothesisFit | None:
-    """The calibrated deck with every shell halved, if it is more probable than ``plain``."""
-    if not any(type(e) is MeshError for e in null.fit.effects):
+    """The deck of a hypothesis with every shell halved, if it is more probable than ``written``."""
+    if not any(type(e) is MeshError for e in hypothesis.fit.effects):
         return None
     try:
-        made = as_written(null, mass_measurement, halved=True)
+        made = as_written(hypothesis, mass_measurement, halved=True)
     except ModelError:
         return None
-    return made if made.neg2_log_evidence < plain.neg2_log_evidence else None
+    return made if made.neg2_log_evidence < written.neg2_log_evidence else None
 
 
 def _given(effect: Effect) -> np.ndarray:

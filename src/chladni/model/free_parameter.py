@@ -10,7 +10,7 @@ class FreeParameter:
     Attributes
     ----------
     name : given by the user
-    field : E, rho, nu, t, E1, E2, G12, nu12, K, M, or the name of an effect
+    field : E, rho, nu, t, wall, offset, E1, E2, G12, nu12, K, M, or the name of an effect
     parts : names and cards as the user wrote them; empty: all with this field
     sd : standard deviation of the prior of ln(value / deck's value), None: the default
     low, high : bounds of value / deck's value, None: no bound

@@ -57,7 +57,7 @@ def diagnosis_page(
     """
     from .next_steps import next_steps
     from .sentence import sentence
-    from .verdict import HEADING, TONE, sections, three_numbers
+    from .verdict import TONE, badge, sections, three_numbers
 
     shown = {name: Path(path) for name, path in (figures or {}).items()}
     hero: Block | None = next((d for d in drawn if d.name == "where"), None)
@@ -67,7 +67,7 @@ def diagnosis_page(
         title or "Diagnosis",
         sections(result, shown, notes, tables, command, drawn),
         lead=sentence(result),
-        badge=HEADING.get(result.verdict, result.verdict),
+        badge=badge(result),
         tone="warn" if result.distrust else TONE.get(result.verdict, "neutral"),
         hero=hero,
         facts=three_numbers(result),

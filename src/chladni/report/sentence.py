@@ -129,8 +129,8 @@ def _gain(result: DiagnosisResult, worse: str) -> str:
     known, said = held.with_nuisances, ""
     if known is not None and before and after is not None and known < before < after:
         said = (
-            f", and to {number(known, 3)} with errors of mesh, joints and scatter, which a deck "
-            "cannot contain"
+            f"; Q is {number(known, 3)} with errors of mesh, joints and scatter, which no deck "
+            "contains"
         )
     if worse:
         return f"; {worse}{said}"

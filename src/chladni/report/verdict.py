@@ -31,6 +31,7 @@ HEADING = {
     "nonlinear": "Not linear",
     "not in catalogue": "Not in the catalogue",
 }
+ONE_ANSWER = ("missing physics", "calibration only", "nothing missing")
 TONE = {
     "missing physics": "found",
     "calibration only": "calm",
@@ -50,6 +51,15 @@ _FILES = {
     "outlook": "forecasts of further measurements, for chladni next",
     "posterior": "odds and posterior, for chladni diagnose --earlier",
 }
+
+
+def badge(result: DiagnosisResult) -> str:
+    """The verdict in a few words, no surer than its sentence."""
+    if result.one_of and not result.effects:
+        return "No effect named"
+    if result.searched and result.distrust and result.verdict in ONE_ANSWER:
+        return "Physics may be missing"
+    return HEADING.get(result.verdict, result.verdict)
 
 
 def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
@@ -197,7 +207,7 @@ def _estimates(effect: NamedEffect) -> list[tuple[str, ...]]:
     if not effect.written:
         return rows
     each = zip(rows, effect.parameters, effect.written, strict=True)
-    return [(*row, quantity(value, p.unit)) for row, p, value in each]
+    return [(*row, _beside(value, p.value, p.unit)) for row, p, value in each]
 
 
 def _interval(p: Estimate) -> str:
@@ -247,14 +257,18 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
 
 def _written(c: CalibratedParameter, result: DiagnosisResult) -> str:
     """The value of the updated deck, with the reason where it is not the one that was found."""
-    written, found = c.written_value, c.estimate.value
-    value = quantity(written, c.estimate.unit)
     if not result.deck_changed:
+        value = quantity(c.written_value, c.estimate.unit)
         return f"{value} (kept: the found value gains too little)"
+    return _beside(c.written_value, c.estimate.value, c.estimate.unit)
+
+
+def _beside(written: float | None, found: float, unit: str) -> str:
+    """A written value, with the reason where it is not the one that was found."""
+    value = quantity(written, unit)
     if written is None or not found or abs(written / found - 1) < APART:
         return value
-    change = percent(written, found)
-    return f"{value} ({change}: fitted without these errors)"
+    return f"{value} ({percent(written, found)}: fitted without errors of mesh and scatter)"
 
 
 def _range(p: ParameterKnowledge) -> str:

@@ -42,12 +42,12 @@ def criterion(value: float | None) -> str:
 def unit_text(unit: str) -> str:
     """A unit with raised digits.
 
-    >>> unit_text("N/m2"), unit_text("kg/m3"), unit_text("-")
-    ('N/m²', 'kg/m³', '')
+    >>> unit_text("N/m2"), unit_text("kg/m3"), unit_text("m4"), unit_text("-")
+    ('N/m²', 'kg/m³', 'm⁴', '')
     """
     if unit in ("-", "1"):
         return ""
-    return unit.replace("**", "").replace("^", "").replace("2", "²").replace("3", "³")
+    return unit.replace("**", "").replace("^", "").translate(str.maketrans("234", "²³⁴"))
 
 
 def quantity(value: float | None, unit: str = "", reference: float | None = None) -> str:

@@ -15,17 +15,22 @@ from ..inference.residual_localisation import ResidualLocalisation
 from ..inference.result import Agreement, MassComparison
 from .result_parts import foretells_worse
 
-CURES = (
-    'try chladni diagnose, [test] gain = "unknown" if the level is uncertain, or position_sd for '
-    "uncertain places"
+CURE = "try chladni diagnose"
+OF_RESPONSES = (
+    ', [test] gain = "unknown" if the level is uncertain, or position_sd for uncertain places'
 )
 LEAST = 0.005  # smaller changes of ln mass and stiffness are not named
-BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0}  # powers in the bending stiffness of a part
+BENDING = {
+    "E": 1.0,
+    "t": 3.0,
+    "wall": 1.0,
+    "offset": 2.0,
+}  # powers in the bending stiffness of a part
 
 
 def compensating(
     fit: Fit, agreement: Agreement | None, mass: MassComparison | None,
-    weighed: MassMeasurement | None, spot: ResidualLocalisation | None,
+    weighed: MassMeasurement | None, spot: ResidualLocalisation | None, responses: bool,
 ) -> tuple[str, ...]:  # fmt: skip
     """Reasons why a calibration compensates, and what it stands for; empty where it does not.
 
@@ -33,9 +38,11 @@ def compensating(
     ----------
     fit : of the deck that is written
     spot : where a local change would still gain
+    responses : the data have a level and places, as tables of frequencies do not
     """
+    cures = CURE + OF_RESPONSES * responses
     reasons = (
-        *(f"{why}; {CURES}" for why in foretells_worse(agreement)),
+        *(f"{why}; {cures}" for why in foretells_worse(agreement)),
         *_leaves_the_scales(mass, weighed),
         *implausible_values(fit),
     )  # fmt: skip
@@ -59,29 +66,28 @@ def _leaves_the_scales(
 
 def _stands_for(fit: Fit, place: str) -> str:
     """The changes of each part in the words of mass and stiffness."""
-    stiff: dict[str, float] = {}
-    heavy: dict[str, float] = {}
+    changes: dict[str, np.ndarray] = {}  # of ln stiffness and ln mass, and their variances
     for effect in filter(_is_factor, fit.effects):
         name, change = effect.parameters[0].name, _log_change(effect, fit.of(effect))
+        powers = np.array([BENDING.get(name, 0.0), float(name in ("rho", "t", "wall"))])
         where = ", ".join(effect.parts) or "the joints"
-        stiff[where] = stiff.get(where, 0.0) + BENDING.get(name, 0.0) * change
-        heavy[where] = heavy.get(where, 0.0) + (name in ("rho", "t", "wall")) * change
+        row = np.array([powers * change, (powers * fit.sd(effect)[0]) ** 2])
+        changes[where] = changes.get(where, 0.0) + row
     said = [
         f"{where} {' and '.join(words)}"
-        for where in stiff
-        if (words := [*_more(stiff[where], "stiffer", "softer"),
-                      *_more(heavy[where], "heavier", "lighter")])
+        for where, row in changes.items()
+        if (words := [*_more(row[:, 0], "stiffer", "softer"),
+                      *_more(row[:, 1], "heavier", "lighter")])
     ]  # fmt: skip
     if not said:
         return (
-            "the deck keeps its values, as no others fit better on its mesh: refine the mesh, or "
-            "look for what is missing with `chladni diagnose`"
+            "the deck keeps its values within their standard deviations, as no others fit better "
+            "on its mesh: refine the mesh, or look for what is missing with `chladni diagnose`"
         )
-    changes = "; ".join(said)
     left = f"; what it leaves is largest {place}" if place else ""
     return (
-        f"the calibration is compensating: it stands for what makes {changes}{left}; `chladni "
-        "diagnose` says which effect does this"
+        f"the calibration is compensating: it stands for what makes {'; '.join(said)}{left}; "
+        "`chladni diagnose` says which effect does this"
     )
 
 
@@ -97,7 +103,8 @@ def _log_change(effect: Effect, x: np.ndarray) -> float:
     return float(np.log(row.value / p.value(p.nominal)))
 
 
-def _more(change: float, up: str, down: str) -> Iterator[str]:
-    """A change of more than half a per cent in words."""
-    if abs(change) > LEAST:
+def _more(of: np.ndarray, up: str, down: str) -> Iterator[str]:
+    """A change of more than half a per cent and its standard deviation in words."""
+    change, variance = of
+    if abs(change) > max(LEAST, np.sqrt(variance)):
         yield f"{100 * abs(np.expm1(change)):.1f} % {up if change > 0 else down}"

@@ -29,10 +29,9 @@ def concluded(case: Hypotheses, decision: Decision) -> tuple[Diagnosis, tuple[st
     )  # fmt: skip
     if lead is None or not decision.named:
         return said, tuple(_doubts(case, decision))
-    halved = (*found.halved, lead.halved) if found.halved else ()
     gains = lead.together.gains if lead.together else ()
     fits = (lead.own, *said.hypotheses[1:])
-    said = replace(said, hypotheses=fits, written=lead.written, halved=halved, gains=gains)
+    said = replace(said, hypotheses=fits, written=lead.written, halved=lead.halved, gains=gains)
     return said, lead.distrust
 
 

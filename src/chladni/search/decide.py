@@ -49,8 +49,9 @@ class Decision:
     def sentences(self) -> tuple[str, ...]:
         """One sentence for every step that has something to report."""
         every = (step if isinstance(step, str) else step() for step in self.steps)
-        test = None if self.named or self.tested is None else self.tested.chances.test
-        last = words.test_of_fit(self.tested) if self.tested and test and not test.passes else ""
+        one = None if self.named or self.one_of else self.tested
+        test = None if one is None else one.chances.test
+        last = words.test_of_fit(one) if one and test and not test.passes else ""
         return tuple(s + words.UNEXPLAINED if s == last else s for s in every if s)
 
     def then(self, *steps: Step, **changes: Any) -> "Decision":
@@ -281,21 +282,26 @@ def _with_doubt(case: Hypotheses, decision: Decision) -> Decision:
     ``RULES.tied`` on all data, the answer is calibration or that effect. It is so at any gain if
     calibration strains a family of joints beyond its scatter and the effect does not. If
     calibration alone does not fit, the answer is that effect or one outside the catalogue. A
-    leader that was refused leaves the latter open as well.
+    leader that was refused leaves the latter open as well. Where no gain reached what is required,
+    calibration that does not fit is no alternative, and every effect near the best that fits is.
     """
     plainly = decision.verdict in ("nothing missing", "calibration only")
-    unfit = not plainly and decision.reason in (Reason.TOO_LITTLE, Reason.WORSE)
+    small = not plainly and decision.reason is Reason.NOTHING_DUE
+    unfit = small or (not plainly and decision.reason in (Reason.TOO_LITTLE, Reason.WORSE))
     news = decision.news or 0.0
     if not (decision.order and (plainly or unfit)) or (unfit and news < 0):
         return decision
     lead = decision.order[0]
     relieved = case.null.strained and not lead.strained
-    gain, least = case.gain(lead), 0.0 if relieved else RULES.tied
+    gain, least = case.gain(lead), 0.0 if relieved or small else RULES.tied
     if gain + news <= least:
         return decision
     least = max(least, gain - RULES.tied)
-    near = (h.name for h in decision.order
-            if case.gain(h) >= least and not (relieved and h.strained))  # fmt: skip
-    open_ = (BEYOND,) if decision.refused else ()
+    near = [h.name for h in decision.order
+            if case.gain(h) >= least and not (relieved and h.strained)
+            and (not small or h.chances.fits)]  # fmt: skip
+    if not near:
+        return decision
+    open_ = (BEYOND,) if decision.refused or small else ()
     one_of = (*(() if unfit else (ALONE,)), *near, *open_)
     return decision.then(words.doubt(case, lead, decision.due), one_of=one_of)

@@ -1,5 +1,6 @@
-"""Calibration parameters of a question: those that the user frees, else E, t (wall) and rho."""
+"""Calibration parameters of a question: those that the user frees, else the default ones."""
 
+from ..effects.beam_offset import stiffener_offsets
 from ..effects.calibration_parameters import defaults
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
@@ -26,13 +27,14 @@ def setup_of(question: Question, f_max: float) -> Setup:
 def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
     """Parameters that the user frees; else E and t (wall) of every part, rho of every material.
 
-    This default holds for shells and beams.  Without either, it is E and rho of every material of
-    solids.
+    Stiffeners also have their distance from the sheet.  This default holds for shells and beams.
+    Without either, it is E and rho of every material of solids.
     """
     if question.parameters:
         return [_freed(question, reduced, f_max, p) for p in question.parameters]
     if len(reduced.groups):
-        return list(defaults(reduced.groups))
+        offsets = stiffener_offsets(question.assembly)
+        return [*defaults(reduced.groups), *(user_parameter(reduced.groups, p) for p in offsets)]
     return [user_parameter(reduced.groups, p) for p in defaults_of_solids(question.assembly)]
 
 

@@ -14,7 +14,7 @@ from ..inference.least_data import CONTRADICTED
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_test_along_effect
 from ..inference.pole_data import Poles
-from ..inference.written_hypothesis import as_written
+from ..inference.written_hypothesis import as_written, preferred_mesh
 from .basis_refinement import refined
 from .decision_rules import RULES
 from .diagnosis import Diagnosis, FitChances, fit_test
@@ -88,9 +88,15 @@ class Explanation:
         return as_written(self.own, self.case.prepared.problem.mass_measurement)
 
     @cached_property
-    def halved(self) -> HypothesisFit:
-        """The hypothesis in the form of a deck with every shell halved."""
-        return as_written(self.own, self.case.prepared.problem.mass_measurement, halved=True)
+    def halved(self) -> tuple[HypothesisFit, ...]:
+        """The calibrated deck and its own with every shell halved, if the data prefer that mesh.
+
+        The hypothesis says which mesh they prefer: without a strong effect no mesh fits.
+        """
+        measured = self.case.prepared.problem.mass_measurement
+        finer = preferred_mesh(self.own, self.written, measured)
+        calibrated = None if finer is None else self.case.plain_halved
+        return () if finer is None or calibrated is None else (calibrated, finer)
 
     @cached_property
     def Q(self) -> tuple[tuple[float, float], ...]:
@@ -99,8 +105,7 @@ class Explanation:
         Both have the mesh that the data prefer: an effect may be smaller than the error of a mesh.
         """
         prepared, found = self.case.prepared, self.case.found
-        decks = (found.halved[0], self.halved) if found.halved else (found.plain, self.written)
-        stages = [(deck, deck.fit.state) for deck in decks]
+        stages = [(deck, deck.fit.state) for deck in self.halved or (found.plain, self.written)]
         return tuple(
             (a, b) for a, b in scores_of(prepared, self.fit, stages, prepared.held.choosing)
         )
@@ -182,6 +187,16 @@ class Hypotheses:
     def null(self) -> Explanation:
         """Calibration alone."""
         return self._of(self.found.null)
+
+    @cached_property
+    def plain_halved(self) -> HypothesisFit | None:
+        """Calibration alone in the form of a deck with every shell halved; None without one."""
+        if self.found.halved:
+            return self.found.halved[0]
+        try:
+            return as_written(self.found.null, self.prepared.problem.mass_measurement, halved=True)
+        except ModelError:
+            return None
 
     @cached_property
     def singles(self) -> tuple[Explanation, ...]:

@@ -9,6 +9,7 @@ from ..effects.effect import Effect
 from ..effects.estimate import Estimate, Location
 from ..ema.odds import evidence_in_words
 from ..inference.hypothesis_fit import HypothesisFit
+from ..inference.identifiability import parameter_names
 from ..inference.joint_fit import JointFit
 from ..inference.likelihood import LN10
 from ..inference.own_optimum import LocalOptimum
@@ -252,10 +253,11 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         found = deck if diagnosis.shared else fit
         rows = effect.reported(found.of(effect), fit.sd(effect))
         written = effect.reported(deck.of(effect), fit.sd(effect))
-        for parameter, row, other in zip(effect.parameters, rows, written, strict=True):
+        each = zip(effect.parameters, parameter_names([effect]), rows, written, strict=True)
+        for parameter, where, row, other in each:
             given = parameter.value(parameter.nominal)
             called = getattr(effect, "called", "")  # the user's name of the parameter
-            where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
+            where = f"{called}: {where}" if called not in ("", row.name) else where
             out.append(CalibratedParameter(where, row, given, other.value if changed else given))
     return tuple(out)
 
@@ -277,11 +279,10 @@ def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
     for one in joint.fits:
         for effect in (e for e in one.fit.effects if e.kind == "calibration"):
             rows = effect.reported(one.fit.of(effect), one.fit.sd(effect))
-            for parameter, row in zip(effect.parameters, rows, strict=True):
+            each = zip(effect.parameters, parameter_names([effect]), rows, strict=True)
+            for parameter, where, row in each:
                 given = parameter.value(parameter.nominal)
-                seen.setdefault(
-                    (effect.text, row.name), CalibratedParameter(effect.text, row, given)
-                )
+                seen.setdefault((where, row.name), CalibratedParameter(where, row, given))
     return tuple(seen.values())
 
 
@@ -320,6 +321,10 @@ def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
         return "it contains no further information"
     if not diagnosis.hypotheses:
         return "it exceeds the noise; a diagnosis shows whether physics is missing"
+    if diagnosis.unexplained and diagnosis.one_of:
+        return "mesh error and scatter do not account for it, and one of these may: " + ", ".join(
+            diagnosis.one_of
+        )
     if diagnosis.unexplained:
         return "no effect tried accounts for it, nor do mesh error and scatter in the parts"
     lead = diagnosis.hypotheses[0]

@@ -317,11 +317,11 @@ def _of_band(made: CaseDraft) -> list[str]:
 
 def _of_parts(made: CaseDraft) -> list[str]:
     out = ["# Calibration parameters; default: E and t of every sheet, rho of every material."]
-    for part in made.assembly.parts[:20]:
-        if fields := fields_of(part):
-            out += _comment(f"{part.name} ({part.id}) has {', '.join(fields)}")
-    first = next((p for p in made.assembly.parts if fields_of(p)), None)
-    if first is not None:
-        quoted = json.dumps(first.name, ensure_ascii=False)
-        out += ["# [[parameter]]", f"# parts = [{quoted}]", f'# field = "{fields_of(first)[0]}"']
+    a = made.assembly
+    having = [(p, fields) for k, p in enumerate(a.parts) if (fields := fields_of(a, k))]
+    for part, fields in having[:20]:
+        out += _comment(f"{part.name} ({part.id}) has {', '.join(fields)}")
+    for part, fields in having[:1]:
+        quoted = json.dumps(part.name, ensure_ascii=False)
+        out += ["# [[parameter]]", f"# parts = [{quoted}]", f'# field = "{fields[0]}"']
     return out

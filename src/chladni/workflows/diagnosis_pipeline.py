@@ -159,12 +159,13 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     result = over_levels(question, prepared, stages, result, diagnosing)
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
-        distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit))
+        coarse = bool(found.halved)
+        distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit, coarse))
     study = known.study
     if not diagnosing:
         reasons = compensating(
             found.plain.fit, result.agreement, result.mass, question.mass_measurement,
-            result.residual_localisation,
+            result.residual_localisation, result.compared == "responses",
         )  # fmt: skip
         distrust = (*distrust, *reasons)
         if study is not None:

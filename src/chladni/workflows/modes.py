@@ -163,7 +163,7 @@ def loose_parts(model: Model, modal: ModalModel) -> list[str]:
     where = ", ".join(map(str, dict.fromkeys(grids)))
     return [
         f"{motions} without stiffness, in addition to those of the whole structure: a part is "
-        f"loose; grid {where} moves most"
+        f"loose, or a stiffness is zero; grid {where} moves most"
     ]
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .convert import PartWords
     from .given_case import Source
 
-OF_PARTS = tuple(name for name in FIELDS if name not in ("K", "M"))
+OF_PARTS = tuple(name for name in FIELDS if name not in ("K", "M", "offset"))
 
 
 class WorkingModel(Model):
@@ -250,11 +250,11 @@ def _wanted(made: Assembly, field: str, value: float | Mapping[str, float]) -> d
     if isinstance(value, Mapping):
         out = {made.part(name): float(v) for name, v in value.items()}
         for k in out:
-            if field not in fields_of(made.parts[k]):
-                have = ", ".join(fields_of(made.parts[k])) or "no field that can be changed"
+            if field not in (has := fields_of(made, k)):
+                have = ", ".join(has) or "no field that can be changed"
                 raise LabelError(f"part {made.parts[k].name} has no {field}; it has {have}")
     else:
-        having = [k for k, part in enumerate(made.parts) if field in fields_of(part)]
+        having = [k for k in range(len(made.parts)) if field in fields_of(made, k)]
         out = dict.fromkeys(having, float(cast(float, value)))
     if not out:
         raise LabelError(f"no part of the model has {field}, or none was named")

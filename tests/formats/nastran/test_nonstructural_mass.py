@@ -58,6 +58,7 @@ def test_a_total_is_shared_by_area(bulk):
         ("NSML1,4,ELEMENT,1.,7,8", "areas and lengths"),
         ("NSM,4,PSHELL,101,-1.", "NSM 4: its mass is negative, and more than element 7"),
         ("NSM,4,PSHELL,101,x", "VALUE is 'X', not a number"),
+        ("NSM1,4,PSHELL,x,1.,101", "VALUE is 'X', not a number"),
         ("NSM,5,PSHELL,101,1.", "NSM set 4 is selected but there is no such set; there are 5"),
     ],
 )

@@ -9,7 +9,7 @@ from tests.builders.refusals import says
 import chladni
 from chladni.errors import ChladniError
 from chladni.io.nastran.edit.unwritten import refuse_unwritten
-from chladni.model.assembly import Assembly, RigidBody, Rotors
+from chladni.model.assembly import Assembly, RigidBody, Rotors, picked
 
 DECK = """SOL 103
 CEND
@@ -146,11 +146,13 @@ def variants(made: Assembly):
                     (replace(value[0], **{column: moved(getattr(value[0], column))}),),
                 )
             yield "solids without", ()
+            yield "solids doubled", (picked(value[0], np.r_[: len(value[0]), 0]), *value[1:])
         elif f.name == "rotors":
             yield f.name, Rotors(np.array([1]), np.array([0]), np.array([[0.0, 0.0, 0.02]]))
         elif hasattr(value, "ids"):
             for column, table in other_table(value):
                 yield f"{f.name} {column}", table
+            yield f"{f.name} fewer", picked(value, np.arange(len(value) - 1))
         elif isinstance(value, bool):
             yield f.name, not value
         elif isinstance(value, float):
@@ -164,7 +166,7 @@ WRITTEN = {"parts 1 membrane.E", "parts 4 material.rho", "shells thickness", "sp
 REFUSED = {"points", "rigid without RigidBody", "rigid without Average", "rigid without Equation",
            "rigid Average", "rigid Equation", "supports added", "masses ids", "springs ids",
            "shells ids", "shells offset", "beams up", "k6rot", "auto_spc", "parts name",
-           "axes"}  # fmt: skip
+           "axes", "solids doubled", "beams fewer", "shells fewer"}  # fmt: skip
 
 
 def test_every_change_is_written_or_refused(model, tmp_path):

@@ -21,7 +21,7 @@ from ..export.numbering import Systems
 from ..export.part_cards import material_card
 from ..text.cards import SHELL_CARDS
 from .added_elements import added_elements
-from .beam_changes import with_sections
+from .beam_changes import offset_changes, with_sections
 from .changes import Change
 from .free_ids import FreeIds, free_ids, ids_of
 from .joint_changes import joint_changes
@@ -61,6 +61,7 @@ def changes(
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after, free)
     out += tie_changes(deck, before, after, units)
+    out += offset_changes(deck, before, after)
     out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
     if cards := list(added.cards(before, units, free)):

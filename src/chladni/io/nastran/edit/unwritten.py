@@ -18,14 +18,14 @@ _NEW = "chladni.io.nastran.write_assembly writes it as a new deck"
 
 
 def refuse_regrouped(before: Assembly, after: Assembly) -> None:
-    """Raise if points, shells, kinds of solids or joints of ``before`` are missing in ``after``.
+    """Raise if points, beams, joints, shells or solids of ``before`` are missing in ``after``.
 
     Edits are found by comparing the two in order.
     """
     pairs = [("points", before.ids, after.ids), ("shells", before.shells.ids, after.shells.ids)]
-    pairs += [(n, getattr(before, n).ids, getattr(after, n).ids) for n in _JOINTS]
+    pairs += [(n, getattr(before, n).ids, getattr(after, n).ids) for n in ("beams", *_JOINTS)]
     pairs += [
-        ("solids", np.array([s.nodes.shape[1]]), np.array([t.nodes.shape[1]]))
+        ("solids", np.append(s.ids, s.nodes.shape[1]), np.append(t.ids, t.nodes.shape[1]))
         for s, t in zip(before.solids, after.solids, strict=False)
     ]
     pairs.append(("solids", np.zeros(len(before.solids)), np.zeros(len(after.solids))))

@@ -51,9 +51,9 @@ def _loads(
     of = _named(ctx, made, cards, i)
     there = np.unique(np.concatenate(of))
     if cards.name.endswith("1"):
-        every = cards.word(i, 4) == "ALL"
+        value, every = cards.real(i, 3), cards.word(i, 4) == "ALL"
         ids = there[there >= 0].tolist() if every else id_list(cards, i, 4, there)
-        yield _rows(cards, i, of, ids), cards.real(i, 3)
+        yield _rows(cards, i, of, ids), value
         return
     for k in range(3, len(cards.fields(i)) + 1, 2):
         if cards.word(i, k):

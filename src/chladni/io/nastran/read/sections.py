@@ -29,6 +29,7 @@ _FAMILIES: dict[str, tuple[str, ...]] = {
     "rod": ("PROD",),
     "tube": ("PTUBE",),
 }
+_UNREAD = ("PCOMPS", "PCOMPLS", "PLSOLID", "PLPLANE", "PBCOMP", "PBMSECT", "PBRSECT")
 
 
 class Parts:
@@ -66,6 +67,10 @@ class Parts:
         if (family, pid) not in self._at:
             known = self._cards[family]
             if pid not in known:
+                for cards in self._ctx.deck.present(*_UNREAD):
+                    if pid in cards.integers(1):
+                        said = f"property {pid} is a {cards.name}, not understood here"
+                        raise elements.refuse(i, said)
                 there = ", ".join(f"{c.name} {p}" for p, (c, _) in sorted(known.items())[:8])
                 kinds = " or ".join(_FAMILIES[family][:2])
                 raise elements.refuse(
