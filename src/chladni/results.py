@@ -99,6 +99,7 @@ class View:
     command : that returns such a result
     inputs : files that were read, which nothing may replace
     needs_origin : whether pictures and files need the model or the case of the result
+    json : result -> plain data, which the command writes as JSON
     """
 
     command: str
@@ -108,6 +109,7 @@ class View:
     save: Callable[[Any, Path, Path, bool], None]
     inputs: Callable[[Any], Iterable[Path]] = lambda _: ()
     needs_origin: bool = True
+    json: Callable[[Any], dict[str, Any]] = lambda _: {}
 
 
 _FRAME = (
@@ -133,6 +135,19 @@ def show_later(module: str) -> None:
     _later.append(module)
 
 
+def view_of(found: object) -> View:
+    """How a result is shown, by the nearest of its types that is known."""
+    names = [full_name(kind) for kind in type(found).__mro__]
+    while not any(name in _views for name in names):
+        import_module(_later.pop())
+    return next(_views[name] for name in names if name in _views)()
+
+
+def to_json(found: object) -> dict[str, Any]:
+    """Convert a result to the JSON that its command writes."""
+    return view_of(found).json(found)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """A result that explains itself.
@@ -144,19 +159,12 @@ class Result:
 
     origin: Any = field(default=None, kw_only=True)
 
-    @property
-    def _view(self) -> View:
-        names = [full_name(kind) for kind in type(self).__mro__]
-        while not any(name in _views for name in names):
-            import_module(_later.pop())
-        return next(_views[name] for name in names if name in _views)()
-
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.summary().partition(chr(10))[0]}>"
 
     def summary(self) -> str:
         """Return the result in words: one sentence, then the main tables as text."""
-        return plain_line(self._view.summary(self))
+        return plain_line(view_of(self).summary(self))
 
     @checked
     def plot(self, name: str = "") -> DrawnPicture:
@@ -188,7 +196,7 @@ class Result:
         """Functions that draw the pictures, found once."""
         self._check_origin()
         if "_stills" not in self.__dict__:
-            object.__setattr__(self, "_stills", self._view.pictures(self))
+            object.__setattr__(self, "_stills", view_of(self).pictures(self))
         stills: Mapping[str, Callable[[Path], object]] = self.__dict__["_stills"]
         return stills
 
@@ -210,18 +218,18 @@ class Result:
             If the result was read from a file, which does not hold the structure.
         """
         self._check_origin()
-        place, view = Path(folder), self._view
+        place, view = Path(folder), view_of(self)
         with run_folder(place, view.command, view.inputs(self)) as scratch:
             view.save(self, scratch, place, pictures)
         return place
 
     def _check_origin(self) -> None:
-        if self.origin is None and self._view.needs_origin:
+        if self.origin is None and view_of(self).needs_origin:
             raise ModelError(
                 f"this {type(self).__name__} was read from a file, which holds no structure to draw"
             )
 
     def _repr_html_(self) -> str:
         """Return the page in a frame for a notebook: its sandbox runs no scripts."""
-        page = self._view.html(self)
+        page = view_of(self).html(self)
         return _FRAME.format(escape(page), type(self).__name__, 36)

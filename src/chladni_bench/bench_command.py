@@ -17,7 +17,7 @@ from chladni.errors import FileError
 from chladni.io.tables.sensor_table import exciter, with_input
 from chladni.output import write_text
 from chladni.progress import Progress, within
-from chladni.report.result_json import to_json
+from chladni.results import to_json
 from chladni.workflows.loaded_model import is_case, load_deck, similar_names
 from chladni_planning import PlanSettings, plan_test, sensors_csv
 

@@ -82,7 +82,7 @@ def in_words(found: BenchResult) -> PageParts:
     return PageParts(lead(found), [Section("The test", blocks)], found.notes)
 
 
-def bench_json(found: BenchResult) -> dict[str, Any]:
+def as_json(found: BenchResult) -> dict[str, Any]:
     """``bench.json``: what was tested and how well; nothing of what is sealed."""
     return {
         "excitation": found.settings.excitation,

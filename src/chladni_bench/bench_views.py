@@ -1,6 +1,5 @@
 """How virtual tests are shown, saved and written as JSON; importing this module registers it."""
 
-from chladni.report.result_json import of_page, to_json
 from chladni.report.result_views import Paged
 from chladni.results import show_by
 
@@ -16,4 +15,3 @@ _PAGED = Paged(
 )
 
 show_by(BenchResult, _PAGED.view)
-to_json.register(BenchResult, of_page(f"{__package__}.bench_page", "bench_json"))

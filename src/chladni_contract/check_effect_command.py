@@ -7,7 +7,7 @@ import typer
 
 from chladni.cli.run import Allow, Out, Units, started
 from chladni.progress import within
-from chladni.report.result_json import to_json
+from chladni.results import to_json
 from chladni.workflows.loaded_model import load_model
 
 from . import check_effect

@@ -64,7 +64,7 @@ def _table(v: Visibility) -> Table:
     return Table(("draw", "change [decades]", "over scatter", "visible"), rows, (), caption)
 
 
-def effect_check_json(found: EffectCheck) -> dict[str, Any]:
+def as_json(found: EffectCheck) -> dict[str, Any]:
     """``effect.json``."""
     v = found.visibility
     return {

@@ -1,6 +1,5 @@
 """How checks of effects are shown, saved and written as JSON; importing it registers them."""
 
-from chladni.report.result_json import of_page, to_json
 from chladni.report.result_views import Paged
 from chladni.results import show_by
 
@@ -15,4 +14,3 @@ _PAGED = Paged(
 )
 
 show_by(EffectCheck, _PAGED.view)
-to_json.register(EffectCheck, of_page(f"{__package__}.effect_check_page", "effect_check_json"))

@@ -7,7 +7,7 @@ import typer
 
 from chladni.cli.run import Allow, DeckOrCase, Out, Pictures, Units, started
 from chladni.progress import within
-from chladni.report.result_json import to_json
+from chladni.results import to_json
 from chladni.workflows.loaded_model import model_in_si, opened
 
 from . import PlanSettings
@@ -112,7 +112,7 @@ def run(
         cost=cost or (),
         separate=separate,
     )
-    from .detectable_page import detectable_section
+    from .detectable_page import detectable_json, detectable_section
     from .plan_page import plan_page
     from .separation_page import separation_in_words, separation_json
 
@@ -131,7 +131,8 @@ def run(
         if detect:
             band, stage = durations(found).band_hz, within(job.progress, 0.8, 1.0)
             smallest = smallest_findings(model, job.folder / "plan.json", band, noise, stage)
-            job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
+            found_by_it = detectable_json(smallest)
+            job.json("smallest.json", found_by_it, "smallest findings, place by place")
             section = detectable_section(model, smallest, noise)
             parts = replace(parts, sections=[*parts.sections, section])
         if found.separation is not None:

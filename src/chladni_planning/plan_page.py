@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from chladni.report.words import direction, fixed, hertz, number, percent, round
 from chladni.view import annotations, charts
 from chladni.workflows.loaded_model import Model
 
+from .plan_json import plan_json
 from .plan_summary import (
     AVERAGES,
     PER_BANDWIDTH,
@@ -51,6 +53,11 @@ def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
     body = sections(found, result, shown, model.structure)
     files = [("sensors.csv", "sensors and shakers, for case.toml")]
     return PageParts(lead(result), body, notes(found), files)
+
+
+def as_json(found: Plan) -> dict[str, Any]:
+    """Content of ``plan.json``."""
+    return plan_json(summary(found))
 
 
 def in_words(found: Plan) -> PageParts:

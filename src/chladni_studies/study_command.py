@@ -24,7 +24,7 @@ from chladni.cli.run import (
 from chladni.dynamics.frf import Quantity
 from chladni.errors import AccuracyError, FileError
 from chladni.progress import Progress
-from chladni.report.result_json import to_json
+from chladni.results import to_json
 from chladni.workflows.loaded_model import is_case
 
 from .parameter_study import study

@@ -38,7 +38,7 @@ READ = (
 )
 
 
-def study_json(found: ParameterStudy) -> dict[str, Any]:
+def as_json(found: ParameterStudy) -> dict[str, Any]:
     """``study.json``: ranges, provenance, sensitivities, what failed."""
     return {
         **found.provenance,

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from chladni.report.result_json import of_page, to_json
 from chladni.report.result_views import Paged
 from chladni.results import show_by
 
@@ -26,4 +25,3 @@ _PAGED = Paged(
 )
 
 show_by(ParameterStudy, _PAGED.view)
-to_json.register(ParameterStudy, of_page(f"{__package__}.study_page", "study_json"))

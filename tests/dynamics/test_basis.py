@@ -50,6 +50,21 @@ def test_what_a_block_adds_is_orthonormal_to_all_before():
     assert_allclose(whole.T @ (M @ whole), np.eye(6), atol=1e-10)
 
 
+def test_what_little_is_left_of_a_block_is_as_orthogonal(monkeypatch):
+    """A vector of which 1e-4 is new: its normalisation magnifies rounding errors by 1e4."""
+    rng = np.random.default_rng(4)
+    M = sp.diags_array(rng.uniform(0.5, 2.0, N)).tocsr()
+    known = (orthonormal(M, [rng.normal(size=(N, 30))]),)
+    block = known[0] @ rng.normal(size=(30, 3)) + rng.normal(size=(N, 3)) * [1e-4, 1e-4, 1.0]
+
+    def error():
+        return abs(known[0].T @ (M @ beyond(M, known, block))).max()
+
+    assert error() < 1e-14
+    monkeypatch.setattr(reduction, "LITTLE", 0.0)
+    assert error() > 1e-13
+
+
 def test_grown_bases_share_their_blocks():
     rng = np.random.default_rng(2)
     basis = Basis(blocks(rng))

@@ -132,6 +132,11 @@ def test_other_effects_have_no_local_score(reduced, responses, base, monkeypatch
     assert none(calibration_parameter(reduced.groups, "t", [0]))
     assert none(Patch((replace(term, rise=rising),)))
     assert none(Patch((replace(term, geometric=True),)))
+    idle = replace(term, operator=operator(reduced, 40, 3e4, np.random.default_rng(3)))
+    monkeypatch.setattr(module, "MOST_ROWS", len(np.unique(stiff.indices)))
+    assert not none(Patch((term,)))
+    assert none(Patch((term, replace(idle, coefficient=0.0))))  # it counts as soon as y moves
+    monkeypatch.undo()
     row, unit = reduced.candidates.rows[:1], np.ones(1)
     assert not none(Patch((PointTerm("K", row, unit, unit[None]),)))
     assert none(Patch((PointTerm("K", row, unit, unit[None], {0: row}),)))

@@ -16,7 +16,7 @@ from chladni.search.search_round import (
     BEHIND,
     _closer,
     _finished,
-    _leaders,
+    _leader,
     _tried,
     by_family,
 )
@@ -56,15 +56,17 @@ def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
 
 
 @pytest.mark.parametrize(
-    ("expected", "joint", "fitted"),
+    ("expected", "joint", "worst", "fitted"),
     [
-        ([50.0, 80.0, 40.0], [50.0, 80.0, 40.0], [2]),  # linear: the others stay behind
-        ([44.0, 80.0, 40.0], [30.0, 60.0, 20.0], [2]),  # all are 20 better than linear
-        ([50.0, 80.0, 40.0], [30.0, 60.0, 60.0], [2, 0]),  # 20 worse: the next may be the best
-        ([50.0, 80.0, None], [30.0, 60.0, None], [0]),  # no structure
+        ([50.0, 80.0, 40.0], [50.0, 80.0, 40.0], np.inf, [2]),  # linear: the others stay behind
+        ([44.0, 80.0, 40.0], [30.0, 60.0, 20.0], np.inf, [2]),  # all are 20 better than linear
+        ([50.0, 80.0, 40.0], [30.0, 60.0, 60.0], np.inf, [2, 0]),  # the next may be the best
+        ([50.0, 80.0, 40.0], [30.0, 60.0, 60.0], 31.0, [2, 0]),
+        ([50.0, 80.0, 40.0], [30.0, 60.0, 60.0], 29.0, [2]),  # another family is far ahead
+        ([50.0, 80.0, None], [30.0, 60.0, None], np.inf, [0]),  # no structure
     ],
 )
-def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, fitted):
+def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, worst, fitted):
     """The linear base may be as wrong about one place as about another; all places are known."""
     done = []
 
@@ -85,7 +87,8 @@ def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, f
         for k in range(3)
     ]
     tried = [Candidate(e, np.zeros(1), np.zeros(1)) for e in (*effects, effects[0])]
-    found = by_family(_leaders(problem, NULL, tried))
+    (lead,), others = _leader(problem, NULL, tried)
+    found = by_family(others.tried(problem, NULL, lead, worst))
     assert done == fitted
     assert found[0].fit.neg2_log_evidence == min(joint[k] for k in fitted)
     known = {found[0].effect.k, *(v.effect.k for v in found[0].optima)}

@@ -14,7 +14,7 @@ from tests.builders.structures import stiffer
 import chladni
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
-from chladni.report.result_json import to_json
+from chladni.results import to_json
 from chladni_studies import StudySettings
 
 CASE = """

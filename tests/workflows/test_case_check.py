@@ -20,7 +20,7 @@ from chladni.io.uff.write_shapes import write_shapes
 from chladni.io.uff.write_uff import binary_set, head_records, write_sets
 from chladni.output import plain
 from chladni.report.check_page import check_page
-from chladni.report.result_json import to_json
+from chladni.results import to_json
 from chladni.workflows.case_check import CaseFinding
 from chladni.workflows.output_only import with_natural_frequencies
 from chladni.workflows.ready_case import ready

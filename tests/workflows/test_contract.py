@@ -10,7 +10,7 @@ import chladni
 from chladni.cli.app import commands
 from chladni.output import plain
 from chladni.report.diagnosis_json import read_diagnosis
-from chladni.report.result_json import to_json
+from chladni.results import to_json
 from chladni_planning import PlanSettings
 
 WORKFLOW = {  # command: the function it calls

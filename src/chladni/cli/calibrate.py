@@ -53,7 +53,7 @@ def run(
     words = stated(sensors=sensors, mass=mass, units=units)
     if variants:
         from ..report.joint_models_page import joint_models_page
-        from ..report.result_json import to_json
+        from ..results import to_json
         from ..workflows.joint_models import joint_models
 
         with started("calibrate", source, out) as job:

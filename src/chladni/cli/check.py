@@ -9,8 +9,8 @@ import typer
 from ..errors import AccuracyError, FileError
 from ..progress import within
 from ..report.blocks import Items, Table
-from ..report.result_json import to_json
 from ..report.words import counted
+from ..results import to_json
 from ..workflows.case_check import check
 from ..workflows.deck_check import check_deck
 from ..workflows.loaded_model import is_case

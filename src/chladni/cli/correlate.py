@@ -9,7 +9,7 @@ import typer
 from ..errors import FileError
 from ..io.mesh_format import refuse_foreign
 from ..progress import within
-from ..report.result_json import to_json
+from ..results import to_json
 from ..workflows.correlate import correlate
 from ..workflows.loaded_model import is_case, load_model
 from ..workflows.other_modes import other_modes

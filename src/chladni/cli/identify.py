@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..case import load_case
-from ..report.result_json import to_json
+from ..results import to_json
 from ..workflows.identify import PoleChoice, identify
 from ..workflows.loaded_model import is_case
 from ..workflows.recordings_of import load_recordings

@@ -8,7 +8,7 @@ import typer
 from ..errors import FileError
 from ..io.nastran import write_deck
 from ..progress import within
-from ..report.result_json import to_json
+from ..results import to_json
 from ..units import units as unit_system
 from ..workflows.loaded_model import load_deck
 from ..workflows.map import map_formed

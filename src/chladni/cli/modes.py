@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from ..progress import within
-from ..report.result_json import to_json
+from ..results import to_json
 from ..workflows.loaded_model import load_model
 from ..workflows.modes import modes
 from .run import Allow, DeckOrCase, Out, Pictures, Units, started

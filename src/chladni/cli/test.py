@@ -7,7 +7,7 @@ import typer
 
 from ..case import load_case
 from ..ema.frf_estimate import EstimateSettings, Excitation, Method
-from ..report.result_json import to_json
+from ..results import to_json
 from ..workflows.evaluation import evaluate_recordings
 from ..workflows.loaded_model import is_case
 from ..workflows.recordings_of import load_recordings

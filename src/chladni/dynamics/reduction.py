@@ -23,6 +23,7 @@ from .modes import ModalModel
 from .system import System
 
 CUT = 1e-5  # relative length below which a vector adds nothing to a basis
+LITTLE = 0.01  # relative length below which rounding errors of a vector are removed once more
 STEPS = 2  # of subspace iteration: the first smooths point loads, the second turns to the modes
 MASSLESS = 1e-20  # of the heaviest dof with the largest motion: a smaller mass is rounding
 COLUMNS = 32  # of a block that are multiplied at once
@@ -49,8 +50,9 @@ def beyond(
     """M-orthonormal vectors (n, k) that a block (n, m) adds to M-orthonormal ones.
 
     Motions without mass (the spin of a straight row of bars) are left out. The block is made
-    orthogonal to the known vectors before and after its own normalisation. Two passes are enough
-    (Giraud et al. 2005, Numerische Mathematik 101, 87-100); one pass leaves rounding errors.
+    orthogonal to the known vectors. What is left of it, if ``LITTLE`` of its length or less, is so
+    again after its own normalisation, which magnifies rounding errors. Two passes are enough
+    (Giraud et al. 2005, Numerische Mathematik 101, 87-100).
     """
     heavy = np.concatenate([(V * (M @ V)).sum(axis=0) for V in _some(block)])
     heaviest = float(M.diagonal().max(initial=0.0)) * (block**2).max(axis=0, initial=0.0)
@@ -61,8 +63,8 @@ def beyond(
     _take_out(M, known, V)
     w, U = np.linalg.eigh(np.hstack([V.T @ (M @ some) for some in _some(V)]))
     keep = w > cut**2
-    V = V @ (U[:, keep] / np.sqrt(w[keep]))
-    _take_out(M, known, V)
+    V = V @ (U[:, keep] / np.sqrt(w[keep]))  # the shortest come first
+    _take_out(M, known, V[:, : int((w[keep] < LITTLE**2).sum())])
     return V
 
 

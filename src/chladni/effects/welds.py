@@ -43,6 +43,7 @@ SD = 1.2  # of the same: from next to nothing of the load to nearly all
 STARTS = (-1.5, 0.0, 1.5)
 SOUND = 40.0  # x of the deck's own
 GONE = -12.0  # x of a missing joint: as good as nothing left
+SCORED = (GONE, *STARTS)  # x at which a joint is scored, once for both kinds
 BY_POLES = 12  # fasteners tried where each costs eigenproblems
 FOLLOWED = 2  # about the calibrated model, and one more about the deck's
 SINGLE = 2  # half of the odds are those of one fastener, wherever it is ...
@@ -160,11 +161,10 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
         some = farthest_point_sample(np.array([tried[k][0].point for k in own]), BY_POLES)
         chosen = [effect(own[k]) for k in some]
         return best_places(context, chosen, FOLLOWED, anywhere=True, extended=True)
-    alone = [kind((kind.strength(float(share.min())),)) for _, share in tried]
-    left = np.array([[e.left(x[0])[0] for x in e.starts()] for e in alone])
+    left, mine = np.array([_left(share) for _, share in tried]), _own_starts(kind)
     out: dict[int, Candidate] = {}
     for about, base in reversed(tuple(enumerate(context.bases))):
-        score = context.scan.fastener_scores(about, left)
+        score = context.scan.fastener_scores(about, left)[:, mine]
         wanted = FOLLOWED if not out else FOLLOWED + 1
         for k in sorted(own, key=score.min(axis=1).__getitem__):
             if len(out) >= wanted:
@@ -236,11 +236,20 @@ def _run(
     kind: type[WeldCompliance], scan: ResponseScan, about: int, n: int, first: int, last: int
 ) -> FastenerRun:
     loose = scan.fastener_rows[n].run(first, last)
-    alone = kind((kind.strength(float(loose.share.min())),))
-    left = np.array([alone.left(x[0])[0] for x in alone.starts()])
-    score = scan.run_scores(about, n, first, last, left)
+    score = scan.run_scores(about, n, first, last, _left(loose.share))[_own_starts(kind)]
     k = int(np.argmin(score))
     return FastenerRun(float(score[k]), last - first + 1, loose.joint, loose.share, k)
+
+
+def _left(share: np.ndarray) -> np.ndarray:
+    """Remaining share of the stiffness of a joint at ``SCORED`` (4,)."""
+    joint = WeldCompliance((WeldCompliance.strength(float(share.min())),))
+    return np.array([joint.left(x)[0] for x in SCORED])
+
+
+def _own_starts(kind: type[WeldCompliance]) -> list[int]:
+    """Positions of the starts of a kind in ``SCORED``."""
+    return [SCORED.index(x) for x in kind.strength(1.0).starts]
 
 
 def softer(context: SearchContext) -> list[Candidate]:

@@ -81,7 +81,8 @@ class LocalEffect:
     def _operators(self, x: np.ndarray, y: np.ndarray) -> list[Operator]:
         """Operators of the effect, with its part in those of the base.
 
-        A factor of the base on modes does not multiply them here.
+        Those of the effect itself are there at every y, so that it has the same rows. A factor of
+        the base on modes does not multiply them here.
         """
         acting = acting_at([*self.base, self.effect], z := np.concatenate([x, y]))
         groups, split = self.reduced.model.groups, "" not in self.reduced.model.linear
@@ -92,7 +93,8 @@ class LocalEffect:
                 t = share.term
                 c = change.get(id(t.operator), ("", t.operator, 0.0))[2]
                 change[id(t.operator)] = t.matrix, t.operator, c + sign * t.coefficient
-        return [each for each in change.values() if each[2]]
+        own = {id(t.operator) for t in of(MatrixTerm, self.effect.terms(y))}
+        return [each for key, each in change.items() if each[2] or key in own]
 
     def _seated(self, operators: list[sp.csr_array], points: Sequence[PointTerm]) -> "_Rows":
         """Their rows; those of the last state where they are the same."""

@@ -152,15 +152,22 @@ class Code:
 
 
 Block = Text | Items | Facts | Table | Picture | Drawing | Links | Code
+_HELD = {
+    Text: "paragraphs", Items: "items", Facts: "facts", Table: "rows", Links: "files", Code: "lines"
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with its blocks; a section without blocks is left out."""
+    """A heading with its blocks; empty blocks, and a section without blocks, are left out."""
 
     title: str
     blocks: Sequence[Block]
     folded: str = ""  # its summary, where a reader opens the section
+
+    def __post_init__(self) -> None:
+        held = [b for b in self.blocks if type(b) not in _HELD or getattr(b, _HELD[type(b)])]
+        object.__setattr__(self, "blocks", held)
 
 
 @dataclass(frozen=True)

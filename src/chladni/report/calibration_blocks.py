@@ -72,11 +72,11 @@ def study_sections(
         return []
     return [
         Section("Identifiability", _known(study.identifiability)),
-        Section("Basins of the fit", _basins(study)),
-        Section("Articles fitted together", _articles(study)),
-        Section("Uncertainty of the values", [*_profiles(study), *_sample(study), *pictures]),
+        Section("Basins of the fit", [_basins(study)]),
+        Section("Articles fitted together", [_articles(study)]),
+        Section("Uncertainty of the values", [_profiles(study), *_sample(study), *pictures]),
         Section("Regions to free next", [*_regions(study), *energy]),
-        Section("Damping of the parts", _damping(study)),
+        Section("Damping of the parts", [_damping(study)]),
     ]
 
 
@@ -86,8 +86,6 @@ def _known(found: Identifiability) -> list[Block]:
          _percent(p.sd_after), _verdict(p))
         for p in found.parameters
     ]  # fmt: skip
-    if not rows:
-        return []
     heads = ("parameter", "plausible", "prior", "single", "all", "with priors", "verdict")
     index = _NONE if found.collinearity is None else number(found.collinearity, 3)
     caption = f"{_KNOWN} Collinearity index: {index} (above 10 to 15 the set trades off)."
@@ -102,7 +100,7 @@ def _known(found: Identifiability) -> list[Block]:
         if len(direction) > 1
     ]
     texts += [_along(p) for p in found.parameters if p.along]
-    return [table, *([Items(texts)] if texts else [])]
+    return [table, Items(texts)]
 
 
 def _plausible(p: ParameterKnowledge) -> str:
@@ -129,41 +127,37 @@ def _percent(sd: float | None) -> str:
     return _NONE if sd is None or sd > _FAR else f"{number(100 * sd, 2)} %"
 
 
-def _basins(study: CalibrationStudy) -> list[Block]:
-    if not study.basins:
-        return []
-    names = tuple(v.name for v in study.basins[0].values)
+def _basins(study: CalibrationStudy) -> Table:
+    names = [v.name for b in study.basins[:1] for v in b.values]
     rows = [
         (number(b.above, 3), str(b.starts), *(quantity(v.value, v.unit) for v in b.values))
         for b in study.basins
     ]
     heads = ("-2 ln evidence above the best", "starts", *names)
-    return [Table(heads, rows, caption=_BASINS.format(n=study.starts))]
+    return Table(heads, rows, caption=_BASINS.format(n=study.starts))
 
 
-def _profiles(study: CalibrationStudy) -> list[Block]:
+def _profiles(study: CalibrationStudy) -> Table:
     rows = [
         (p.name, *(f"{number(v, 3)} ({number(q, 3)}) at {quantity(at, p.unit)}" for at, v, q in
                    zip(p.values, p.neg2_log_likelihood, p.quadratic, strict=True)))
         for p in study.profiles
     ]  # fmt: skip
     heads = ("parameter", "-2 sd", "-1 sd", "+1 sd", "+2 sd")
-    return [Table(heads, rows, ("parameter",), _PROFILE)] if rows else []
+    return Table(heads, rows, ("parameter",), _PROFILE)
 
 
-def _articles(study: CalibrationStudy) -> list[Block]:
+def _articles(study: CalibrationStudy) -> Table:
     """Common mean, spread and values of several articles."""
-    if not study.articles:
-        return []
     rows = [
         (p.name, _within(p.mean, p.low, p.high, p.unit), _spread(p),
          *(f"{quantity(a.value, p.unit)} ({100 * a.away:+.2g} ± {100 * a.reach:.2g} %)"
            for a in p.articles))
         for p in study.articles
     ]  # fmt: skip
-    names = tuple(a.article for a in study.articles[0].articles)
+    names = [a.article for p in study.articles[:1] for a in p.articles]
     heads = ("parameter", "mean of all units", "spread of units", *names)
-    return [Table(heads, rows, heads, _TOGETHER)]
+    return Table(heads, rows, heads, _TOGETHER)
 
 
 def _regions(study: CalibrationStudy) -> list[Block]:
@@ -185,11 +179,11 @@ def _regions(study: CalibrationStudy) -> list[Block]:
     return [table, Text([_NEXT]), Code(found.words)]
 
 
-def _damping(study: CalibrationStudy) -> list[Block]:
+def _damping(study: CalibrationStudy) -> Table:
     """Loss factors of the parts."""
     rows = [(d.part, number(d.loss_factor, 2), f"{number(d.low, 2)} to {number(d.high, 2)}")
             for d in study.damping]  # fmt: skip
-    return [Table(("part", "loss factor", "95 %"), rows, ("part",), _LOSSES)] if rows else []
+    return Table(("part", "loss factor", "95 %"), rows, ("part",), _LOSSES)
 
 
 def _share(x: float) -> str:
@@ -213,7 +207,7 @@ def _sample(study: CalibrationStudy) -> list[Block]:
     ]  # fmt: skip
     heads = ("parameter", "draws", "Gaussian", "sd, draws / Gaussian", "autocorrelation [steps]",
              "effective draws")  # fmt: skip
-    return [Table(heads, rows, ("parameter",), f"{_DRAWN} {found.sentence}.")] if rows else []
+    return [Table(heads, rows, ("parameter",), f"{_DRAWN} {found.sentence}.")]
 
 
 def _within(value: float, low: float, high: float, unit: str) -> str:

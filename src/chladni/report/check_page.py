@@ -8,12 +8,12 @@ from ..output import plain
 from ..view.surface import surface
 from ..workflows.case_check import CaseCheck, CheckedDof
 from ..workflows.case_model import cords, markers
-from .blocks import Block, Facts, Items, PageParts, Section, Table
+from .blocks import Facts, Items, PageParts, Section, Table
 from .mesh_drawings import layout, mesh_of
 from .words import counted, direction, fixed, hertz, number, percent
 
 
-def check_json(found: CaseCheck) -> dict[str, Any]:
+def as_json(found: CaseCheck) -> dict[str, Any]:
     """``check.json``."""
     return {
         "facts": [{"what": what, "text": text} for what, text in found.facts],
@@ -32,11 +32,9 @@ def check_page(case: Case, found: CaseCheck) -> PageParts:
         outputs=markers(case.outputs), inputs=markers(case.inputs), cords=cords(case),
     )  # fmt: skip
     caption = "Sensors, shakers and cords; arrows: their directions."
-    blocks: list[Block] = [layout("where", shown, "sensors", caption, "sensors on the mesh")]
-    if found.dofs:
-        blocks.append(_table(found.dofs))
+    drawn = layout("where", shown, "sensors", caption, "sensors on the mesh")
     looks, facts, *told = in_words(found).sections
-    sections = [looks, facts, Section("Sensors", blocks), *told]
+    sections = [looks, facts, Section("Sensors", [drawn, _table(found.dofs)]), *told]
     return PageParts(_lead(found), sections)
 
 
@@ -46,20 +44,18 @@ def in_words(found: CaseCheck) -> PageParts:
     modes = ", ".join(number(f) for f in found.frequency)
     facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
     sections = [
-        Section("Possible errors", [Items(looks)] if looks else []),
-        Section("Data and settings in use", [Facts(facts), *_mesh(found)]),
+        Section("Possible errors", [Items(looks)]),
+        Section("Data and settings in use", [Facts(facts), _mesh(found)]),
         *(Section(f"For {who}", [Items(said)]) for who, said in _unused_words(found.unused)),
     ]
     return PageParts(_lead(found), sections)
 
 
-def _mesh(found: CaseCheck) -> list[Block]:
+def _mesh(found: CaseCheck) -> Table:
     """Elastic modes with the error that their mesh makes."""
-    if not len(found.converged):
-        return []
-    both = zip(found.frequency.tolist(), found.converged.tolist(), strict=True)
+    both = zip(found.frequency.tolist(), found.converged.tolist(), strict=False)
     rows = [(hertz(f), hertz(limit), percent(f, limit)) for f, limit in both]
-    return [Table(("model [Hz]", "on a fine mesh [Hz]", "off"), rows, caption=_MESH)]
+    return Table(("model [Hz]", "on a fine mesh [Hz]", "off"), rows, caption=_MESH)
 
 
 _MESH = (

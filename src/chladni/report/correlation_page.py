@@ -251,7 +251,7 @@ def _scores(found: Correlation, at: Mapping[str, int] = MappingProxyType({})) ->
     ]
 
 
-def correlation_json(result: Correlation) -> dict[str, Any]:
+def as_json(result: Correlation) -> dict[str, Any]:
     """The result for ``correlation.json``."""
     p, q, f, test = result.pairs, result.quality, result.f_model, result.f_test
     held: dict[str, Any] = {

@@ -168,7 +168,7 @@ def _decays(decays: tuple[RingDown, ...]) -> Table:
     return Table(heads, rows, ("output",), "Free decays, each followed until it reaches its noise.")
 
 
-def evaluation_json(result: Evaluation) -> dict[str, Any]:
+def as_json(result: Evaluation) -> dict[str, Any]:
     """The result for ``test.json``."""
     return {"recordings": [_evaluated(r) for r in result.recordings]}
 

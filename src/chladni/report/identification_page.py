@@ -361,7 +361,7 @@ def _span(f: np.ndarray) -> str:
     return f" from {number(f[0])} to {number(f[-1])} Hz"
 
 
-def identification_json(result: Identification) -> dict[str, Any]:
+def as_json(result: Identification) -> dict[str, Any]:
     """The result for ``identified.json``."""
     held: dict[str, Any] = {"recordings": [_recording(r) for r in result.recordings]}
     if result.levels:

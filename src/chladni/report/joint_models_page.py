@@ -15,7 +15,6 @@ _CAPTION = (
     "are fitted to the same data. After: calibrated. Frequencies: rms of ln(model/test). A model "
     "of a joint is better where the held-out Q is lower, with the same mass."
 )
-_NONE = "–"
 
 
 def joint_models_page(folder: Path, found: JointModels) -> PageParts:
@@ -40,8 +39,8 @@ def in_words(found: JointModels) -> PageParts:
         held = f"held out: {found.what}; the best model is chosen on these data"
     sections = [
         Section("Models of the joints", [table, Items([held])]),
-        Section("Not possible in this deck", [Items(refused)] if refused else []),
-        Section("Reasons not to trust a fit", [Items(doubts)] if doubts else []),
+        Section("Not possible in this deck", [Items(refused)]),
+        Section("Reasons not to trust a fit", [Items(doubts)]),
     ]
     return PageParts(_lead(found), sections, found.notes)
 
@@ -60,11 +59,10 @@ def _lead(found: JointModels) -> str:
 def _row(row: JointModelFit) -> tuple[str, ...]:
     a, b = row.fitted, row.held_out
     values = (a.nominal, a.calibrated, b.nominal, b.calibrated, *row.frequency_rms)
-    mass = _NONE if row.mass is None else number(row.mass, 5)
-    return (row.name, *(_NONE if x is None else number(x, 3) for x in values), mass)
+    return (row.name, *(number(x, 3) for x in values), number(row.mass, 5))
 
 
-def joint_models_json(found: JointModels) -> dict[str, Any]:
+def as_json(found: JointModels) -> dict[str, Any]:
     """Content of ``variants.json``."""
     return {
         "rows": [

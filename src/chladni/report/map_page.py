@@ -97,7 +97,7 @@ def _guessed(found: MappedDeck) -> list[Block]:
     return [*out, Table(heads, known, ("part",), caption=_GUESS)]
 
 
-def map_json(found: MappedDeck) -> dict[str, Any]:
+def as_json(found: MappedDeck) -> dict[str, Any]:
     """``mapping.json``."""
     fit, model = found.found.alignment, found.thinning
     return {

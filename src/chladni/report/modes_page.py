@@ -102,7 +102,7 @@ def _share(value: float) -> str:
     return "–" if not np.isfinite(value) else f"{100 * value:.1f} %"
 
 
-def modes_json(result: NormalModes) -> dict[str, Any]:
+def as_json(result: NormalModes) -> dict[str, Any]:
     """``modes.json``; without a unit system mass and centre are under names that claim none."""
     mass, centre = (
         ("mass_kg", "centre_of_gravity_m") if result.in_si else ("mass", "centre_of_gravity")

@@ -87,7 +87,7 @@ def _table(found: OtherModes, drawn: bool = False) -> Table:
     return Table(_HEADS, rows, caption=_CAPTION, opens=opens, at=range(len(rows)))
 
 
-def other_modes_json(found: OtherModes) -> dict[str, Any]:
+def as_json(found: OtherModes) -> dict[str, Any]:
     """``correlation.json`` of two sets of normal modes."""
     p, f, other = found.pairs, found.f_model, found.f_other
     return {

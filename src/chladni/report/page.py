@@ -45,8 +45,8 @@ def diagnosis_page(
     Parameters
     ----------
     result : DiagnosisResult
-    figures : dict     pictures by name; those of a drawing replace it on paper, known names are put
-                       in their section (``verdict.PLACES``), others at the end
+    figures : dict     pictures by name; those of a drawing replace it on paper, the others stand at
+                       the end
     notes : sentences  what was done and why
     tables : sections  anything more, put before the files
     command : str      the line that makes this run again

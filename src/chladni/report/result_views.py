@@ -25,9 +25,10 @@ class Paged:
     """
 
     command: str
-    module: str  # with ``in_words`` and a function that draws the page; ``.name``: one of this room
+    # with ``in_words``, ``as_json`` and a function that draws the page; ``.name``: one of this room
+    module: str
     page: Callable[[ModuleType, Path, Any], PageParts]  # (module, folder, result) -> PageParts
-    json: str = ""  # name of the file with the result as plain data; "": none
+    json: str = ""  # name of the file with the result by ``as_json``; "": none
     # writes more files into the folder and returns (name, what it is) of each
     files: Callable[[Any, Path], Sequence[tuple[str, str]]] = lambda *_: ()
     needs_origin: bool = True
@@ -46,6 +47,7 @@ class Paged:
             lambda found, folder, _, pictures: self._write(module, found, folder, pictures),
             _inputs,
             self.needs_origin,
+            module.as_json if self.json else dict,
         )
 
     def _stills(self, module: ModuleType, found: Any) -> Mapping[str, Still]:
@@ -56,13 +58,12 @@ class Paged:
 
     def _write(self, module: ModuleType, found: Any, folder: Path, pictures: bool) -> None:
         from .page import write_sections
-        from .result_json import to_json
 
         parts = self.page(module, folder, found)
         drawn = write_pictures(folder, drawings(parts.sections), pictures)
         files = [*self.files(found, folder), *parts.files, *drawn]
         if self.json:
-            write_json(folder / self.json, to_json(found))
+            write_json(folder / self.json, module.as_json(found))
             files.append((self.json, "the result for other programs"))
         body = [*parts.sections, *closing_sections(parts.notes, files)]
         figures = {Path(name).stem: folder / name for name, _ in drawn}
@@ -74,8 +75,8 @@ def closing_sections(notes: Sequence[str], files: Sequence[tuple[str, str]]) -> 
     from .blocks import Links
 
     return [
-        Section("Steps and reasons", [Items(notes)] if notes else []),
-        Section("Files", [Links(files)] if files else []),
+        Section("Steps and reasons", [Items(notes)]),
+        Section("Files", [Links(files)]),
     ]
 
 
@@ -89,8 +90,8 @@ def _text(parts: PageParts) -> str:
 def _html(title: str, parts: PageParts) -> str:
     from .page import page_text
 
-    notes = Section("Steps and reasons", [Items(parts.notes)] if parts.notes else [])
-    return page_text(title, [*parts.sections, notes], lead=parts.lead)
+    closing = closing_sections(parts.notes, ())
+    return page_text(title, [*parts.sections, *closing], lead=parts.lead)
 
 
 def _inputs(found: Any) -> Sequence[Path]:
@@ -102,6 +103,7 @@ def _inputs(found: Any) -> Sequence[Path]:
 def _diagnosis() -> View:
     from .diagnosis_drawings import drawings as drawings_of
     from .diagnosis_folder import shown, write_diagnosis
+    from .diagnosis_json import diagnosis_json
     from .page import diagnosis_page
     from .sentence import sentence
     from .verdict import sections, three_numbers
@@ -122,7 +124,7 @@ def _diagnosis() -> View:
     def save(found: "DiagnosisResult", folder: Path, home: Path, pictures: bool) -> None:
         write_diagnosis(folder, found.origin, found, home=home, pictures=pictures)
 
-    return View("diagnose", summary, diagnosis_page, stills, save, _inputs)
+    return View("diagnose", summary, diagnosis_page, stills, save, _inputs, json=diagnosis_json)
 
 
 def _mapped(found: "MappedDeck", folder: Path) -> Sequence[tuple[str, str]]:

@@ -42,7 +42,7 @@ def compared_runs(a: FinishedRun, b: FinishedRun, place: Path) -> PageParts:
     caption = f"The files hold {left} more." if left > 0 else ""
     sections = [
         Section("Results", [Table(heads, first, heads), pages]),
-        Section("Values", [Table(heads, rows[:_MOST], heads, caption)] if rows else []),
+        Section("Values", [Table(heads, rows[:_MOST], heads, caption)]),
         Section("Charts of both", _charts(a, b, names)),
     ]
     same = a.lead == b.lead

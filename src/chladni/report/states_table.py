@@ -3,9 +3,10 @@
 import re
 
 from ..effects.estimate import Estimate
+from ..inference.result import Agreement
 from ..workflows.diagnosis_result import DiagnosisResult, StateResult
 from .blocks import Block, Table
-from .words import number
+from .words import interval, number, quantity
 
 
 def state_folder(result: DiagnosisResult, k: int) -> str:
@@ -25,32 +26,29 @@ def states_table(result: DiagnosisResult) -> list[Block]:
     out: list[Block] = [Table(heads, rows, words, note)]
     if result.shared:
         shared = [
-            (p.where, number(p.deck_value), _size(p.estimate), p.estimate.unit)
+            (p.where, quantity(p.deck_value, p.estimate.unit), _size(p.estimate))
             for p in result.shared
         ]
         said = "Shared by all states and fitted to all their recordings together."
-        out.append(Table(("parameter", "deck", "all states", "unit"), shared, ("parameter",), said))
+        out.append(Table(("parameter", "deck", "all states"), shared, ("parameter",), said))
     return out
 
 
 def _row(s: StateResult, folder: str) -> tuple[str, ...]:
     effects = s.result.effects
-    fit = s.result.agreement.fitted if s.result.agreement else None
+    fit = (s.result.agreement or Agreement()).fitted
     return (
         s.name or "(no name)",
         s.result.verdict,
         "; ".join(e.name for e in effects) or "–",
         "; ".join(e.where.text for e in effects) or "–",
-        "; ".join(
-            ", ".join(f"{p.name} = {_size(p)} {p.unit}" for p in e.parameters) for e in effects
-        )
+        "; ".join(", ".join(f"{p.name} = {_size(p)}" for p in e.parameters) for e in effects)
         or "–",
-        number(fit.nominal) if fit else "–",
-        number(fit.after) if fit else "–",
+        number(fit.nominal),
+        number(fit.after),
         folder,
     )
 
 
 def _size(p: Estimate) -> str:
-    """The value and its interval."""
-    return f"{number(p.value)} ({number(p.low)} to {number(p.high)})"
+    return interval(p.value, p.low, p.high, p.unit)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from statistics import mean
 
 from ..effects.estimate import Estimate, Location
 from ..inference.calibration_result import ParameterKnowledge
@@ -18,7 +19,6 @@ from .blocks import Block, Code, Drawing, Facts, Items, Links, Picture, Section,
 from .calibration_blocks import study_sections
 from .level_blocks import level_section
 from .measurement_table import next_measurements
-from .recording_scores import recording_scores
 from .screening_blocks import screening_section
 from .states_table import states_table
 from .words import criterion, fixed, hertz, interval, number, percent, quantity
@@ -40,19 +40,7 @@ TONE = {
     "nonlinear": "warn",
     "not in catalogue": "warn",
 }
-PLACES = {  # section: pictures of a run that stand there where the page does not draw them
-    "frf": ("frf", "frf_fitted", "frf_held_out", "frf_grid"),
-    "scores": ("waterfall", "held_out", "fit_test", "left", "deviation"),
-    "study": ("profiles", "corner", "articles", "bands"),
-    "guidance": ("energy",),
-    "modes": ("frequencies", "mac", "modes", "stabilisation"),
-    "why": ("evidence",),
-    "test": ("setup",),
-    "found": ("where_2", "where_3"),
-    "next": ("information",),
-}
 APART = 0.01  # relative difference of a written value from the found one that is explained
-LEVELS = "levels_"  # pictures of modes over levels: with the number of the mode
 _FILES = {
     "deck": "the updated deck",
     "calibrated": "the deck calibrated without the effect",
@@ -82,9 +70,8 @@ def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
     if before is not None and after is not None:
         text = f"{one} deck {number(before, 3)} → {last} deck {number(after, 3)}"
         facts.append(("Held-out deviation Q", f"{text} ({percent(after, before)})"))
-    off = [_mean_off(result, key) for key in ("before_hz", "after_hz")]
-    if off[0] is not None:
-        text = " → ".join(f"{number(100 * x, 2)} %" for x in off if x is not None)
+    if (off := [_off(result, key) for key in ("before_hz", "after_hz")])[0]:
+        text = " → ".join(_in_percent(mean(x)) for x in off if x)
         facts.append(("Frequencies, mean deviation", text))
     if mass is not None and mass.model_kg is not None:
         weighed = f", weighed {number(mass.weighed_kg)} kg" if mass.weighed_kg else ", not weighed"
@@ -92,14 +79,17 @@ def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
     return facts
 
 
-def _mean_off(result: DiagnosisResult, key: str) -> float | None:
-    """Mean |f/f_test - 1| over the modes with a partner."""
-    off = [abs(f / r.test_hz - 1) for r in result.frequencies if r.test_hz
-           if (f := getattr(r, key))]  # fmt: skip
-    return sum(off) / len(off) if off else None
+def _off(result: DiagnosisResult, key: str) -> list[float]:
+    """|f/f_test - 1| of the modes with a partner."""
+    return [abs(f / r.test_hz - 1) for r in result.frequencies if r.test_hz
+            if (f := getattr(r, key))]  # fmt: skip
 
 
-def _joints(result: DiagnosisResult) -> list[Block]:
+def _in_percent(x: float) -> str:
+    return f"{number(100 * x, 2)} %"
+
+
+def _joints(result: DiagnosisResult) -> Table:
     """Tabulate the joints of a linear deck at every level."""
     rows = [tuple(number(x) for x in vars(j).values()) for j in result.joints]
     heads = ("mode [Hz]", "level", "K, times", "GE", "share of strain energy")
@@ -107,7 +97,7 @@ def _joints(result: DiagnosisResult) -> list[Block]:
         "Springs and bushes of a linear deck that matches the mode at one level: K relative to "
         "the updated deck, and GE (PBUSH). The updated deck contains them as comments."
     )
-    return [Table(heads, rows, caption=what)] if rows else []
+    return Table(heads, rows, caption=what)
 
 
 def sections(
@@ -122,70 +112,52 @@ def sections(
 
     ``figures`` are the pictures that there are, by name.
     """
-    held = {name for d in drawings for name in d.pictures}
-    rest = {name: path for name, path in figures.items() if name not in held and name != "where"}
+    held = {name for d in drawings for name in d.pictures} | {"where"}
 
-    def shown(place: str) -> list[Block]:
-        own: list[Block] = [d for d in drawings if d.place == place]
-        known = [name for name in PLACES.get(place, ()) if name in rest]
-        return [*own, *(Picture(rest.pop(name)) for name in known)]
+    def shown(place: str) -> list[Drawing]:
+        return [d for d in drawings if d.place == place]
 
     found = screening_section(result.screening)
-    of_levels: dict[int, Block] = {_mode(d.name): d for d in drawings if d.place == "levels"}
-    for name in [n for n in rest if n.startswith(LEVELS) and n.removeprefix(LEVELS).isdecimal()]:
-        of_levels[_mode(name)] = Picture(rest.pop(name))
+    of_levels = {int(d.name.rpartition("_")[2]) - 1: d for d in shown("levels")}
     return [
-        Section("Reasons for doubt", [Items(result.distrust)] if result.distrust else []),
+        Section("Reasons for doubt", [Items(result.distrust)]),
         *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
-        Section("Next measurement", [*_advised(result), *shown("next")]),
-        Section("At a glance", _glance(result)),
+        Section("Next measurement", [next_measurements(result.next_measurements), *shown("next")]),
+        Section("At a glance", [_glance(result)]),
         Section("Findings", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),
-        Section("Joints at each level", _joints(result)),
+        Section("Joints at each level", [_joints(result)]),
         Section("Calibrated parameters", _calibrated(result)),
         *study_sections(result.study, shown("study"), shown("guidance")),
         Section("Test and model", shown("frf")),
-        Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),
-        Section("Frequencies", [*_frequencies(result), *shown("modes")]),
-        Section("Why not something else", [*_alternatives(result), *shown("why")]),
+        Section("Scores", [_scores(result), _recordings(result), *shown("scores")]),
+        Section("Frequencies", [_frequencies(result), *shown("modes")]),
+        Section("Why not something else", [_alternatives(result), *shown("why")]),
         Section("The test", shown("test")),
         *([found] if result.screening and not result.screening.findings else []),
-        Section("Steps and reasons", [Items(list(notes))] if notes else []),
+        Section("Steps and reasons", [Items(notes)]),
         *more,
-        Section("More pictures", [Picture(path, name) for name, path in rest.items()]),
-        Section("Files", _files(result)),
-        Section("Run it again", [Code([command])] if command else []),
+        Section("More pictures", [Picture(p, n) for n, p in figures.items() if n not in held]),
+        Section("Files", [_files(result)]),
+        Section("Run it again", [Code([command] if command else [])]),
     ]
 
 
-def _advised(result: DiagnosisResult) -> list[Block]:
-    """Tabulate the next measurements, where explanations are open."""
-    return [next_measurements(every)] if (every := result.next_measurements) else []
-
-
-def _mode(name: str) -> int:
-    """Position of the mode over levels in the name of its drawing."""
-    return int(name.removeprefix(LEVELS)) - 1
-
-
-def _glance(result: DiagnosisResult) -> list[Block]:
+def _glance(result: DiagnosisResult) -> Facts:
     """Numbers in addition to the three of the first screen."""
     facts, fit = [], (result.agreement or Agreement()).fitted
     if fit.nominal is not None and fit.after is not None:
         change = percent(fit.after, fit.nominal)
         text = f"{number(fit.nominal, 3)} → {number(fit.after, 3)} ({change})"
         facts.append(("Q, fitted data", text))
-    rows = [r for r in result.frequencies if r.test_hz]
-    for name, key in (("before", "before_hz"), ("after", "after_hz")):
-        off = [abs(f / r.test_hz - 1) for r in rows if (f := getattr(r, key))]
-        if off:
-            mean, worst = 100 * sum(off) / len(off), 100 * max(off)
-            text = f"mean error {number(mean, 2)} %, largest {number(worst, 2)} %"
+    for name in ("before", "after"):
+        if off := _off(result, f"{name}_hz"):
+            text = f"mean error {_in_percent(mean(off))}, largest {_in_percent(max(off))}"
             facts.append((f"Frequencies {name}", text))
     if result.adequate is not None:
         facts.append(("Test of fit", _fits(result.adequate)))
-    return [Facts(facts)] if facts else []
+    return Facts(facts)
 
 
 def _fits(test: Adequacy) -> str:
@@ -312,10 +284,10 @@ _REACHED = (
 )
 
 
-def _scores(result: DiagnosisResult) -> list[Block]:
-    if result.agreement is None:
-        return []
-    fit, held = result.agreement.fitted, result.agreement.held_out
+def _scores(result: DiagnosisResult) -> Table:
+    """Tabulate Q of every deck on fitted and on held-out data."""
+    agreement = result.agreement or Agreement()
+    fit, held = agreement.fitted, agreement.held_out
     steps = (
         ("nominal deck", "nominal", False),
         ("calibrated deck without an effect", "calibrated", True),
@@ -335,15 +307,27 @@ def _scores(result: DiagnosisResult) -> list[Block]:
         sides = zip(values, (fit, held), strict=True)
         changes = [percent(v, q.nominal) if changed else "–" for v, q in sides]
         rows.append((name, number(values[0]), changes[0], number(values[1]), changes[1]))
-    if not rows:
-        return []
     columns = ("model", "Q fitted", "change", "Q held out", "change ")
-    what = f"Held out: {result.agreement.what}. " if result.agreement.what else ""
+    what = f"Held out: {agreement.what}. " if agreement.what else ""
     what += f"Q: mean {_MEANING[result.compared]}; lower is better. "
     what += "Every run of the same deck gives the same Q."
-    return [Table(columns, rows, ("model",), what)]
+    return Table(columns, rows, ("model",), what)
 
 
+def _recordings(result: DiagnosisResult) -> Table:
+    """Tabulate Q of every deck on each repeat, article and level that was held out."""
+    rows = [
+        (r.name, r.relation, *map(number, (r.apart, r.nominal, r.calibrated, r.with_effect)))
+        for r in result.recordings
+    ]
+    heads = ("recording", "is a", "apart", "nominal deck", "calibrated deck", "updated deck")
+    return Table(heads, rows, ("recording", "is a"), _APART)
+
+
+_APART = (
+    "Q of the decks on the held-out recordings, over all lines and channels. 'Apart' is the Q of "
+    "the fitted recording on them: no deck can be expected to come closer."
+)
 _MEANING = {
     "responses": "over channels and lines of |log10(H model / H test)|²",
     "frequencies": "over the paired frequencies of |log10(f model / f test)|²",
@@ -351,7 +335,7 @@ _MEANING = {
 }
 
 
-def _frequencies(result: DiagnosisResult) -> list[Block]:
+def _frequencies(result: DiagnosisResult) -> Table:
     rows = [
         (
             hertz(r.test_hz),
@@ -367,10 +351,10 @@ def _frequencies(result: DiagnosisResult) -> list[Block]:
     ]
     heads = ("test [Hz]", "damping [%]", "before [Hz]", "off", "after [Hz]", "off ", "MAC before",
              "MAC after")  # fmt: skip
-    return [Table(heads, rows, opens="shapes", at=range(len(rows)))] if rows else []
+    return Table(heads, rows, opens="shapes", at=range(len(rows)))
 
 
-def _alternatives(result: DiagnosisResult) -> list[Block]:
+def _alternatives(result: DiagnosisResult) -> Table:
     named = [e.log_evidence for e in result.effects]
     top = max((value for value in named if value is not None), default=None)
     rows = []
@@ -379,9 +363,8 @@ def _alternatives(result: DiagnosisResult) -> list[Block]:
         below = None if value is None or top is None else value - top
         rows.append((other.name, number(value), number(below), other.why_not))
     heads = ("explanation", "log evidence", "compared with the best", "why not")
-    return [Table(heads, rows, ("explanation", "why not"))] if rows else []
+    return Table(heads, rows, ("explanation", "why not"))
 
 
-def _files(result: DiagnosisResult) -> list[Block]:
-    files = [(str(f), _FILES.get(name, name)) for name, f in result.files.items() if f]
-    return [Links(files)] if files else []
+def _files(result: DiagnosisResult) -> Links:
+    return Links([(str(f), _FILES.get(name, name)) for name, f in result.files.items() if f])

@@ -28,7 +28,7 @@ from ..inference.scan import (
 )
 from ..parallel import in_parallel
 from ..reduced.local_effect import LocalEffect
-from ..reduced.reduced_model import evaluate
+from ..reduced.reduced_model import Reduced, evaluate
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .pole_starts import global_starts
 
@@ -229,6 +229,8 @@ class UpdatingContext:
         if local is None:
             wider = extended or effect.release is not None
             model = (reduced.model_for if wider else model.split_for)(effect, starts[0])
+            if "" not in model.linear:
+                self._components[effect.text] = model  # every start of the effect is scored on it
         data = self.problem.data.rebased(model)
         ways = WIDE if isinstance(data, Poles) else (0.0,)
         out = np.full((len(ways), len(starts)), np.inf)
@@ -250,6 +252,10 @@ class UpdatingContext:
                 r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
+
+    @cached_property
+    def _components(self) -> dict[str, Reduced]:
+        return {}
 
     def own(self, effect: Effect, start: np.ndarray) -> tuple[float, np.ndarray]:
         """-2 ln evidence at the own optimum of an effect, and the optimum; inf without one."""
@@ -329,15 +335,28 @@ class UpdatingContext:
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
         """Score of each fastener with some of its stiffness left (n, k)."""
-        base, reduced = self.baselines[about], self.problem.reduced
-        return fastener_scores(base, reduced, self.data, self.loosened, left)
+        return self._loosened_once(about, self.loosened, left, (about,))
 
     def run_scores(
         self, about: int, row: int, first: int, last: int, left: np.ndarray
     ) -> np.ndarray:
         """Score of a run of a row with some of its stiffness left (k,)."""
-        base, run = self.baselines[about], self.fastener_rows[row].run(first, last)
-        return fastener_scores(base, self.problem.reduced, self.data, [run], left[None])[0]
+        run = self.fastener_rows[row].run(first, last)
+        return self._loosened_once(about, [run], left[None], (about, row, first, last))[0]
+
+    def _loosened_once(
+        self, about: int, joints: Sequence[Loosened], left: np.ndarray, key: tuple[int, ...]
+    ) -> np.ndarray:
+        """Scores (n, k) of joints that ``key`` names; several families try the same ones."""
+        known, key_too = self._loose, (key, left.tobytes())
+        if key_too not in known:
+            base, reduced = self.baselines[about], self.problem.reduced
+            known[key_too] = fastener_scores(base, reduced, self.data, joints, left)
+        return known[key_too]
+
+    @cached_property
+    def _loose(self) -> dict[tuple[tuple[int, ...], bytes], np.ndarray]:
+        return {}
 
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]

@@ -4,9 +4,9 @@ The base of the round contains the effects found before it. A later round theref
 of an effect in addition to the others.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,12 +52,15 @@ def search_round(
     later = least is not None  # the bases of the first round are still there
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
     progress(f"trying {len(tried)} candidates", 0.0)
-    families = _by_name(tried)
+    families, others = _by_name(tried), dict[str, _Others]()
     every = in_parallel(_fits(problem, null), families.values())
-    for k, (name, fits) in enumerate(zip(families, every, strict=True)):
+    for k, (name, (fits, others[name])) in enumerate(zip(families, every, strict=True)):
         progress(f"tried {name}", 0.8 * (k + 1) / len(families))
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
         give_back_freed_memory()
+    worst = BEHIND + min((t.neg2_log_evidence for t in hypotheses), default=0.0)
+    more = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
+    hypotheses = _lighter(problem, by_family([t for fits in more for t in fits]), whole)
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(hypotheses, null.neg2_log_evidence)
     progress("refining the place", 0.8)
@@ -117,27 +120,55 @@ def _by_name(tried: Sequence[Candidate]) -> dict[str, list[Candidate]]:
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class _Others:
+    """Other optima of a family than the best, best first; each with its base (n_base,).
+
+    ``slack`` is the largest difference of a joint fit from what its own optimum let expect.
+    """
+
+    optima: Sequence[LocalOptimum] = ()
+    bases: Mapping[LocalOptimum, np.ndarray] = field(default_factory=dict)
+    slack: float = 0.0
+
+    def tried(
+        self, problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit, worst: float
+    ) -> list[HypothesisFit]:
+        """Fit those jointly that may become the best of the family, and better than ``worst``.
+
+        The linear base may be as wrong about another as it was about the best.
+        """
+        fits, slack = [lead], self.slack
+        for k, own in enumerate(self.optima):
+            expected = own.neg2_log_evidence
+            if expected - slack > min(fits[0].neg2_log_evidence, worst):
+                return [fits[0].knowing(self.optima[k:]), *fits[1:]]
+            found = _tried(problem, null, own.effect, own.x, self.bases[own])
+            slack = max([slack, *(abs(expected - t.neg2_log_evidence) for t in found)])
+            fits = sorted([*fits, *found], key=lambda t: t.neg2_log_evidence)
+        return fits
+
+
 def _fits(
     problem: UpdatingProblem, null: HypothesisFit
-) -> Callable[[Sequence[Candidate]], list[HypothesisFit]]:
+) -> Callable[[Sequence[Candidate]], tuple[list[HypothesisFit], _Others]]:
     """A function that fits the candidates of a family roughly.
 
     Poles are paired anew by every change: each candidate is fitted from its start. With responses
     each candidate's own parameters are optimised first, and the base is linear about the null or
-    the deck. The best is then fitted jointly, and others where their joint fit may be the best.
-    The linear base may be as wrong about another as it was about the best.
+    the deck. The best is then fitted jointly.
     """
     if isinstance(problem.data, Responses):
-        return lambda tried: _leaders(problem, null, tried)
-    return lambda tried: [
-        t for c in tried for t in _tried(problem, null, c.effect, c.start, c.base)
-    ]
+        return lambda tried: _leader(problem, null, tried)
+    return lambda tried: (
+        [t for c in tried for t in _tried(problem, null, c.effect, c.start, c.base)], _Others()
+    )  # fmt: skip
 
 
-def _leaders(
+def _leader(
     problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate]
-) -> list[HypothesisFit]:
-    """Rough joint fits of the leading candidates of a family, from their own optima."""
+) -> tuple[list[HypothesisFit], _Others]:
+    """Rough joint fits of the leading candidate of a family, from its own optimum; the others."""
     bases, lead = dict[LocalOptimum, np.ndarray](), None
     for c in {(c.effect.text, *c.start): c for c in tried}.values():
         with suppress(*FAILED):
@@ -146,15 +177,12 @@ def _leaders(
             if all(own.neg2_log_evidence < other.neg2_log_evidence for other in bases):
                 lead = model  # the only one of them that is kept
             bases[own] = base
-    optima, fits, slack = distinct(bases), list[HypothesisFit](), 0.0
+    optima = distinct(bases)
     for k, own in enumerate(optima):
-        expected = own.neg2_log_evidence
-        if fits and expected - slack > fits[0].neg2_log_evidence:
-            return [fits[0].knowing(optima[k:]), *fits[1:]]
-        found = _tried(problem, null, own.effect, own.x, bases[own], lead)
-        slack = max([slack, *(abs(expected - t.neg2_log_evidence) for t in found)])
-        fits, lead = sorted([*fits, *found], key=lambda t: t.neg2_log_evidence), None
-    return fits
+        if fits := _tried(problem, null, own.effect, own.x, bases[own], None if k else lead):
+            slack = max(abs(own.neg2_log_evidence - t.neg2_log_evidence) for t in fits)
+            return fits, _Others(optima[k + 1 :], bases, slack)
+    return [], _Others()
 
 
 def _tried(
@@ -251,7 +279,7 @@ def _closer(
 def _of_the_same_lump(
     problem: UpdatingProblem, hypotheses: Sequence[HypothesisFit]
 ) -> list[HypothesisFit]:
-    """All hypotheses that may be the leading mass, begun at its place with its mass.
+    """Other hypotheses that may be the leading mass, begun at its place with its mass.
 
     A point mass at the edge of a tailgate (tuning 561) had converged 16 mm from its place with a
     gain of 113, and a resonator led with 222. Begun at the resonator's place, the mass gains 226.
@@ -262,7 +290,7 @@ def _of_the_same_lump(
     x = lead.fit.of(lead.effect)
     lump = np.array(lead.effect.location(x).point_m), lead.effect.parameters[0].value(x[0])
     base, out = taken(problem, lead, ("calibration", "nuisance")), list[HypothesisFit]()
-    for family in problem.families:
+    for family in (f for f in problem.families if f.name != lead.effect.name):
         begun = None if family.of_lump is None else family.of_lump(problem.where, *lump)
         if begun is not None and not already_there(problem, *begun):
             with suppress(*FAILED):
