@@ -188,7 +188,7 @@ def sections(found: Plan, result: PlanSummary, shown: Shown, built: Structure) -
         Section("Sensors", _sensors(found, result, shown)),
         *_apart(found),
         Section("Modes", _modes(found, result, shown, built)),
-        Section("Shaker and cords", _shaker(found, result, shown)),
+        Section(f"Shaker{' and cords' * bool(len(result.hangers))}", _shaker(found, result, shown)),
         Section("Lines and duration", [Text([_test(result.test)])]),
     ]
 
@@ -327,13 +327,13 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
         )
         for k, a in enumerate(result.actuators[:10])
     ]
-    s = result.scores
+    s, free = result.scores, len(result.hangers) > 0
     facts = [
         ("Seen by the sensors", f"{s.observability_rank} of {s.states} states (rank of the "
          "observability matrix)"),
         ("Best and worst seen state", f"{_ratio(s.gramian_quotient)} apart in amplitude (square "
          "root of the quotient of the observability Gramian)"),
-        ("Cords at grids", ", ".join(str(g) for g in result.hangers)),
+        *([("Cords at grids", ", ".join(map(str, result.hangers)))] if free else []),
     ]  # fmt: skip
     caption = (
         "Condition: best driven mode over the one driven least (Hankel singular values), the lower "
@@ -347,10 +347,10 @@ def _shaker(found: Plan, result: PlanSummary, shown: Shown) -> list[Block]:
     table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
     cords = [_hanger(found, int(g)) for g in result.hangers]
     placed = replace(shown, inputs=best, cords=cords)
-    what, rank = "Ten best shaker places (orange), cords (green).", "shaker, by rank"
+    what = f"Ten best shaker places (orange){', cords (green)' * free}."
     return [
         Facts(facts),
-        layout("shaker", placed, "shaker", what, "shaker and cords", rank),
+        layout("shaker", placed, "shaker", what, "shaker and cords", "shaker, by rank"),
         table,
     ]
 

@@ -40,6 +40,7 @@ from .rattle import Openings, Rattle, first_rattle, openings
 from .sensor_candidates import SensorCandidates, find_sensor_candidates
 
 SPARE = 6  # modes computed beyond the target modes, for the sweep over more modes
+_CORDS = 4  # of an article that hangs
 BLIND = 0.25  # of the floor: a mode that no place sees better is no target of the layout
 
 
@@ -157,7 +158,7 @@ class Plan(Result):
     quotient : float              of the observability gramian (Echaniz Granado 2015, section 4.1.1)
     auto_mac : (r, r)             at the sensors
     loaded : (r,)                 frequencies with the sensors' mass on [Hz]
-    hangers : (k,) int            grids, the quietest first
+    hangers : (k,) int            grids, the quietest first; none of a structure that is held
     quiet : (k,)                  their rms motion over the first modes, of the largest anywhere
     rules : PlaceRules            on the surface of the model
     notes : the unit system, where it was guessed
@@ -252,7 +253,7 @@ def plan_test(
     together = best_actuators(shaker, settings.actuators, ranking.allowed if enough else None)
     if not np.isfinite(shaker.condition(together)):
         together = np.sort(ranking.order[: settings.actuators])
-    hangers, quiet = hang_points(moving[:, :, :r], places)
+    hangers, quiet = hang_points(moving[:, :, :r], places, _CORDS if first else 0)
     three = places.moving(moving, mounts.place[layout])[..., :r]
     return Plan(
         settings,
@@ -378,7 +379,7 @@ def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int,
 
 
 def hang_points(
-    moving: np.ndarray, places: SensorCandidates, count: int = 4, first: int = 5
+    moving: np.ndarray, places: SensorCandidates, count: int, first: int = 5
 ) -> tuple[np.ndarray, np.ndarray]:
     """Grids that move least in the first modes, well apart: cords add least near nodes.
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tests.builders.structures import joined
 
+import chladni
 import chladni_planning as pretest
 from chladni.errors import ModelError, ShapeError
 from chladni.fem.assemble import structure
@@ -14,6 +15,7 @@ from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.model.assembly import Scalars
 from chladni_planning import PlanSettings, find_sensor_candidates, plan_test, sensors_csv, summary
+from chladni_planning.plan_page import plan_page
 from chladni_planning.whole_plan import target_modes
 from chladni_specimens.plates import box, folded_panel, plate
 
@@ -234,6 +236,16 @@ def test_hang_points_are_quiet_and_apart(found):
     apart = np.linalg.norm(at[:, None] - at, axis=2)
     size = np.linalg.norm(np.ptp(found.places.points, axis=0))
     assert apart[np.triu_indices(len(at), 1)].min() >= 0.3 * size - 1e-12
+
+
+def test_a_clamped_structure_needs_no_cords(tmp_path):
+    """The plan names none, nor does its page; cords would only add stiffness."""
+    sheet = plate(0.3, 0.2, 6, 4, 1e-3)
+    edge = np.flatnonzero(sheet.points[:, 0] == sheet.points[:, 0].min())
+    held = replace(sheet, supports=np.array([(row, c) for row in edge for c in range(1, 7)]))
+    made = chladni.plan(held, sensors=4, modes=3, draws=0)
+    assert not len(made.hangers)
+    assert "Shaker" in [s.title for s in plan_page(tmp_path, made.origin, made).sections]
 
 
 def test_spacing_is_kept(panel, built):

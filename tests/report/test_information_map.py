@@ -52,7 +52,8 @@ def test_a_run_keeps_its_mesh_and_next_draws_on_it(tmp_path):
     shown = shown_of_run(tmp_path)
     assert_allclose(shown.seen.points, SEEN.points, atol=1e-6)
     assert (shown.seen.faces == SEEN.faces).all()
-    ran("next", tmp_path, "--out", tmp_path / "out")
+    ran("next", tmp_path, "--pictures", "--out", tmp_path / "out")
+    assert (tmp_path / "out" / "information.png").is_file()
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Information expected of one more sensor" in page
 

@@ -112,11 +112,14 @@ def read(path):
 
 def test_text_of_decks_and_recordings_is_escaped(tmp_path):
     """Whatever field a deck or a recording can fill: no tag comes out of it."""
-    more = [Section(EVIL, [Text([EVIL]), Table((EVIL,), [(EVIL,)]), Facts([(EVIL, EVIL)])])]
+    more = [
+        Section(EVIL, [Text([EVIL, f"`{EVIL}`"]), Table((EVIL,), [(EVIL,)]), Facts([(EVIL, EVIL)])])
+    ]
     page = write_page(tmp_path, RESULT, {}, [EVIL], more, command=EVIL, title=EVIL)
     text, tags = read(page)
     assert tags.seen.count("script") == 1  # that of the page
-    assert text.count("&lt;script&gt;") >= 14
+    assert text.count("&lt;script&gt;") >= 15
+    assert "<code>&lt;" in text
     assert all(link.startswith(("./", "#part-")) for link in tags.links)
 
 

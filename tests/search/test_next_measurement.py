@@ -252,6 +252,7 @@ def test_a_quantity_is_named_where_its_effect_was_found():
     found = SimpleNamespace(point_m=(0.0, 0.3, 0.0), text="near grid 18")
     effect = SimpleNamespace(text="at grid 58", name="point-mass", location=lambda x: found)
     assert quantity_of(effect, "M", np.zeros(3)) == "M near grid 18"
+    assert quantity_of(effect, "across", np.zeros(3)) == "the place of point-mass near grid 18"
 
 
 def test_a_mean_over_cases_is_advised(found):
@@ -260,6 +261,7 @@ def test_a_mean_over_cases_is_advised(found):
     both = with_common_candidates([found, less])
     assert [o.candidates for o in both] == [less.candidates, less.candidates]
     assert advised(both) == advised([less])
+    assert with_common_candidates([]) == ()  # a planned test that settles every article
 
 
 def test_places_that_are_allowed_are_the_candidates(problem, tied, tmp_path):

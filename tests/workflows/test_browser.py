@@ -220,6 +220,16 @@ def test_all_is_drawn_without_a_word_on_the_console_or_a_look_outside(page):
     assert not page.complaints()
 
 
+def test_all_is_drawn_while_the_page_is_never_idle(window, folder_of_run):
+    """A shape that moves on a slow machine leaves no idle time; what is far down comes anyway."""
+    busy = "requestIdleCallback = (run, o) => o?.timeout && setTimeout(run, o.timeout)"
+    window.devtools("Page.addScriptToEvaluateOnNewDocument", source=busy, runImmediately=True)
+    window.size(1280, 900)
+    window.open(folder_of_run / "report.html")
+    left = "document.querySelectorAll('.live[data-word]:not([data-ready])').length"
+    assert window.until(f"return document.querySelector('[data-ready]') && !{left}")
+
+
 def test_the_mesh_turns_where_it_is_dragged(page):
     see(page, "where")
     eye = PLOT + "return Object.values(plot._fullLayout.scene._scene.getCamera().eye)"

@@ -120,5 +120,5 @@ def _source(
 ) -> Case | Model | DeckModels:
     """A model where the user says how it is driven, else what says so itself."""
     if driven:
-        return load_model(source, units, allow)
+        return load_model(source, units, allow, command="frf")
     return load_case(source) if is_case(source) else load_deck(source, units, allow)

@@ -11,7 +11,7 @@ from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..inference.result import NextMeasurement
 from ..output import run_folder, write_json, write_text
-from ..report.blocks import Section
+from ..report.blocks import Section, drawings, write_pictures
 from ..report.information_map import information_map, shown_of_run
 from ..report.measurement_table import next_measurements
 from ..report.mesh_drawings import mesh_of
@@ -30,7 +30,7 @@ from ..search.next_measurement import (
 from ..workflows.before_any_test import PlannedTests, before_any_test
 from ..workflows.loaded_model import model_in_si, opened
 from .console import say, say_results, say_table, watched
-from .run import Allow, Units, folder_named
+from .run import Allow, Pictures, Units, folder_named
 
 
 def run(
@@ -77,6 +77,7 @@ def run(
             parser=folder_named,
         ),
     ] = None,
+    pictures: Pictures = False,
 ) -> None:
     """Say which further measurements would probably tell the open explanations apart.
 
@@ -85,6 +86,8 @@ def run(
     Before any test, articles are drawn with each of the effects, and the planned test of each is
     diagnosed.
     """
+    if pictures and out is None:
+        raise FileError("--pictures needs --out, the folder that they are written to")
     barred = [word.strip() for word in without.split(",") if word.strip()]
     if not effects:
         if not source.is_dir() or (source / "case.toml").is_file():
@@ -98,7 +101,7 @@ def run(
         every = advised([known], count, odds, barred)
         _tell(known.names, every, odds)
         drawn = _page(shown_of_run(source) if out else None, [known], every, odds)
-        _write(out, source / FILE, known.names, every, drawn)
+        _write(out, source / FILE, known.names, every, drawn, pictures)
         return
     names = tuple(dict.fromkeys(word.strip() for word in effects.split(",") if word.strip()))
     with watched() as progress:
@@ -121,7 +124,7 @@ def run(
     if out and together:
         model = model_in_si(found, "next")[0]
         drawn = _page(mesh_of(model.seen, model.assembly), together, every, odds)
-    _write(out, source, names, every, drawn)
+    _write(out, source, names, every, drawn, pictures)
 
 
 def _planned(made: PlannedTests) -> None:
@@ -172,7 +175,7 @@ def _page(
 
 def _write(
     out: Path | None, source: Path, names: Sequence[str], every: Sequence[NextMeasurement],
-    drawn: Sequence[Section],
+    drawn: Sequence[Section], pictures: bool,
 ) -> None:  # fmt: skip
     """Write the advice with its page, and the places for a test or the bench."""
     if out is None:
@@ -195,5 +198,7 @@ def _write(
             lead = f"Nothing is tied; the least known quantity is {every[-1].about}."
             if len(names) > 1:
                 lead = f"To tell apart: {', '.join(names)}."
-            write_sections(part / "report.html", title, drawn, lead=lead)
+            files = write_pictures(part, drawings(drawn), pictures)
+            figures = {Path(name).stem: part / name for name, _ in files}
+            write_sections(part / "report.html", title, drawn, lead=lead, figures=figures)
     say_results(out)

@@ -312,6 +312,6 @@ def _energy(result: DiagnosisResult, shown: Shown) -> Iterator[Drawing]:
     values[: len(shells)] = sides[0] - sides[1]
     top = float(np.quantile(np.abs(values[: len(shells)]), MOST_ENERGY))
     caption = "Strain energy per area of the worst modes less that of the others, over the mean."
-    name = "strain energy of the worst modes less that of the others"
+    name = "strain energy, worst less other modes"
     made = field(shown, values, (-top, top), "energy", name, caption, "RdBu_r")
     yield replace(made, place="guidance")

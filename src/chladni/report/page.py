@@ -6,8 +6,10 @@ Jinja escapes all text from a deck or a recording.
 from __future__ import annotations
 
 import platform
+import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from html import escape
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -114,6 +116,7 @@ def page_text(
     )
     environment.filters["relative_link"] = lambda name: "./" + quote(str(name))
     environment.filters["meaning"] = meaning
+    environment.filters["code"] = _with_code
     environment.filters["id"] = id
     environment.filters["stills"] = lambda block: [
         Picture(figures[name]) for name in block.pictures if figures and name in figures
@@ -134,6 +137,11 @@ def page_text(
         sections=[s for s in body if s.blocks],
         made=made_with(),
     )
+
+
+def _with_code(text: str) -> str:
+    """A sentence as HTML; what stands between backticks is code."""
+    return re.sub("`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def made_with() -> str:

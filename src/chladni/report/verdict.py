@@ -339,7 +339,7 @@ def _frequencies(result: DiagnosisResult) -> Table:
     rows = [
         (
             hertz(r.test_hz),
-            number(None if r.damping is None else 100 * r.damping, 3),
+            "–" if r.damping is None else f"{100 * r.damping:#.3g}",
             hertz(r.before_hz),
             percent(r.before_hz, r.test_hz),
             hertz(r.after_hz),

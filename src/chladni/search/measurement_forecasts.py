@@ -178,6 +178,8 @@ def quantity_of(effect: Effect, parameter: str, x: np.ndarray) -> str:
     found = effect.location(x)
     text = effect.text or effect.name
     text = text if found.point_m is None else found.text
+    if parameter in ("along", "across"):  # of a place on a sheet
+        return f"the place of {effect.name} {text}"
     return text if text.startswith(f"{parameter} of ") else f"{parameter} {text}".strip()
 
 

@@ -167,6 +167,8 @@ def outcomes(
 
 def with_common_candidates(every: Sequence[Outlook]) -> tuple[Outlook, ...]:
     """The outlooks with the candidates that all of them have, in the order of the first."""
+    if not every:
+        return ()
     places = [{(c.kind, c.label): k for k, c in enumerate(o.candidates)} for o in every]
     keys = [key for key in places[0] if all(key in other for other in places)]
     return tuple(

@@ -83,7 +83,7 @@ class Note:
     x: float
     y: float
     text: str
-    above: bool = False  # True: a little above the place; False: over it
+    lift: int = 0  # 1: a little above the place; -1: below it; 0: over it
 
 
 @dataclass(frozen=True, eq=False)

@@ -164,7 +164,7 @@ def _add_panel(
     for n in panel.notes:
         high = float(np.log10(n.y)) if panel.y.log else n.y  # Plotly's annotations are in decades
         words = escape(n.text, False)
-        place = {"x": n.x, "y": high, "xref": x, "yref": y, "yshift": 12 * n.above}
+        place = {"x": n.x, "y": high, "xref": x, "yref": y, "yshift": 12 * n.lift}
         layout["annotations"].append({**note, **place, "text": words})
     if panel.title:
         layout["annotations"].append(_title(panel.title, x, y))

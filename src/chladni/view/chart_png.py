@@ -81,7 +81,7 @@ def _panel(ax: Axes, panel: Panel, looks: Any, small: bool) -> None:
         ax.axvspan(low, high, color="#555555", alpha=0.14, lw=0, zorder=0)
     for note in panel.notes:
         style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7}
-        ax.annotate(note.text, (note.x, note.y), (0, 7 * note.above), textcoords="offset points",
+        ax.annotate(note.text, (note.x, note.y), (0, 7 * note.lift), textcoords="offset points",
                     **style)  # fmt: skip
     _axis(ax, "x", panel.x, small)
     _axis(ax, "y", panel.y, small)

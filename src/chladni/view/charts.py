@@ -165,7 +165,7 @@ def steps(
     tints = dict(zip(sides, ("neutral", "before"), strict=False))
     every = [v for q in (*sides.values(), floors or {}) for v in q.values() if v > 0]
     low, high = min(every, default=1.0) / 2, 3 * max(every, default=1.0)
-    points, notes = [], []
+    points, notes, level = [], [], [np.nansum([*q.values()]) for q in sides.values()]
     for k, (side, q) in enumerate(sides.items()):
         known = [(j, q[n]) for j, n in enumerate(names) if n in q and np.isfinite(q[n])]
         at, value = np.array(known, dtype=float).reshape(-1, 2).T
@@ -174,7 +174,8 @@ def steps(
         said = [f"{v:.4g}" + (f" ({round(100 * (v / first - 1)):+d} %)" if j and first else "")
                 for j, v in enumerate(value)]  # fmt: skip
         points.append(Series(side, at, drawn, "both", tints[side], size=7, tips=said))
-        notes += [Note(x, y, text, True) for x, y, text in zip(at, drawn, said, strict=True)]
+        lift = 1 if level[k] == max(level) else -1  # the lower side has its words below
+        notes += [Note(x, y, text, lift) for x, y, text in zip(at, drawn, said, strict=True)]
     lines = [Mark(v, "x", tints[side], "dash", f"{of}, {side}")
              for side, v in (floors or {}).items() if v > 0 and side in sides]  # fmt: skip
     axis = ChartAxis("Q", log=True, limits=(low, high))

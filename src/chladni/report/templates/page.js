@@ -283,12 +283,12 @@ function shapes(at, data, shared, box) {
     clearTimeout(timer);
     if (busy || !state.run || !inView || document.hidden) return;
     busy = true;
-    const phase = Math.sin((performance.now() - start) / 250), sides = parts.map((_, n) => moved(n, phase)), all = sides.flat();
+    const begun = performance.now(), phase = Math.sin((begun - start) / 250), sides = parts.map((_, n) => moved(n, phase)), all = sides.flat();
     const of = (axis) => all.map((p) => p[axis]);
     await Plotly.restyle(at, { x: of("x"), y: of("y"), z: of("z") }, sides.flatMap((side, n) => side.map((_, k) => k + (n ? parts[0].length : 0))));
     at.dataset.frames = Number(at.dataset.frames || 0) + 1;
     busy = false;
-    timer = setTimeout(tick, 30);
+    timer = setTimeout(tick, Math.max(30, performance.now() - begun));  // half the time is left to the rest of the page
   }
   at.redraw = () => show();
   at.open = (to) => {  // a row, or a mode of each side
@@ -478,7 +478,7 @@ async function begin() {
   const redraw = () => figures.filter((f) => f.dataset.ready).forEach((f) => f.querySelector(".plot").redraw());
   for (const media of ["(prefers-color-scheme: dark)", "print"]) matchMedia(media).addEventListener("change", redraw);
   for (const figure of figures) {  // all of it is there when it is printed
-    await new Promise((next) => (window.requestIdleCallback ?? setTimeout)(next));
+    await new Promise((next) => (window.requestIdleCallback ?? setTimeout)(next, { timeout: 300 }));  // a shape that moves leaves no idle time
     await once(figure);
   }
 }
