@@ -211,7 +211,9 @@ def test_a_rival_has_a_basis_of_its_own_again(two, found):
         alternative.data.scaled(alternative.fit.state, False)
     null = null_of(two)
     diagnosis = Diagnosis(null, null, null, (lead, alternative))
-    again = Hypotheses(None, SimpleNamespace(problem=two), diagnosis).singles[1].whole
+    rival = Hypotheses(None, SimpleNamespace(problem=two), diagnosis).singles[1]
+    again = rival.whole
+    assert rival.chances.test is not None
     assert again.data.scaled(again.fit.state, False)[0].size
     gains = [null.neg2_log_evidence - t.neg2_log_evidence for t in (again, lead)]
     assert gains[0] == pytest.approx(gains[1], rel=0.02)

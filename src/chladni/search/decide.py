@@ -299,7 +299,7 @@ def _with_doubt(case: Hypotheses, decision: Decision) -> Decision:
     least = max(least, gain - RULES.tied)
     near = [h.name for h in decision.order
             if case.gain(h) >= least and not (relieved and h.strained)
-            and (not small or h.chances.fits)]  # fmt: skip
+            and (not small or h.fits)]  # fmt: skip
     if not near:
         return decision
     open_ = (BEYOND,) if decision.refused or small else ()

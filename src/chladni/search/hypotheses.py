@@ -54,8 +54,16 @@ class Explanation:
 
     @cached_property
     def chances(self) -> FitChances:
-        """The test of fit."""
-        return self.known or fit_test(self.case.prepared.problem, self.fit)
+        """The test of fit, of a rival with the model of its own that it was fitted on."""
+        return self.known or fit_test(self.case.prepared.problem, self.whole)
+
+    @property
+    def fits(self) -> bool:
+        """True if the test of fit passes; False where the hypothesis cannot be fitted again."""
+        try:
+            return self.chances.fits
+        except ModelError:
+            return False
 
     @cached_property
     def news(self) -> float:
