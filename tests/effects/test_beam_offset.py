@@ -8,8 +8,14 @@ from numpy.testing import assert_allclose
 
 from chladni import load
 from chladni.case.free_parameters import fields_of
-from chladni.effects.beam_offset import offset_of, offset_sd, stiffener_offsets
-from chladni.effects.user_parameters import sd_of, user_parameter, values_of
+from chladni.effects.user_parameters import (
+    offset_of,
+    offset_sd,
+    sd_of,
+    stiffener_offsets,
+    user_parameter,
+    values_of,
+)
 from chladni.fem.assemble import structure
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.model.assembly import picked

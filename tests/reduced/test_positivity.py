@@ -74,6 +74,9 @@ class Catalogue:
     def scores(self, effect: Effect, starts, extended: bool = False, about: int = -1):
         return np.zeros((1, len(starts)))
 
+    def own(self, effect: Effect, start: np.ndarray):
+        return 0.0, start
+
     def modal_operators(self, effect: Effect, x: np.ndarray):
         lam = evaluate(self.reduced.model, [], np.zeros(0), False)
         terms = [t for t in effect.terms(x) if hasattr(t, "operator")]

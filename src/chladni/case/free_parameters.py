@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.beam_offset import offset_of
 from ..effects.registry import families
+from ..effects.user_parameters import offset_of
 from ..effects.weld_patch import PATCHES
 from ..errors import FileError, LabelError, did_you_mean
 from ..io.nastran import Deck

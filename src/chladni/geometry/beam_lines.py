@@ -40,7 +40,7 @@ def fastener_bars(assembly: Assembly) -> list[np.ndarray]:
         return []
     held = {r.independent if isinstance(r, RigidBody) else r.reference
             for r in assembly.rigid if isinstance(r, RigidBody | Average)}  # fmt: skip
-    sheets, out = _Sheets.of(assembly), []
+    sheets, out = _ShellsAtPoints.of(assembly), []
     for piece in connected_rows(nodes):
         if len(piece) > MOST_BARS:
             continue
@@ -53,7 +53,7 @@ def fastener_bars(assembly: Assembly) -> list[np.ndarray]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sheets:
+class _ShellsAtPoints:
     """Shells at each point: which (n, m), and the mean root of their area (n,) [m], 0 without."""
 
     at: sp.csr_array

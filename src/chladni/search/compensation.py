@@ -20,12 +20,8 @@ OF_RESPONSES = (
     ', [test] gain = "unknown" if the level is uncertain, or position_sd for uncertain places'
 )
 LEAST = 0.005  # smaller changes of ln mass and stiffness are not named
-BENDING = {
-    "E": 1.0,
-    "t": 3.0,
-    "wall": 1.0,
-    "offset": 2.0,
-}  # powers in the bending stiffness of a part
+# powers in the bending stiffness of a part
+BENDING = {"E": 1.0, "t": 3.0, "wall": 1.0, "offset": 2.0}
 
 
 def compensating(

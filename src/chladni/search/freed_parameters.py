@@ -1,11 +1,16 @@
 """Calibration parameters of a question: those that the user frees, else the default ones."""
 
-from ..effects.beam_offset import stiffener_offsets
 from ..effects.calibration_parameters import defaults
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
 from ..effects.registry import family
-from ..effects.user_parameters import UNITS, defaults_of_solids, freed_effect, user_parameter
+from ..effects.user_parameters import (
+    UNITS,
+    defaults_of_solids,
+    freed_effect,
+    stiffener_offsets,
+    user_parameter,
+)
 from ..effects.weld_patch import PATCHES, weld_patch
 from ..errors import FileError
 from ..fem.energy import mass_properties

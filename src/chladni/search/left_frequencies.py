@@ -36,7 +36,7 @@ def left_frequencies(rows: Sequence[FrequencyRow], model: Modelled) -> Iterator[
     alone = len(rows) - len(paired)
     yield (
         f"the frequencies of the deck are {rms:.2g} % (rms) from those of the test over "
-        f"{len(paired)} modes{f', and {alone} have no partner' * bool(alone)}; the one at "
+        f"{len(paired)} modes{f' (without a partner: {alone})' * bool(alone)}; the one at "
         f"{test[worst]:.4g} Hz is {100 * (f[worst] / test[worst] - 1):+.2g} % off; a careful model "
         f"of {'shells' if most == SHELLS else 'bars or solids'} leaves {most:g} % at most, so "
         "physics is missing, or modes are paired wrongly"

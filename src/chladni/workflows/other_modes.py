@@ -284,9 +284,9 @@ def _on_model(model: Model, read: PunchModes, recording: Recording | None, path:
         )
     said = [f"Places of {path.name} were read in {found.unit}."] * (found.unit != "m")
     if found.by_place:
-        said.append(f"{found.by_place} points were found at grids of other numbers, by place.")
+        said.append(f"Points found at grids of other numbers, by place: {found.by_place}.")
     if sensors:
-        said.append(f"{len(sensors) // 3} points are away from grids, on the nearest of the mesh.")
+        said.append(f"Points taken on the mesh, away from grids: {len(sensors) // 3}.")
     row = found.row[kept]
     axes = np.array([_axes(made, recording, int(n), int(k))
                      for n, k in zip(read.ids[kept], row, strict=True)])  # fmt: skip
