@@ -260,7 +260,7 @@ def _shapes(
 ) -> dict[str, object]:  # fmt: skip
     """Every mode of the test at its sensors, and the whole motion of the decks' modes."""
     assert result.models is not None
-    rows, used = result.frequencies, shown.seen.without_joints().used
+    rows = result.frequencies
     f = np.array([r.test_hz for r in rows], dtype=float)
     test = live_mesh.ModeSet(
         f, sensors=result.models.test.shapes, damping=[r.damping for r in rows]
@@ -270,7 +270,7 @@ def _shapes(
         s = model.structure
         motion = np.asarray(s.T @ modes.shapes).reshape(-1, 6, len(modes))
         sides[name] = live_mesh.ModeSet(
-            modes.frequency, motion[s.assembly.rows(shown.ids[used]), :3],
+            modes.frequency, motion[s.assembly.rows(shown.ids), :3],
             case.outputs.rows(s) @ modes.shapes,
         )  # fmt: skip
     partners = {name: dict(pairs) for name, (*_, pairs) in decks.items()}

@@ -199,8 +199,7 @@ def _shapes(
     whole = _expanded(origin, outputs, psi, float(m.frequency.max()))
     said = f"{TURN} Click a row of the table for its mode."
     if whole is not None:
-        used = shown.seen.without_joints().used
-        sides = {EXPANDED: ModeSet(m.frequency, whole[used], psi, damping=damping), **sides}
+        sides = {EXPANDED: ModeSet(m.frequency, whole, psi, damping=damping), **sides}
         said += f" {ON_MESH}"
     auto = auto_mac(driven_shapes(m)) if 1 < m.order <= _MATRIX else None
     alike = {} if auto is None else {f"{name}|{name}": auto for name in sides}

@@ -131,20 +131,20 @@ class ModeSet:
     """Modes of the test or of a deck, as they are drawn next to others."""
 
     f: np.ndarray  # (r,) [Hz]
-    motion: np.ndarray | None = None  # (n, 3, r) of the points in use; None: of the sensors alone
+    motion: np.ndarray | None = None  # (n, 3, r) of all points; None: of the sensors alone
     sensors: np.ndarray | None = None  # (k, r) along the sensors' directions
     numbers: Sequence[int] = ()
     damping: Sequence[float | None] = ()
 
-    def drawn(self, k: int) -> dict[str, Any]:
-        """One mode, its motion over the largest in thousandths."""
+    def drawn(self, k: int, used: np.ndarray) -> dict[str, Any]:
+        """One mode, the motion of the points in use over its largest, in thousandths."""
         mode: dict[str, Any] = {"hz": float(self.f[k])}
         mode |= {"number": int(self.numbers[k])} if len(self.numbers) else {}
         mode |= {"damping": self.damping[k]} if len(self.damping) else {}
         at_sensors = None if self.sensors is None else _shares(self.sensors[:, k])
         if self.motion is None:
             return mode | {"motion": at_sensors}
-        return mode | {"motion": _shares(self.motion[:, :, k]), "sensors": at_sensors}
+        return mode | {"motion": _shares(self.motion[used, :, k]), "sensors": at_sensors}
 
 
 def _shares(motion: np.ndarray) -> list[Any]:
@@ -164,9 +164,9 @@ def shapes(
     rows : positions of the modes in the sides, None without a partner
     mac : by "side|side", (modes of one, modes of the other)
     """
-    decks = [side for side in sides.values() if side.motion is not None]
-    values = sum(side.motion[:, :, :1].size for side in decks if side.motion is not None)
-    room = _SHAPE_VALUES // max(1, values)  # modes of each deck
+    used = shown.seen.without_joints().used
+    decks = sum(side.motion is not None for side in sides.values())
+    room = _SHAPE_VALUES // max(1, 3 * decks * len(used))  # modes of each deck
 
     def held(name: str) -> int:
         return len(sides[name].f) if sides[name].motion is None else min(room, len(sides[name].f))
@@ -174,7 +174,7 @@ def shapes(
     kept = [[None if k is None or k >= held(name) else k
              for name, k in zip(sides, row, strict=True)] for row in rows]  # fmt: skip
     return {
-        "sides": {name: [side.drawn(k) for k in range(held(name))]
+        "sides": {name: [side.drawn(k, used) for k in range(held(name))]
                   for name, side in sides.items()},
         "rows": [row for row in kept if row != [None] * len(sides)],
         "mac": {name: np.round(value, 3).tolist() for name, value in (mac or {}).items()},

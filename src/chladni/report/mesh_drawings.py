@@ -64,18 +64,9 @@ def mode_shapes(
     mac: Mapping[str, np.ndarray] | None = None,
 ) -> list[Drawing]:
     """Shapes (n, 3, r) of a model that move; the ``picture`` has the first of them."""
-    if not len(f):
-        return []
-    some = slice(drawn)
-    still = _picture("montage", seen=shown.seen, shapes=motion[:, :, some], frequency=f[some],
-                      numbers=numbers[some])  # fmt: skip
-
-    def moving() -> Mapping[str, Any]:
-        used = motion[shown.seen.without_joints().used]
-        sides = {"model": live_mesh.ModeSet(f, used, numbers=numbers)}
-        return live_mesh.shapes(sides, [[k] for k in range(len(f))], shown, mac=mac)
-
-    return [Drawing("shapes", spatial("shapes", shown, moving), TURN, {picture: still}, what)]
+    side = live_mesh.ModeSet(f, motion, numbers=numbers)
+    rows = [[k] for k in range(len(f))]
+    return _beside({"model": side}, rows, shown, drawn, what, picture, mac)
 
 
 def two_models(
@@ -84,23 +75,28 @@ def two_models(
     mac: np.ndarray, drawn: int = 12,
 ) -> list[Drawing]:  # fmt: skip
     """Shapes (n, 3, r) of another model next to those of the model; MAC (other, model)."""
-    if not len(f_other):
+    partner, shapes = dict(pairs), _as_partners(shapes, motion, pairs)
+    sides = {
+        other: live_mesh.ModeSet(f_other, shapes, numbers=numbers_other),
+        "model": live_mesh.ModeSet(f, motion, numbers=numbers),
+    }
+    rows, alike = [[k, partner.get(k)] for k in range(len(f_other))], {f"{other}|model": mac}
+    return _beside(sides, rows, shown, drawn, f"shapes of {other}", "shapes", alike)
+
+
+def _beside(
+    sides: Mapping[str, live_mesh.ModeSet], rows: Sequence[Sequence[int | None]], shown: Shown,
+    drawn: int, what: str, picture: str, mac: Mapping[str, np.ndarray] | None,
+) -> list[Drawing]:  # fmt: skip
+    """Modes of whole models side by side; the ``picture`` has some of the first side."""
+    first, some = next(iter(sides.values())), slice(drawn)
+    assert first.motion is not None
+    if not len(first.f):
         return []
-    some, shapes = slice(drawn), _as_partners(shapes, motion, pairs)
-    still = _picture("montage", seen=shown.seen, shapes=shapes[:, :, some],
-                     frequency=f_other[some], numbers=numbers_other[some])  # fmt: skip
-
-    def moving() -> Mapping[str, Any]:
-        used, partner = shown.seen.without_joints().used, dict(pairs)
-        sides = {
-            other: live_mesh.ModeSet(f_other, shapes[used], numbers=numbers_other),
-            "model": live_mesh.ModeSet(f, motion[used], numbers=numbers),
-        }
-        rows = [[k, partner.get(k)] for k in range(len(f_other))]
-        return live_mesh.shapes(sides, rows, shown, mac={f"{other}|model": mac})
-
-    what = f"shapes of {other}"
-    return [Drawing("shapes", spatial("shapes", shown, moving), TURN, {"shapes": still}, what)]
+    still = _picture("montage", seen=shown.seen, shapes=first.motion[:, :, some],
+                     frequency=first.f[some], numbers=first.numbers[some])  # fmt: skip
+    content = spatial("shapes", shown, lambda: live_mesh.shapes(sides, rows, shown, mac=mac))
+    return [Drawing("shapes", content, TURN, {picture: still}, what)]
 
 
 def _as_partners(
@@ -125,13 +121,12 @@ def shape_pairs(
         from ..view.annotations import Marker
 
         at = zip(found.points.tolist(), found.directions.tolist(), sensors, strict=True)
-        used = shown.seen.without_joints().used
         partner = dict(found.pairs)
-        model = live_mesh.ModeSet(found.f_model, found.motion[used], found.model, found.numbers)
+        model = live_mesh.ModeSet(found.f_model, found.motion, found.model, found.numbers)
         tests = {"test": live_mesh.ModeSet(found.f_test, sensors=found.test)}
         if expanded is not None:
             whole = _as_partners(expanded, found.motion, found.pairs)
-            tests = {EXPANDED: live_mesh.ModeSet(found.f_test, whole[used], found.test), **tests}
+            tests = {EXPANDED: live_mesh.ModeSet(found.f_test, whole, found.test), **tests}
         rows = [[*[k] * len(tests), partner.get(k)] for k in range(len(found.f_test))]
         places = [Marker(x, n, label) for x, n, label in at]
         alike = {} if mac is None else {f"{name}|model": mac for name in tests}
