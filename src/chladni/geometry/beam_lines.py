@@ -32,8 +32,8 @@ def connected_rows(nodes: np.ndarray) -> Iterator[np.ndarray]:
 def fastener_bars(assembly: Assembly) -> list[np.ndarray]:
     """Rows (k,) of each isolated chain of bars whose ends lead RBE2 or RBE3, or bridge sheets.
 
-    A chain that ends on a grid of a shell bridges sheets if its ends are corners of no common shell
-    and nearer to each other than the shells are wide: a stiffener runs along the sides of shells.
+    A chain that ends on a grid of a shell bridges sheets if its ends are corners of no common
+    shell, as those of a stiffener are. They are also nearer to each other than the shells are wide.
     """
     nodes = assembly.beams.nodes
     if not len(nodes) or not len(assembly.shells):

@@ -81,8 +81,8 @@ class LocalEffect:
     def _operators(self, x: np.ndarray, y: np.ndarray) -> list[Operator]:
         """Operators of the effect, with its part in those of the base.
 
-        Those of the effect itself are there at every y, so that it has the same rows. A factor of
-        the base on modes does not multiply them here.
+        The operators of the effect itself are there at every y, so that it has the same rows. A
+        factor of the base on modes does not multiply them here.
         """
         acting = acting_at([*self.base, self.effect], z := np.concatenate([x, y]))
         groups, split = self.reduced.model.groups, "" not in self.reduced.model.linear

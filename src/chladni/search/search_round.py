@@ -136,8 +136,8 @@ class _Others:
     ) -> list[HypothesisFit]:
         """Fit those jointly that may become the best of the family, and better than ``worst``.
 
-        The linear base may be as wrong about another as it was about the best. What is not fitted
-        is known only where it cannot be better than the best fit.
+        The linear base may be as wrong about another as it was about the best. An optimum
+        that is not fitted is known only where it cannot be better than the best fit.
         """
         fits, slack = [lead], self.slack
         for k, own in enumerate(self.optima):
