@@ -1,6 +1,7 @@
 """A rib along a line of grids: closed forms, the lines that are tried, a concealed one."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.sheets import Doubler, MassPatch, thickened
-from chladni.effects.stiffener import GridLines, Stiffener
+from chladni.effects.stiffener import GridLines, Stiffener, candidates
 from chladni.fem.assemble import structure
 from chladni.inference.hypothesis_fit import fitted
 from chladni.inference.pole_data import Poles
@@ -145,3 +146,32 @@ def test_a_concealed_doubler_is_told_from_a_mass(problem):
     left, x = rms(problem, data, Doubler.on(problem.groups, group, 1), start)
     assert 0.5 * np.exp(x[0]) == pytest.approx(0.6, rel=0.3)
     assert rms(problem, data, MassPatch.on(problem.groups, group, 1), start)[0] > 2 * left
+
+
+def test_a_heavy_rib_is_sought_where_a_mass_explains_most(where):
+    """No line of shells wants more bending: the line through the heaviest place is proposed."""
+    made = where.groups.structure.assembly
+    place = where.places.point[len(where.places) // 3]
+
+    def bending(about, sets):
+        return -np.ones(len(sets)), np.zeros(len(sets))
+
+    def masses(about, matrix, strengths):
+        far = np.linalg.norm(where.places.point - place, axis=1)
+        return far[:, None] + (strengths != np.median(strengths))
+
+    def scores(line, starts, extended):
+        X = made.points[made.rows(np.array(line.grids))]
+        far = np.linalg.norm(X - place, axis=1).min() + np.ptp(X[:, 0])
+        return np.full((1, len(starts)), far)
+
+    context = SimpleNamespace(
+        where=where, bases=(None, "null"), scores=scores,
+        scan=SimpleNamespace(bending_scores=bending, point_scores=masses),
+        own=lambda line, x: (float(scores(line, [x], True)[0, 0]), x),
+    )  # fmt: skip
+    best = candidates(context)[0]
+    X = made.points[made.rows(np.array(best.effect.grids))]
+    assert np.linalg.norm(X - place, axis=1).min() < 0.05
+    assert np.ptp(X[:, 0]) < 1e-9
+    assert best.base == "null"

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from ..fem.energy import only
 from ..geometry.cells import edges_of
 from ..geometry.facets import point_normals, unit
-from ..geometry.sampling import farthest_point_sample
+from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.added_beams import with_beam_line
 from ..model.assembly import Assembly
 from ..model.properties import BeamSection, Isotropic, ShellSection
@@ -25,13 +25,14 @@ from .effect import Effect, MatrixTerm, Traits, Weight
 from .effect_context import EffectContext
 from .estimate import in_mm
 from .family import Article, Family
-from .search_context import Candidate, SearchContext, best_places, followed
+from .search_context import Candidate, ResponseScan, SearchContext, best_places, followed
 
 BENDING, AREA = 20.0, 4.0  # prior medians over t⁴ and t²: a rib of 2 t by 4 t, or a flat bead
 STRAIGHT = 0.8  # least cosine of an edge to the line: no zigzag along diagonals
 BEGUN = 6  # lines of shells whose grids are tried
 FEW = 16  # middles of lines that are tried if only natural frequencies are known
 FOLLOWED = 2  # lines that are fitted
+MASSES = (0.003, 0.01, 0.03)  # of the article's, with which the place of a heavy rib is sought
 LONGER = (1, 3)  # edges by which a move lengthens a line
 
 
@@ -193,6 +194,7 @@ def distinct(lines: Iterator[tuple[int, ...]] | list[tuple[int, ...]]) -> list[t
 def candidates(context: SearchContext) -> list[Candidate]:
     """The lines of grids that explain most, next to the lines of shells that want more bending.
 
+    A rib is heavy as well as stiff: lines through the shell that wants more mass are tried, too.
     Scores of lines of shells are linearised, scores of lines of grids are exact. The best line of
     grids is moved while it explains more.
     """
@@ -211,6 +213,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
         score = np.where(amount > 0, score, np.inf)
         chosen = far_apart(score, np.array([line.centre for line in drawn]), BEGUN)
         drawn = [drawn[k] for k in chosen if np.isfinite(score[k])]
+        drawn += shells.drawn(_heaviest(context, context.scan, shells), LENGTHS)
     every = distinct([
         path for line in drawn for path in grids.beside(line, shells.half(line.through, line.times))
     ])  # fmt: skip
@@ -220,6 +223,14 @@ def candidates(context: SearchContext) -> list[Candidate]:
         effects = [c.effect for c in leading if isinstance(c.effect, Stiffener)]
     best = best_places(context, effects, FOLLOWED, extended=True)
     return [closer(context, best[0].effect, best[0].start) or best[0], *best[1:]] if best else []
+
+
+def _heaviest(context: SearchContext, scan: ResponseScan, shells: LineFinder) -> np.ndarray:
+    """Row of the shell (1,) where a mass explains most."""
+    where = context.where
+    masses = np.array(MASSES) * where.setup.weight
+    score = scan.point_scores(len(context.bases) - 1, "M", masses).min(axis=1)
+    return nearest_points(shells.middle, where.places.point[[int(np.argmin(score))]])
 
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
