@@ -50,9 +50,9 @@ def beyond(
     """M-orthonormal vectors (n, k) that a block (n, m) adds to M-orthonormal ones.
 
     Motions without mass (the spin of a straight row of bars) are left out. The block is made
-    orthogonal to the known vectors. What is left of it, if ``LITTLE`` of its length or less, is so
-    again after its own normalisation, which magnifies rounding errors. Two passes are enough
-    (Giraud et al. 2005, Numerische Mathematik 101, 87-100).
+    orthogonal to the known vectors. Its own normalisation magnifies the rounding errors of vectors
+    with little left, ``LITTLE`` of their length or less, so these are made orthogonal again. Two
+    passes are enough (Giraud et al. 2005, Numerische Mathematik 101, 87-100).
     """
     heavy = np.concatenate([(V * (M @ V)).sum(axis=0) for V in _some(block)])
     heaviest = float(M.diagonal().max(initial=0.0)) * (block**2).max(axis=0, initial=0.0)

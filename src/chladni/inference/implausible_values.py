@@ -31,11 +31,11 @@ def in_doubt(plain: Fit, null: Fit, coarse: bool = False) -> tuple[str, ...]:
     combination of E, rho and t.  On a ``coarse`` mesh, one that the data reject, the numbers of the
     reported deck stand for its mesh, and small effects cannot be seen.
     """
-    own = implausible_values(plain) or _far_together(plain)
+    own = _far(plain)
     far = list(dict.fromkeys((*own, *strained(null))))
     if not far:
         return ()
-    if coarse and own and not (implausible_values(null) or _far_together(null)):
+    if coarse and own and not _far(null):
         return (
             f"{'; '.join(far)}: that is the mesh of the deck, whose frequencies are off by up to "
             f"{100 * _of_mesh(null):.2g} %; refine it and diagnose again, because an effect "
@@ -45,6 +45,11 @@ def in_doubt(plain: Fit, null: Fit, coarse: bool = False) -> tuple[str, ...]:
         f"calibration alone explains the recording, but {'; '.join(far)}: measure it first, and "
         "correct the deck; if it was only guessed, free it by a [[parameter]] with a matching sd",
     )
+
+
+def _far(fit: Fit) -> list[str]:
+    """Sentences on calibrated numbers, each or all together, that no structure of the deck has."""
+    return implausible_values(fit) or _far_together(fit)
 
 
 def _of_mesh(null: Fit) -> float:
