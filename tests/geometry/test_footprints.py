@@ -5,18 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import least_squares
 
 from chladni.effects.model_errors import JointFootprint, mesh_errors
 from chladni.fem.modelled import modelled
-from chladni.geometry.footprints import on_smaller_shells, regions_of_joints
+from chladni.geometry.footprints import on_smaller_shells, on_whole_shells, regions_of_joints
 from chladni.geometry.refine import refined
 from chladni.model.added_points import with_points
-from chladni.model.assembly import Average, RigidBody
+from chladni.model.assembly import Average, Beams, RigidBody
+from chladni.model.properties import BeamSection, Part
 from chladni_specimens.forms import FORMS
-from chladni_specimens.plates import plate
+from chladni_specimens.plates import STEEL, plate
 
 ALL = (1, 2, 3, 4, 5, 6)
 UP = np.array([0, 0, 0.01])
+SPOT = BeamSection(STEEL, 28.3e-6, 63.6e-12, 63.6e-12, J=127.2e-12)  # 6 mm in diameter
 
 
 def held(rows, place, kind="mean", weights=None):
@@ -114,3 +117,61 @@ def test_footprints_are_what_another_mesh_of_a_bolted_bracket_differs_by():
     shells, both = (np.stack(slopes[:n], axis=1) for n in (1, 2))
     left = [due - A @ np.linalg.lstsq(A, due, rcond=None)[0] for A in (shells, both)]
     assert np.linalg.norm(left[1]) < 0.5 * np.linalg.norm(left[0])
+
+
+def spotted(n):
+    """Two sheets of 6 n x 4 n shells, 2 mm apart, on six spot welds: bars from grid to grid."""
+    low = plate(0.3, 0.2, 6 * n, 4 * n, 1e-3)
+    m, shells = len(low.points), low.shells
+    twice = {
+        name: np.concatenate([v, v]) for name, v in vars(shells).items()
+        if isinstance(v, np.ndarray) and name != "nodes"
+    }  # fmt: skip
+    twice["nodes"] = np.concatenate([shells.nodes, shells.nodes + m])
+    points = np.concatenate([low.points, low.points + 0.2 * UP])
+    spots = [[x, y, 0.0] for x in (0.05, 0.15, 0.25) for y in (0.05, 0.15)]
+    at = np.array([np.linalg.norm(low.points - place, axis=1).argmin() for place in spots])
+    bars = Beams(
+        9000 + np.arange(len(at)), np.column_stack([at, at + m]), np.ones(len(at), int),
+        np.tile([1.0, 0, 0], (len(at), 1)), np.zeros((len(at), 2, 3)),
+        np.zeros((len(at), 2, 6), bool),
+    )  # fmt: skip
+    return replace(
+        low, ids=np.arange(1, 2 * m + 1), points=points, shells=replace(shells, **twice),
+        beams=bars, parts=(*low.parts, Part(2, "spots", SPOT)), axes=None,
+    )  # fmt: skip
+
+
+def test_a_load_on_a_spot_weld_acts_on_refined_grids_as_on_the_shells_of_the_deck():
+    """By the shape functions of the grid: 1, 1/2 and 1/4, which are 4 together."""
+    coarse = spotted(1)
+    fine = refined(coarse)
+    made = on_whole_shells(coarse, fine)
+    assert len(made.rigid) == 12
+    weights = [w for _, _, w in made.rigid[0].terms]
+    assert sorted(weights) == [0.25] * 4 + [0.5] * 4 + [1.0]
+    ends = made.points[made.beams.nodes.ravel()]
+    assert_allclose(ends, fine.points[fine.beams.nodes.ravel()])
+    assert not np.isin(made.beams.nodes, made.shells.nodes).any()
+    assert on_whole_shells(plate(0.3, 0.2, 6, 4, 1e-3), fine) is fine
+
+
+def test_footprints_of_spot_welds_are_what_a_finer_mesh_differs_by():
+    """Shells of half and of a third of the deck's, the bars on the same grids."""
+    top = 300.0
+    deck = modelled(spotted(2), 2 * top)
+    shells, joints = mesh_errors(deck, top)
+    assert isinstance(joints, JointFootprint)
+    halved, third = (modelled(spotted(n), top).modes.frequency[6:] for n in (4, 6))
+    assert_allclose(shells.file._frequency(1.0)[: len(halved)], halved, rtol=1e-6)
+    omega = shells.omega
+
+    def left(x):
+        """Errors of ln f with x times the change by each mesh."""
+        w, V = np.linalg.eigh(sum(v * e.log for v, e in zip(x, (shells, joints), strict=False)))
+        lam = np.linalg.eigvalsh(omega[:, None] * ((V * np.exp(w)) @ V.T) * omega)
+        return np.log(np.sqrt(lam[: len(third)]) / (2 * np.pi * third))
+
+    alone, both = (least_squares(left, np.ones(n)) for n in (1, 2))
+    assert both.cost < 0.05 * alone.cost
+    assert_allclose(both.x, 4 / 3, atol=0.15)

@@ -20,7 +20,7 @@ from ..fem.modelled import Modelled, solved
 from ..geometry.beam_lines import member_beams
 from ..geometry.facets import cell_areas
 from ..geometry.folds import share_at_folds
-from ..geometry.footprints import on_smaller_shells, regions_of_joints
+from ..geometry.footprints import on_smaller_shells, on_whole_shells, regions_of_joints
 from ..geometry.refine import refined
 from ..model.assembly import Assembly
 from .calibration_parameters import LogField
@@ -59,6 +59,7 @@ class MeshError(Effect):
     # (p, k) change of motion at the measured places by each coordinate
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     order: int = 2  # p: errors fall as h^p
+    file: "MeshError | None" = None  # the deck with halved shells, if its joints are others
 
     @property
     def limit(self) -> np.ndarray:
@@ -85,9 +86,8 @@ class MeshError(Effect):
     @property
     def halved(self) -> "HalvedMesh":
         """The finer mesh itself."""
-        return HalvedMesh(
-            (), self.text, rows=self.rows, omega=self.omega, log=self.log, shapes=self.shapes
-        )
+        of = self.file or self
+        return HalvedMesh((), of.text, rows=of.rows, omega=of.omega, log=of.log, shapes=of.shapes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
 
     The list holds the error of the elements. Joints on whole shells add the error of their
     footprints: one common to all, and one for each region, because two meshers attach one joint to
-    different shells.
+    different shells. Fasteners from grid to grid add one common to all of them.
 
     The refined modes Ψ at the old points are paired with the modes Φ. B = ΦᵀMΨ is made orthogonal,
     softest modes first, and Λ^½ e^L Λ^½ = B Λ_ref Bᵀ. B is square, so that x = 1 gives the refined
@@ -176,16 +176,23 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
         return near, _Begun(made, made.system.M @ modes.shapes, near)
 
     fine = refined(built.assembly)
-    of_shells, begun = change(fine, begun)
+    whole = on_whole_shells(built.assembly, fine)
+    of_shells, begun = change(whole, begun)
     order = order_of(made)
     prior = limit_of(order) * (1 - LEFT ** (order / 2)), MESH_SD
     errors = [of_shells.error(MeshError, prior, order)]
+    if whole is not fine:
+        of_file, _ = change(fine, begun)
+        file = of_file.error(MeshError, prior, order)
+        errors = [replace(errors[0], file=file)]
+        errors.append((of_file - of_shells).error(JointFootprint, FOOTPRINT))
     smaller = on_smaller_shells(built.assembly, fine)
     moved = [k for k, (new, old) in enumerate(zip(smaller, fine.rigid, strict=True)) if new != old]
 
     def footprints(bodies: Sequence[int], mean: float, sd: float) -> MeshError:
         rigid = [smaller[k] if k in bodies else old for k, old in enumerate(fine.rigid)]
-        on_less, _ = change(replace(fine, rigid=tuple(rigid)), begun)
+        rigid += whole.rigid[len(rigid) :]
+        on_less, _ = change(replace(whole, rigid=tuple(rigid)), begun)
         return (on_less - of_shells).error(JointFootprint, (mean, sd))
 
     if moved:
