@@ -9,7 +9,7 @@ from chladni.effects.calibration_parameters import PartScale
 from chladni.effects.effect import Parameter
 from chladni.effects.joint_stiffness import ADHESIVE, ModelFamily
 from chladni.effects.model_errors import MeshError
-from chladni.inference.implausible_values import FAR, in_doubt, strained
+from chladni.inference.implausible_values import FAR, error_of_mesh, in_doubt, strained
 
 
 def fitted(text, away):
@@ -59,11 +59,13 @@ def test_numbers_that_only_a_coarse_mesh_takes_far_off_are_said_to_be_the_mesh()
     mesh = MeshError((Parameter("mesh", "-", 1.0, 0.3),), omega=np.array([600.0, 900]), log=stiffer)
     plain = found([E], [1.5 * FAR * 0.06], [0.01])
     near, far = (found([E, mesh], [away * 0.06, 1.0], [0.01, 0.1]) for away in (0.5, 1.5 * FAR))
-    (said,) = in_doubt(plain, near, coarse=True)
+    coarse = error_of_mesh(near)
+    assert coarse == pytest.approx(0.08)
+    (said,) = in_doubt(plain, near, coarse)
     assert "off by up to 8 %; refine it" in said
     assert "E of shell" in said
-    assert in_doubt(near, near, coarse=True) == ()
-    assert in_doubt(plain, near) == in_doubt(plain, far, coarse=True)
+    assert in_doubt(near, near, coarse) == ()
+    assert in_doubt(plain, near) == in_doubt(plain, far, coarse)
     assert "measure it first" in in_doubt(plain, near)[0]
 
 

@@ -73,6 +73,13 @@ def test_a_calibration_measures_what_moved_most():
     assert not any("hem" in s for s in found)
 
 
+@pytest.mark.parametrize(("error", "said"), [(0.0, False), (0.043, True)])
+def test_a_quiet_answer_on_a_coarse_mesh_says_what_it_cannot_see(error, said):
+    found = {"verdict": "calibration only", "mesh_error": error}
+    assert ("(up to 4.3 % of a frequency)" in sentence(from_json(found))) == said
+    assert steps(**found)[0].startswith("Refine the mesh, which takes frequencies up to") == said
+
+
 def test_a_structure_that_was_not_weighed_is_weighed():
     weigh = [any(s.startswith("Weigh the test article as") for s in
                  steps(verdict="nothing missing", mass={"model_kg": 2.0, "weighed_kg": kg}))

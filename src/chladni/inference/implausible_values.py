@@ -22,14 +22,14 @@ def implausible_values(fit: Fit) -> list[str]:
     ]
 
 
-def in_doubt(plain: Fit, null: Fit, coarse: bool = False) -> tuple[str, ...]:
+def in_doubt(plain: Fit, null: Fit, coarse: float = 0.0) -> tuple[str, ...]:
     """Reasons why a calibration that explains the whole recording is not to be trusted.
 
     "Nothing is missing" is a claim too.  A number that no structure of this deck has may stand for
     missing physics, in the reported deck or in the null.  Several numbers may do so together,
     although each alone is plausible.  For example, the frequencies of a strip determine only one
-    combination of E, rho and t.  On a ``coarse`` mesh, one that the data reject, the numbers of the
-    reported deck stand for its mesh, and small effects cannot be seen.
+    combination of E, rho and t.  On a mesh that the data reject, and that takes frequencies off by
+    ``coarse``, the numbers of the reported deck stand for it, and small effects cannot be seen.
     """
     own = _far(plain)
     far = list(dict.fromkeys((*own, *strained(null))))
@@ -38,7 +38,7 @@ def in_doubt(plain: Fit, null: Fit, coarse: bool = False) -> tuple[str, ...]:
     if coarse and own and not _far(null):
         return (
             f"{'; '.join(far)}: that is the mesh of the deck, whose frequencies are off by up to "
-            f"{100 * _of_mesh(null):.2g} %; refine it and diagnose again, because an effect "
+            f"{100 * coarse:.2g} %; refine it and diagnose again, because an effect "
             "smaller than this error is not seen",
         )
     return (
@@ -52,7 +52,7 @@ def _far(fit: Fit) -> list[str]:
     return implausible_values(fit) or _far_together(fit)
 
 
-def _of_mesh(null: Fit) -> float:
+def error_of_mesh(null: Fit) -> float:
     """Largest relative error of a frequency by the fitted error of the elements."""
     mesh = next(e for e in null.effects if type(e) is MeshError)
     return mesh.largest(float(null.of(mesh)[0]))

@@ -204,7 +204,11 @@ def _check_values(result: DiagnosisResult) -> list[str]:
             *_take_the_deck(result),
             "Run chladni diagnose, which searches for missing physics.",
         ]
-    return [*_measured(result.calibrated), *_take_the_deck(result), *_validate(result)]
+    finer = [
+        f"Refine the mesh, which takes frequencies up to {100 * result.mesh_error:.2g} % off, and "
+        "diagnose again: effects that are smaller than this are then seen."
+    ] * bool(result.mesh_error)
+    return [*finer, *_measured(result.calibrated), *_take_the_deck(result), *_validate(result)]
 
 
 def _measured(calibrated: Sequence[CalibratedParameter]) -> list[str]:

@@ -50,7 +50,10 @@ def _sentence(result: DiagnosisResult) -> str:
     if verdict in ("calibration only", "nothing missing") and not plain:
         return f"No effect is named, but physics may still be missing{gain}."
     if verdict == "calibration only":
-        return f"Calibration explains the recording; no physics is missing{gain}."
+        beyond = f" that exceeds the error of the mesh ({_of_mesh(result)})" * bool(
+            result.mesh_error
+        )
+        return f"Calibration explains the recording; no physics is missing{beyond}{gain}."
     if verdict == "nothing missing":
         return (
             f"No effect is named: {_off(result)}. The allowed errors of mesh, joints and scatter "
@@ -77,6 +80,10 @@ def against(result: DiagnosisResult) -> str:
         f"the frequencies of the {last} deck are farther from the test than those of the {best} "
         f"deck ({number(after, 2)} %, {number(off[best], 2)} % before)"
     )
+
+
+def _of_mesh(result: DiagnosisResult) -> str:
+    return f"up to {number(100 * result.mesh_error, 2)} % of a frequency"
 
 
 def _off(result: DiagnosisResult) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from ..case import Case
 from ..ema.finding import Finding, Screening
 from ..inference.calibration_result import CalibrationStudy
-from ..inference.implausible_values import in_doubt
+from ..inference.implausible_values import error_of_mesh, in_doubt
 from ..inference.joint_fit import Posterior, informed
 from ..progress import Progress, within
 from ..search.articles import articles_together
@@ -159,7 +159,8 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     result = over_levels(question, prepared, stages, result, diagnosing)
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
-        coarse = bool(found.halved)
+        coarse = error_of_mesh(found.null.fit) if found.halved else 0.0
+        result = replace(result, mesh_error=coarse)
         distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit, coarse))
     study = known.study
     if not diagnosing:

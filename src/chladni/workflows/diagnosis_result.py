@@ -93,6 +93,8 @@ class DiagnosisResult(Result):
     screening : faults that the recording itself reveals; None without an FRF
     files : {what: name} of the files written with it
     halved : why every shell of the written decks is halved; "" if they have the given mesh
+    mesh_error : largest relative error of a natural frequency by the mesh of the deck, where the
+        data reject this mesh; 0 where they do not
     models : the structures; None if the result was read from a file
     left_where : residual of the explanation on the mesh; None if frequencies were compared
     recordings : Q of the decks on the recordings that were not fitted
@@ -122,6 +124,7 @@ class DiagnosisResult(Result):
     screening: Screening | None = None
     files: dict[str, str | None] = field(default_factory=dict)
     halved: str = ""
+    mesh_error: float = 0.0
     models: UpdatedModels | None = None
     residual_localisation: ResidualLocalisation | None = None
     outlook: Outlook | None = None
