@@ -51,9 +51,9 @@ def on_smaller_shells(coarse: Assembly, fine: Assembly) -> tuple[Rigid, ...]:
 def on_whole_shells(coarse: Assembly, fine: Assembly) -> Assembly:
     """The refined structure with fasteners from grid to grid on footprints as wide as in the deck.
 
-    A load on a grid acts on the coarse shells round it by their shape functions. On the refined
-    grids these are 1, 1/2 on the sides and 1/4 in the middles: the weights of a mean (RBE3) that
-    holds the end of the fastener.
+    A load on a grid acts on the coarse shells round it by their shape functions. These are 1 there,
+    1/2 in the middles of sides and 1/4 in those of shells. They are the weights of a mean (RBE3)
+    that holds the end of the fastener.
 
     Parameters
     ----------
