@@ -175,3 +175,19 @@ def test_a_heavy_rib_is_sought_where_a_mass_explains_most(where):
     assert np.linalg.norm(X - place, axis=1).min() < 0.05
     assert np.ptp(X[:, 0]) < 1e-9
     assert best.base == "null"
+
+
+@pytest.mark.parametrize(("height", "edges", "what"), [
+    (0.9, 2, "point-mass"), (0.9, 4, "mass-patch"), (1.1, 2, ""), (4.0, 4, ""),
+])  # fmt: skip
+def test_a_blade_lower_than_the_sheet_is_thick_is_a_mass(problem, where, height, edges, what):
+    """Of thickness b on a sheet of thickness t: A = b h, I = b h³/3, at any b."""
+    assembly = where.groups.structure.assembly
+    lines = GridLines.of(assembly)
+    rows = lines.walk(0, np.array([1.0, 0, 0]), 10.0)[: edges + 1]
+    rib = Stiffener.along(where, assembly.ids[rows].tolist(), 1)
+    t = float(assembly.shells.thickness.mean())
+    for b in (0.5 * t, 20 * t):
+        sizes = b * (height * t) ** 3 / 3, b * height * t
+        x = np.array([np.log(v / p.scale) for v, p in zip(sizes, rib.parameters, strict=True)])
+        assert rib.remarks(x).becomes == what

@@ -23,7 +23,7 @@ from .attachments import strength
 from .crack import LENGTHS, PLACES, Line, LineFinder, far_apart
 from .effect import Effect, MatrixTerm, Traits, Weight
 from .effect_context import EffectContext
-from .estimate import in_mm
+from .estimate import Remarks, in_mm
 from .family import Article, Family
 from .search_context import Candidate, ResponseScan, SearchContext, best_places, followed
 
@@ -33,6 +33,7 @@ BEGUN = 6  # lines of shells whose grids are tried
 FEW = 16  # middles of lines that are tried if only natural frequencies are known
 FOLLOWED = 2  # lines that are fitted
 MASSES = (0.003, 0.01, 0.03)  # of the article's, with which the place of a heavy rib is sought
+SHORTEST = 3  # grids of a line
 LONGER = (1, 3)  # edges by which a move lengthens a line
 
 
@@ -98,6 +99,13 @@ class Stiffener(Effect):
         """ρ A L."""
         m = self.section.material.rho * self.parameters[1].value(x[1]) * self.length
         return Weight(m, m * np.eye(2)[1])
+
+    def remarks(self, x: np.ndarray, sd: np.ndarray | None = None) -> Remarks:
+        """A mass, where a blade of this I and A is lower than the sheet is thick."""
+        i, a = self.sizes(x)
+        height2 = 3 * BENDING / AREA * i / a  # over t²: A = b h, I = b h³/3
+        mass = "point-mass" if len(self.grids) == SHORTEST else "mass-patch"
+        return Remarks(becomes=mass if height2 < 1 else "")
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Write bars with a property of their own."""
@@ -172,7 +180,7 @@ class GridLines:
         rows, X = self.assembly.rows(np.array(grids)), self.assembly.points
         ahead = unit(X[rows[-1]] - X[rows[0]])
         size = float(np.linalg.norm(X[rows[1]] - X[rows[0]]))
-        found = [grids[1:], grids[:-1]] if len(grids) > 3 else []
+        found = [grids[1:], grids[:-1]] if len(grids) > SHORTEST else []
         for end, d in ((-1, ahead), (0, -ahead)):
             for edges in LONGER:
                 more = self.walk(int(rows[end]), d, (edges - 0.5) * size)[1:]
@@ -188,7 +196,7 @@ class GridLines:
 
 def distinct(lines: Iterator[tuple[int, ...]] | list[tuple[int, ...]]) -> list[tuple[int, ...]]:
     """Each line of three grids or more once."""
-    return list({frozenset(line): line for line in lines if len(line) > 2}.values())
+    return list({frozenset(line): line for line in lines if len(line) >= SHORTEST}.values())
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
