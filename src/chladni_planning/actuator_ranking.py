@@ -18,6 +18,8 @@ from chladni.errors import ShapeError
 
 from .gramians import condition, controllability_gramian, hankel_values, observability_gramian
 
+STILL = 1e-12  # of the largest driving-point residue: rounding in a clamp
+
 
 @dataclass(frozen=True, eq=False)
 class Shaking:
@@ -166,7 +168,7 @@ class ActuatorRanking:
     condition : (n,)     Hankel condition number of each candidate (by candidate, not by rank)
     residue : (n,)       least over mean driving-point residue of its modes
     margin : (n,)        rattle margin, inf where no gap was given
-    allowed : (n,) bool  accessible, and free of rattle
+    allowed : (n,) bool  accessible, free of rattle, and moved by a mode
     weakest : (n,)       Hankel value of the mode driven least, over the largest of all candidates
     """
 
@@ -186,7 +188,9 @@ def ranked_actuators(
     margin: np.ndarray | None = None,
     access: np.ndarray | None = None,
 ) -> ActuatorRanking:
-    """Rank candidates by the response of the weakest mode; no access, or a margin < 1, is a veto.
+    """Rank candidates by the response of the weakest mode.
+
+    No access, a margin < 1 and a place that no mode moves, as in a clamp, are vetoes.
 
     It is zero everywhere where no candidate drives all modes, for example where two modes share a
     frequency.  The driving-point residues of the modes stand for the Hankel values then.
@@ -195,6 +199,7 @@ def ranked_actuators(
     margin = np.full(n, np.inf) if margin is None else margin
     allowed = (np.ones(n, bool) if access is None else np.asarray(access, bool)) & (margin >= 1)
     residue, weakest = driving_point_residue(frequency, phi), shaker.weakest()
+    allowed &= residue.max(axis=1) > STILL * residue.max()
     least = residue.min(axis=1) / np.maximum(residue.mean(axis=1), 1e-300)
     return ActuatorRanking(
         np.lexsort((-least * residue.min(axis=1), shaker.effort(shaker.each), ~allowed)),

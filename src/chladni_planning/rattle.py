@@ -61,10 +61,10 @@ def openings(assembly: Assembly, motion: np.ndarray) -> Openings:
 
 
 def _likely(g: Gaps) -> np.ndarray:
-    """The clearance c; for touching sheets the middle of [c - u, c + u], cut off at zero."""
+    """The clearance c; for touching sheets the middle of [c - u, c + u]; ``TAKE_UP`` or more."""
     least = np.maximum(g.clearance - g.uncertainty, 0.0)
     most = np.maximum(g.clearance + g.uncertainty, 2 * TAKE_UP)
-    return np.where(g.touching, (least + most) / 2, g.clearance)
+    return np.where(g.touching, (least + most) / 2, np.maximum(g.clearance, TAKE_UP))
 
 
 def _zip(found: tuple[Gaps, ...], masks: list[np.ndarray]) -> list[tuple[Gaps, np.ndarray]]:

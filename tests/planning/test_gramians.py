@@ -168,6 +168,16 @@ def test_veto_puts_the_best_behind_all_others():
     assert not ranking.allowed[best]
 
 
+def test_a_clamp_shakes_nothing_though_it_never_rattles():
+    f, zeta, phi_out, phi_in = specimen(n_in=6, seed=10)
+    phi_in[4] = 0.0
+    margin = np.full(6, 0.5)
+    margin[4] = np.inf
+    ranking = ranked_actuators(shaking(f, zeta, phi_out, phi_in), f, phi_in, margin=margin)
+    assert not ranking.allowed.any()
+    assert ranking.order[-1] == 4
+
+
 @pytest.mark.parametrize("exhaustive", [2000, 1])
 def test_several_actuators(exhaustive):
     """Exchange comes near what trying every pair finds."""
