@@ -22,6 +22,7 @@ from chladni.units import Units
 from .variation import Variation
 from .vary_text import VaryText
 
+MOST = 20  # times the mass of the structure, beyond which a mass has another unit
 _TOP = 100.0  # [Hz] highest frequency for priors, which samples do not use
 
 
@@ -61,6 +62,12 @@ def of_effect(
         effect = _placed(request, kind, assembly, case)
     scale, unit = _scale(effect.parameters[0].unit, units)
     low, high = request.ends(scale, None)
+    total = mass_properties(assembly)[0]
+    if effect.parameters[0].unit == "kg" and high > MOST * total:
+        raise request.refused(
+            f"{high:.4g} {unit} are more than {MOST} times the mass of the whole structure, "
+            f"{total:.4g} {unit}; numbers are in the deck's units"
+        )
     free = FreeParameter(kind.name, kind.name, () if grid is None else (str(grid),))
     name = kind.name if grid is None else f"{kind.name} at {grid}"
     return VariedEffect(name, free, 0.0, low, high, unit, request.log, effect)

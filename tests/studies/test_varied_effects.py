@@ -47,6 +47,12 @@ def test_a_mass_at_a_grid_is_a_mass_at_that_grid():
     assert not len(varied.applied(sheet(), 0.0).masses)
 
 
+def test_masses_that_far_exceed_the_structure_are_in_another_unit():
+    """1.4 kg of sheet: 5 to 50 t are 5 to 50 g of someone who reads kg/1000."""
+    with pytest.raises(FileError, match=r"5e\+04 kg are more than 20 times .*, 1.413 kg"):
+        of_effect(vary_text(f"point-mass at {GRID}=5:50"), sheet(), None, UNITS["mm-t-s"])
+
+
 def test_a_support_pushes_across_the_sheet():
     varied = of_effect(vary_text(f"extra-support at {GRID}=1e2:1e5:log"), sheet(), None, None)
     row = sheet().rows([GRID])

@@ -28,8 +28,8 @@ def in_doubt(plain: Fit, null: Fit, coarse: float = 0.0) -> tuple[str, ...]:
     "Nothing is missing" is a claim too.  A number that no structure of this deck has may stand for
     missing physics, in the reported deck or in the null.  Several numbers may do so together,
     although each alone is plausible.  For example, the frequencies of a strip determine only one
-    combination of E, rho and t.  A mesh that the data reject takes frequencies off by ``coarse``. The
-    numbers of the reported deck then stand for it, and small effects cannot be seen.
+    combination of E, rho and t.  A mesh that the data reject takes frequencies off by
+    ``coarse``. The numbers of the reported deck then stand for it, and small effects are not seen.
     """
     own = _far(plain)
     far = list(dict.fromkeys((*own, *strained(null))))
