@@ -337,6 +337,9 @@ def test_a_deck_far_from_the_frequencies_is_no_explanation_of_them():
     assert left == ((beyond, "extra-support"), (beyond,))
     said = sentence(replace(RESULT, verdict="not in catalogue", one_of=left))
     assert said == f"No effect is named; the data cannot distinguish {beyond}, extra-support."
+    assert beyond_calibration((("crack", beyond),), "softer folds") == (
+        ("crack", f"{beyond} (softer folds)"),
+    )
 
 
 def test_agreement_says_how_near():

@@ -178,10 +178,10 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     if result.compared != "responses":
-        left = tuple(left_frequencies(result.frequencies, stages.final.model))
+        left, cause = left_frequencies(result.frequencies, stages.final.model)
         distrust = (*left, *distrust)
         if left and result.verdict == "not in catalogue":
-            result = replace(result, one_of=beyond_calibration(result.one_of))
+            result = replace(result, one_of=beyond_calibration(result.one_of, cause))
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
@@ -196,13 +196,17 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     )  # fmt: skip
 
 
-def beyond_calibration(groups: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+def beyond_calibration(
+    groups: tuple[tuple[str, ...], ...], cause: str = ""
+) -> tuple[tuple[str, ...], ...]:
     """Tied explanations with a cause outside the catalogue in place of calibration alone.
 
-    The calibrated deck leaves too much of the frequencies to be an explanation.
+    The calibrated deck leaves too much of the frequencies to be an explanation. The ``cause`` that
+    these show is named.
     """
+    beyond = f"{BEYOND} ({cause})" if cause else BEYOND
     return tuple(
-        tuple(dict.fromkeys(BEYOND if name == ALONE else name for name in group))
+        tuple(dict.fromkeys(beyond if name in (ALONE, BEYOND) else name for name in group))
         for group in groups
     )
 
