@@ -16,9 +16,7 @@ SHELLS, OTHERS = 2.0, 1.0  # rms in per cent that careful models leave: of shell
 STRAINED = 2.0  # prior standard deviations from which a nuisance is a finding
 
 
-def left_frequencies(
-    rows: Sequence[FrequencyRow], model: Modelled
-) -> tuple[tuple[str, ...], str]:
+def left_frequencies(rows: Sequence[FrequencyRow], model: Modelled) -> tuple[tuple[str, ...], str]:
     """Sentences on a deck whose frequencies are farther off than those of a careful model.
 
     The second value names the cause outside the catalogue that they show, "" if they show none.
@@ -60,7 +58,7 @@ def left_frequencies(
 
 
 def folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> tuple[float, float]:
-    """κ of the folds, where the deviations are in proportion to theirs, and what it removes of them.
+    """κ of the folds where the deviations are in proportion to theirs, and the share it removes.
 
     A fold is in series with the sheet. If it is κ times as stiff as in the deck, (f / f_test)² =
     C (1 + s (1/κ - 1)). s is the share of bending at folds in the strain energy, C common to all.
