@@ -213,6 +213,9 @@ def of_poles(data: Poles, state: State) -> FitTest:
         where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
         return FitTest(often >= LEAST_P, often, what, where)
     both = " and shapes" if data.shapes is not None else ""
+    where = ""
+    if len(test):
+        where = f"most at {data.frequency[test[np.argmax(np.abs(delta))]]:.4g} Hz"
     apart = float(chdtrc(max(len(test), 1), np.sum((delta / data.std()[test]) ** 2)))
     if apart < closely:
         rms = 100 * np.sqrt(np.mean(delta**2))
@@ -220,14 +223,13 @@ def of_poles(data: Poles, state: State) -> FitTest:
             f"{len(test)} natural frequencies differ by {rms:.1f} % (rms), more than the spread of "
             f"{100 * data.scale:.1f} % that frequencies{both} show together"
         )
-        worst = data.frequency[test[np.argmax(np.abs(delta))]]
-        return FitTest(apart >= LEAST_P, apart, what, f"most at {worst:.4g} Hz")
+        return FitTest(apart >= LEAST_P, apart, what, where)
     what = (
         f"{len(poles) - len(alone)} of {len(poles)} natural frequencies{both} agree to "
         f"{100 * data.scale:.1f} % with errors of mesh and scatter, which a deck cannot contain; "
         f"models of one structure differ by about {100 * SCALE:.1f} %"
     )
-    return FitTest(closely >= LEAST_P, closely, what, "over all modes")
+    return FitTest(closely >= LEAST_P, closely, what, where)
 
 
 def at_least(count: int, chance: np.ndarray) -> float:

@@ -57,6 +57,8 @@ def _sentence(result: DiagnosisResult) -> str:
             "explain this as well as any effect tried."
         )
     if verdict == "not in catalogue" and result.one_of:
+        if len(result.one_of[0]) == 1:
+            return f"No effect is named; the recording shows {result.one_of[0][0]}."
         return f"No effect is named; the data cannot distinguish {', '.join(result.one_of[0])}."
     if verdict == "not in catalogue":
         if result.compared != "responses" and not what:
