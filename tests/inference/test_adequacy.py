@@ -103,6 +103,9 @@ def test_poles_fit_as_closely_as_models_do_or_not_at_all():
 def test_poles_without_partner_are_counted_and_said():
     """Of six listed modes one may be spurious by chance, three are not."""
     assert of_poles(listed(), modes(10, 20, 30, 40, 50, 75)).passes
+    wide = of_poles(listed(scale=1.3 * listed().scale), modes(10, 20, 30, 40, 50, 75))
+    assert wide.passes
+    assert "5 of 6 natural frequencies (60 Hz without a partner) agree" in wide.what
     found = of_poles(listed(), modes(10, 25, 35, 45, 60))
     assert not found.passes
     assert "have no partner" in found.what

@@ -14,8 +14,8 @@ from ..errors import LabelError
 from .identification import Identified
 from .propagation import propagated, standard_deviations
 
-# condition of Φ at the sensors from which they cannot tell modes apart: 2 % of noise, which is usual
-# of a shape, becomes as large there as a mode
+# condition of Φ at the sensors from which they cannot tell modes apart: the usual noise of a shape,
+# 2 %, becomes as large there as a mode
 SEPARATE = 50.0
 
 

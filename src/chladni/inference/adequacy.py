@@ -208,10 +208,10 @@ def of_poles(data: Poles, state: State) -> FitTest:
     alone = np.setdiff1d(poles, test)
     share = np.broadcast_to(data.spurious, data.frequency.shape)[poles]
     often = at_least(len(alone), share)
+    without = ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
     if often < closely:
         what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
-        where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
-        return FitTest(often >= LEAST_P, often, what, where)
+        return FitTest(often >= LEAST_P, often, what, f"at {without}")
     both = " and shapes" if data.shapes is not None else ""
     where = ""
     if len(test):
@@ -224,8 +224,9 @@ def of_poles(data: Poles, state: State) -> FitTest:
             f"{100 * data.scale:.1f} % that frequencies{both} show together"
         )
         return FitTest(apart >= LEAST_P, apart, what, where)
+    left = f" ({without} without a partner)" if len(alone) else ""
     what = (
-        f"{len(poles) - len(alone)} of {len(poles)} natural frequencies{both} agree to "
+        f"{len(test)} of {len(poles)} natural frequencies{both}{left} agree to "
         f"{100 * data.scale:.1f} % with errors of mesh and scatter, which a deck cannot contain; "
         f"models of one structure differ by about {100 * SCALE:.1f} %"
     )
