@@ -197,10 +197,11 @@ def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
 def of_poles(data: Poles, state: State) -> FitTest:
     """Test of natural frequencies: their error, and the number of poles without a partner.
 
-    p is the smallest of three probabilities: of a spread of ln f at least as large as the fitted
-    one, of deviations at least as large with this spread (χ²), and of at least as many poles
-    without a partner among the modes of ``state``. Each pole is spurious with its own probability.
-    Shapes have a say in the spread, so that frequencies may deviate by more than it.
+    p is the smallest of three probabilities. The first is that of a spread of ln f at least as
+    large as the fitted one. The second is that of deviations at least as large with this spread
+    (χ²): shapes have a say in it, and frequencies may deviate by more. The third is that of at
+    least as many poles without a partner among the modes of ``state``, each spurious with its own
+    chance.
     """
     closely = float(ndtr(-np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
