@@ -10,16 +10,18 @@ import pytest
 from tests.builders.commands import ran
 
 WITH_SHAPES = {"pcb_clamped": "recording.unv", "u_beam_shell": "recording.uff"}
-SHAPES = '[model]\ndeck = "deck.bdf"\nunits = "mm-t-s"\n[test]\nrecordings = ["{}"]\n'
 
 
 def answer(recordings, folder, name):
     """The answer to a copy of a case, which must end with exit 3; of ``NAME shapes`` with these."""
     name, _, shapes = name.partition(" ")
-    shutil.copytree(recordings / name, folder / name)
+    case = folder / name
+    shutil.copytree(recordings / name, case)
     if shapes:
-        (folder / name / "case.toml").write_text(SHAPES.format(WITH_SHAPES[name]))
-    said = ran("diagnose", folder / name, "--out", folder / "out", code=3).output
+        both = case / "deck.bdf", case / WITH_SHAPES[name]
+        case = folder / "case"
+        ran("init", *both, "--out", case)
+    said = ran("diagnose", case, "--out", folder / "out", code=3).output
     return json.loads((folder / "out" / "diagnosis.json").read_text()), said.splitlines()
 
 
