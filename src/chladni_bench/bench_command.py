@@ -13,11 +13,13 @@ from chladni.case import Case, load_case
 from chladni.case.load import OUTSIDE
 from chladni.case.sensor_places import placed
 from chladni.cli.run import Allow, DeckOrCase, Out, Pictures, Units, limits, started
-from chladni.errors import FileError
+from chladni.errors import FileError, named
+from chladni.fem.modelled import modelled
 from chladni.io.tables.sensor_table import exciter, with_input
 from chladni.output import write_text
 from chladni.progress import Progress, within
 from chladni.results import to_json
+from chladni.search.silent_dofs import silent_sensors
 from chladni.workflows.loaded_model import is_case, load_deck, similar_names
 from chladni_planning import PlanSettings, plan_test, sensors_csv
 
@@ -207,10 +209,11 @@ def _case(
     model = bare.model()
     if driven:
         placed(model.assembly, [exciter(driven, "--input")], "--input")
-    table, hangers = scratch / "sensors.csv", ""
+    table, hangers, f_max = scratch / "sensors.csv", "", 0.0
     if sensors is None:
         progress("planning the sensors", 0.1)
         made = plan_test(model.assembly, PlanSettings(draws=0))
+        f_max = float(made.modal.frequency[-1])
         write_text(table, sensors_csv(made, driven))
         on_table = driven.startswith("base:")
         hangers = "" if on_table else f"hangers = {[int(h) for h in made.hangers]}\n"
@@ -228,6 +231,21 @@ def _case(
         + f"[test]\nsensors = {json.dumps(str(table))}\n{hangers}",
     )
     case = load_case(scratch)
-    own = (note for note in case.notes if note != OUTSIDE)  # no word of the user's
+    still = silent_of_plan(case, f_max) if sensors is None else ()
+    if still:  # a plan serves all modes, and one drive does not move them all
+        rows = table.read_text(encoding="utf-8").splitlines(keepends=True)
+        write_text(table, "".join(row for row in rows if row.split(",")[0] not in still))
+        case = load_case(scratch)
+    own = [note for note in case.notes if note != OUTSIDE]  # no word of the user's
+    if still:
+        own.append(
+            f"sensors {named(still, 3)} of the plan are left out: {case.inputs.labels[0]} does not "
+            "move them"
+        )
     notes = tuple(dict.fromkeys((*model.notes, *own)))
     return replace(case, path=source, notes=notes)
+
+
+def silent_of_plan(case: Case, f_max: float) -> tuple[str, ...]:
+    """Labels of planned sensors that the drive of a case does not move, by modes to ``f_max``."""
+    return silent_sensors(modelled(case.assembly, f_max), case.outputs, case.inputs)

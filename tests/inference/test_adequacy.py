@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.stats import binom, kstest
+from scipy.stats import binom, chi2, kstest
 
 from chladni.effects.effect import Effect
 from chladni.inference.adequacy import (
@@ -103,10 +103,25 @@ def test_poles_fit_as_closely_as_models_do_or_not_at_all():
 def test_poles_without_partner_are_counted_and_said():
     """Of six listed modes one may be spurious by chance, three are not."""
     assert of_poles(listed(), modes(10, 20, 30, 40, 50, 75)).passes
+    wide = of_poles(listed(scale=1.3 * listed().scale), modes(10, 20, 30, 40, 50, 75))
+    assert wide.passes
+    assert "5 of 6 natural frequencies (60 Hz without a partner) agree" in wide.what
     found = of_poles(listed(), modes(10, 25, 35, 45, 60))
     assert not found.passes
     assert "have no partner" in found.what
     assert "20" in found.where
+
+
+def test_shapes_that_agree_excuse_no_frequencies():
+    """Deviations of the learned spread pass as χ² says; of three times it they are no scatter."""
+    rng, f = np.random.default_rng(5), listed().frequency
+    draws = [of_poles(listed(), modes(*f * np.exp(0.01 * rng.normal(size=6)))) for _ in range(300)]
+    assert sum(not test.passes for test in draws) <= binom.isf(1e-3, 300, 0.01)
+    off = 3 * np.array([1, -1, 1, -1, 1, -1])
+    found = of_poles(listed(), modes(*f * np.exp(0.01 * off)))
+    assert_allclose(found.p, chi2.sf(np.sum(off**2) * 0.01**2 / (0.01**2 + 1e-8), 6))
+    assert not found.passes
+    assert "differ by 3.0 % (rms)" in found.what
 
 
 def test_equal_chances_are_binomial():

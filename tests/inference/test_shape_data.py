@@ -10,6 +10,7 @@ from tests.builders.tube_frames import frame_deck, recorded_shapes
 from chladni.case import load_case
 from chladni.inference.shape_data import ShapeData, shape_slopes
 from chladni.reduced.reduced_model import evaluate
+from chladni.search.measured_shapes import NOISES, learned_noise
 from chladni.search.preparation import prepare
 from chladni.search.question import Prepared, Question
 from chladni.workflows.question_of_case import question_of
@@ -166,3 +167,14 @@ def test_noise_is_learned_or_stated(question: Question) -> None:
     data = stated.problem.data
     assert data.shapes is not None
     assert (data.shapes.variance.sum(axis=1) > 0.1**2).all()
+
+
+def test_every_mode_has_its_own_noise() -> None:
+    """Shapes of Gaussian noise: a mode of ten times the others' noise tells so, and they do not."""
+    rng, n, share = np.random.default_rng(4), 12, np.array([0.02] * 5 + [0.2])
+    square = (n - 1) / n * share**2 * rng.chisquare(n - 1, len(share)) / (n - 1)
+    v = NOISES[:, None] ** 2 / n
+    unlikely = (n - 1) * np.log(v) + square / v
+    common, own = learned_noise(np.repeat(unlikely[:, None], 2, axis=1))
+    assert 0.015 < common < 0.045
+    np.testing.assert_array_less(np.abs(np.log(own / share)), np.log(1.7))

@@ -337,6 +337,13 @@ def test_a_deck_far_from_the_frequencies_is_no_explanation_of_them():
     assert left == ((beyond, "extra-support"), (beyond,))
     said = sentence(replace(RESULT, verdict="not in catalogue", one_of=left))
     assert said == f"No effect is named; the data cannot distinguish {beyond}, extra-support."
+    assert beyond_calibration((("crack", beyond),), "softer folds") == (
+        ("crack", f"{beyond} (softer folds)"),
+    )
+    alone = beyond_calibration((), "softer folds")
+    said = sentence(replace(RESULT, verdict="not in catalogue", one_of=alone))
+    assert said == f"No effect is named; the recording shows {beyond} (softer folds)."
+    assert beyond_calibration(()) == ()
 
 
 def test_agreement_says_how_near():

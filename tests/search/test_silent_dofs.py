@@ -7,7 +7,7 @@ from tests.builders.structures import held_along_x0
 from chladni.errors import LabelError
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import modelled
-from chladni.search.silent_dofs import refuse_silent
+from chladni.search.silent_dofs import refuse_silent, silent_sensors
 from chladni_specimens import plate
 
 ACROSS, ALONG = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
@@ -50,6 +50,13 @@ def test_what_is_silent_is_refused_with_its_label(request, structure, outputs, d
     model = request.getfixturevalue(structure)
     with pytest.raises(LabelError, match=said):
         refuse_silent(model, places(model, *outputs), places(model, drive))
+
+
+def test_sensors_in_the_plane_of_a_sheet_are_silent(held):
+    """A force across a flat sheet moves no point along it; the others keep their labels."""
+    outputs = places(held, (9, ACROSS), (33, ALONG), (52, ALONG))
+    assert silent_sensors(held, outputs, places(held, (18, ACROSS))) == outputs.labels[1:]
+    assert silent_sensors(held, outputs, places(held, (18, ACROSS), (12, ALONG))) == ()
 
 
 def test_what_a_support_leaves_free_is_said():

@@ -41,6 +41,20 @@ def deck(demo, tmp_path_factory):
 BARE = ("--units", "mm-t-s", "--allow", "CSEAM")
 
 
+def test_a_plan_keeps_the_sensors_that_its_drive_moves(tmp_path):
+    """A straight bar bends along two axes apart; a plan sees both, and one drive moves one."""
+    cards = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,70.+9,,.3,2700.",
+             "PBARL,1,1,,BAR", ",.02,.03"]  # fmt: skip
+    cards += [f"GRID,{k},,{(k - 1) / 12},0.,0." for k in range(1, 14)]
+    cards += [f"CBAR,{k},1,{k},{k + 1},0.,0.,1." for k in range(1, 13)]
+    (tmp_path / "bar.bdf").write_text("\n".join([*cards, "SPC1,1,123456,1", "ENDDATA", ""]))
+    words = ("--units", "SI", "--band", "5:600")
+    made = bench(tmp_path / "bar.bdf", tmp_path / "o", *words)
+    (drive,) = made.inputs.labels
+    assert {label[-2:] for label in made.outputs.labels} == {drive[-2:]}
+    prepared(made)
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -23,7 +23,8 @@ class Likeness:
     """One pair of modes, compared at the sensors."""
 
     mac: float  # on all channels
-    noise_leaves: float  # expected MAC of the true shape with the one that was identified
+    # expected MAC of the true shape with the one that was identified; nan where no noise is stated
+    noise_leaves: float
     # seen, seen_mac: channels that see the mode, and the MAC on them
     seen: int
     seen_mac: float

@@ -14,7 +14,9 @@ from ..errors import LabelError
 from .identification import Identified
 from .propagation import propagated, standard_deviations
 
-SEPARATE = 1e3  # condition of Φ at the sensors from which they cannot tell modes apart
+# condition of Φ at the sensors from which they cannot tell modes apart: the usual noise of a shape,
+# 2 %, becomes as large there as a mode
+SEPARATE = 50.0
 
 
 def mixture(phi: np.ndarray, psi: np.ndarray) -> np.ndarray | None:

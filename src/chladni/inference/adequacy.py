@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import chdtrc, ndtr
 
 from ..reduced.reduced_model import State, evaluate
 from .complex_modes import ModeCoupling
@@ -197,26 +197,41 @@ def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
 def of_poles(data: Poles, state: State) -> FitTest:
     """Test of natural frequencies: their error, and the number of poles without a partner.
 
-    p is the smaller of two probabilities: of a spread of ln f at least as large as the fitted one,
-    and of at least as many poles without a partner among the modes of ``state``. Each pole is
-    spurious with its own probability.
+    p is the smallest of three probabilities. The first is that of a spread of ln f at least as
+    large as the fitted one. The second is that of deviations at least as large with this spread
+    (χ²): shapes have a say in it, and frequencies may deviate by more. The third is that of at
+    least as many poles without a partner among the modes of ``state``, each spurious with its own
+    chance.
     """
     closely = float(ndtr(-np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
-    alone = np.setdiff1d(poles, data.pairs(state)[0])
+    delta, test, _ = data.deviation(state)
+    alone = np.setdiff1d(poles, test)
     share = np.broadcast_to(data.spurious, data.frequency.shape)[poles]
     often = at_least(len(alone), share)
+    without = ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
     if often < closely:
         what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
-        where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
-        return FitTest(often >= LEAST_P, often, what, where)
+        return FitTest(often >= LEAST_P, often, what, f"at {without}")
     both = " and shapes" if data.shapes is not None else ""
+    where = ""
+    if len(test):
+        where = f"most at {data.frequency[test[np.argmax(np.abs(delta))]]:.4g} Hz"
+    apart = float(chdtrc(max(len(test), 1), np.sum((delta / data.std()[test]) ** 2)))
+    if apart < closely:
+        rms = 100 * np.sqrt(np.mean(delta**2))
+        what = (
+            f"{len(test)} natural frequencies differ by {rms:.1f} % (rms), more than the spread of "
+            f"{100 * data.scale:.1f} % that frequencies{both} show together"
+        )
+        return FitTest(apart >= LEAST_P, apart, what, where)
+    left = f" ({without} without a partner)" if len(alone) else ""
     what = (
-        f"{len(poles) - len(alone)} of {len(poles)} natural frequencies{both} agree to "
+        f"{len(test)} of {len(poles)} natural frequencies{both}{left} agree to "
         f"{100 * data.scale:.1f} % with errors of mesh and scatter, which a deck cannot contain; "
         f"models of one structure differ by about {100 * SCALE:.1f} %"
     )
-    return FitTest(closely >= LEAST_P, closely, what, "over all modes")
+    return FitTest(closely >= LEAST_P, closely, what, where)
 
 
 def at_least(count: int, chance: np.ndarray) -> float:

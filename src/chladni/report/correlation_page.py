@@ -10,6 +10,7 @@ import numpy as np
 
 from ..case import Case
 from ..ema.correlation import Quality
+from ..ema.mac_significance import Likeness
 from ..view import charts
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
@@ -36,8 +37,9 @@ _COMAC = (
     "others may have a wrong place or direction, or the model lacks physics there."
 )
 _WORTH = (
-    "MAC, and its largest value with the noise of the recording. Seen on: sensors whose motion "
-    "exceeds three standard deviations of its noise, and the MAC on them alone. By chance: "
+    "MAC, and its largest value with the noise of the recording (–: none is stated). Seen on: "
+    "sensors whose motion exceeds three standard deviations of its noise, and the MAC on them "
+    "alone. By chance: "
     "probability that the best of random shapes, as many as the model has modes here, reaches "
     "that value; sensors that move together count once. With neighbours: share of the test's "
     "shape that the model's modes within 5 % in frequency represent together; close modes may "
@@ -179,8 +181,7 @@ def _worth(found: Correlation) -> list[Block]:
     f = [hertz(found.f_test[j]) for j in found.pairs.test]
     n, worth = len(found.sensors), found.likeness
     rows = [
-        (at, criterion(w.mac), criterion(w.noise_leaves), f"{w.seen} of {n}",
-         criterion(w.seen_mac), number(w.chance, 2), criterion(w.space))
+        (at, criterion(w.mac), *_by_noise(w, n), number(w.chance, 2), criterion(w.space))
         for at, w in zip(f, worth, strict=True)
     ]  # fmt: skip
     heads = ("test [Hz]", "MAC", "noise leaves", "seen on", "MAC there", "by chance",
@@ -195,6 +196,13 @@ def _worth(found: Correlation) -> list[Block]:
         names = ("test [Hz]", "MAC", "best half", "random shapes reach it")
         blocks.append(Table(names, poor, caption=_HALVES))
     return blocks
+
+
+def _by_noise(one: Likeness, sensors: int) -> tuple[str, str, str]:
+    """The largest MAC with the noise, and the sensors above it; dashes where none is stated."""
+    if np.isnan(one.noise_leaves):
+        return "–", "–", "–"
+    return criterion(one.noise_leaves), f"{one.seen} of {sensors}", criterion(one.seen_mac)
 
 
 def _alone(found: Correlation) -> str:

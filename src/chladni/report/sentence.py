@@ -60,8 +60,15 @@ def _sentence(result: DiagnosisResult) -> str:
             "explain this as well as any effect tried."
         )
     if verdict == "not in catalogue" and result.one_of:
+        if len(result.one_of[0]) == 1:
+            return f"No effect is named; the recording shows {result.one_of[0][0]}."
         return f"No effect is named; the data cannot distinguish {', '.join(result.one_of[0])}."
     if verdict == "not in catalogue":
+        if result.compared != "responses" and not what:
+            return (
+                "No single effect of the catalogue explains the recording: the model lacks other "
+                "physics, or several effects at once."
+            )
         near = f": {what}" if what else ""
         return f"The model lacks physics that is not in the catalogue{near}."
     return verdict

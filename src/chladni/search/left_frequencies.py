@@ -1,6 +1,6 @@
 """Frequencies that a written deck leaves, against those of careful models, and what they show."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,8 +16,10 @@ SHELLS, OTHERS = 2.0, 1.0  # rms in per cent that careful models leave: of shell
 STRAINED = 2.0  # prior standard deviations from which a nuisance is a finding
 
 
-def left_frequencies(rows: Sequence[FrequencyRow], model: Modelled) -> Iterator[str]:
+def left_frequencies(rows: Sequence[FrequencyRow], model: Modelled) -> tuple[tuple[str, ...], str]:
     """Sentences on a deck whose frequencies are farther off than those of a careful model.
+
+    The second value names the cause outside the catalogue that they show, "" if they show none.
 
     Parameters
     ----------
@@ -26,27 +28,37 @@ def left_frequencies(rows: Sequence[FrequencyRow], model: Modelled) -> Iterator[
     """
     paired = [(r.after_hz, r.test_hz) for r in rows if r.after_hz]
     if not paired:
-        return
+        return (), ""
     f, test = np.array(paired, dtype=float).T
     off = 100 * np.log(f / test)
     rms, most = float(np.sqrt(np.mean(off**2))), SHELLS if len(model.assembly.shells) else OTHERS
     if rms <= most:
-        return
+        return (), ""
     worst = int(np.abs(off).argmax())
     alone = len(rows) - len(paired)
-    yield (
+    far = (
         f"the frequencies of the deck are {rms:.2g} % (rms) from those of the test over "
         f"{len(paired)} modes{f' (without a partner: {alone})' * bool(alone)}; the one at "
         f"{test[worst]:.4g} Hz is {100 * (f[worst] / test[worst] - 1):+.2g} % off; a careful model "
         f"of {'shells' if most == SHELLS else 'bars or solids'} leaves {most:g} % at most, so "
         "physics is missing, or modes are paired wrongly"
     )
-    if len(model.assembly.shells):
-        yield from _folds(f, test, model)
+    kappa, removed = folds(f, test, model) if len(model.assembly.shells) else (1.0, 0.0)
+    away = abs(np.log(kappa)) / FOLDS
+    if away <= STRAINED:
+        return (far,), ""
+    cause = f"{'softer' if kappa < 1 else 'stiffer'} folds"
+    said = (
+        f"the deviations show {cause} than the deck has: shells along them with about "
+        f"{kappa:.2g} of their bending stiffness remove {100 * removed:.0f} % of the squared "
+        f"deviations; that is {away:.2g} standard deviations of the differences between meshes; "
+        "look at the joints along the folds"
+    )
+    return (far, said), cause
 
 
-def _folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> Iterator[str]:
-    """Sentence on folds of another stiffness, where the deviations are in proportion to theirs.
+def folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> tuple[float, float]:
+    """κ of the folds where the deviations are in proportion to theirs, and the share it removes.
 
     A fold is in series with the sheet. If it is κ times as stiff as in the deck, (f / f_test)² =
     C (1 + s (1/κ - 1)). s is the share of bending at folds in the strain energy, C common to all.
@@ -55,23 +67,14 @@ def _folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> Iterator[str]:
 
     share = fold_shares(model, f)
     if len(f) < 4 or np.ptp(share) == 0:
-        return
+        return 1.0, 0.0
     y, A = (f / test) ** 2, np.stack([np.ones(len(f)), share], axis=1)
     (common, slope), *_ = np.linalg.lstsq(A, y)
     left, plain = np.sum((y - A @ [common, slope]) ** 2), np.sum((y - y.mean()) ** 2)
     p = fisher.sf((plain - left) / left * (len(f) - 2), 1, len(f) - 2)
     if 1 + slope / common <= 0 or p > LEAST_P:
-        return
-    kappa = 1 / (1 + slope / common)
-    away = abs(np.log(kappa)) / FOLDS
-    if away > STRAINED:
-        yield (
-            f"the folds are {'softer' if kappa < 1 else 'stiffer'} than in the deck: shells along "
-            f"them with about {kappa:.2g} of their bending stiffness remove "
-            f"{100 * (1 - left / plain):.0f} % of the squared deviations; that is {away:.2g} "
-            "standard deviations of the differences between meshes; look at the joints along the "
-            "folds"
-        )
+        return 1.0, 0.0
+    return float(1 / (1 + slope / common)), float(1 - left / plain)
 
 
 def fold_shares(model: Modelled, frequency: np.ndarray) -> np.ndarray:

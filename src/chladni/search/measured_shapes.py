@@ -2,7 +2,8 @@
 
 Noise that a file does not state is learned: the shapes are most probable with it, whatever the
 deck's modes mix by. Noise lies in all directions of the sensors, an error of the model in those of
-its modes.
+its modes. Every mode has a noise of its own about a common one: peaks of one test differ in height,
+and a weak one gives a poor shape.
 """
 
 from dataclasses import replace
@@ -19,7 +20,9 @@ from ..inference.shape_data import ShapeData
 from .question import Question
 
 NOISE, NOISE_SD = 0.02, 0.7  # prior median of the noise over the rms of a shape, and sd of its ln
-NOISES, SPREADS = np.geomspace(0.001, 0.3, 24), np.geomspace(0.005, 0.2, 8)
+OF_MODES = 0.7  # sd of ln of the noise between modes of one test
+NOISES, SPREADS = np.geomspace(0.001, 1.0, 31), np.geomspace(0.005, 0.2, 8)
+NEAR = 0.2  # |ln f| to a partner that costs as much as a whole MAC
 RIGID = 0.02  # of the lowest measured frequency: modes below are rigid motions
 
 
@@ -38,8 +41,9 @@ def shape_data(
     found, f = ShapeData(psi.real / norm, np.zeros(psi.shape)), question.frequency[listed]
     modes = nominal.up_to(min(MIXED * float(f[-1]), nominal.band))
     phi = question.outputs.rows(nominal.structure) @ modes.shapes
-    flexible = modes.frequency > RIGID * f[0]
-    partner = np.where(flexible[:, None], mac(phi, found.values.T), -1.0).argmax(axis=0)
+    flexible = (modes.frequency > RIGID * f[0])[:, None]
+    away = np.log(np.maximum(modes.frequency, RIGID * f[0])[:, None] / f) / NEAR
+    partner = np.where(flexible, mac(phi, found.values.T) - away**2, -np.inf).argmax(axis=0)
     wrong = side(question.outputs, question.outputs, nominal.structure, question.accuracy)
     moved = sum((rows @ modes.shapes[:, partner]) ** 2 for rows in wrong.rows)
     size = np.maximum((phi[:, partner] ** 2).sum(axis=0), 1e-300)
@@ -57,15 +61,36 @@ def shape_data(
     lam = (2 * np.pi * modes.frequency) ** 2
     every = np.arange(len(f))
 
-    def unlikely(share: float) -> float:
+    def unlikely(share: float, scale: float) -> np.ndarray:
         data = noisy(share)
-        fixed = (1 - 1 / n) * np.log(data.variance).sum()
-        each = [data.costs(phi, lam, s, every, partner).sum() for s in SPREADS]
-        prior = (np.log(share / NOISE) / NOISE_SD) ** 2
-        return float(fixed - 2 * logsumexp(-np.array(each) / 2) + prior)
+        fixed = (1 - 1 / n) * np.log(data.variance).sum(axis=1)
+        return fixed + data.costs(phi, lam, scale, every, partner)
 
-    share = float(min(NOISES, key=unlikely))
-    return noisy(share), (_said(len(f), n, f"{share:.2g} of their rms, learned"),)
+    common, own = learned_noise(np.array([[unlikely(x, s) for s in SPREADS] for x in NOISES]))
+    words = f"{common:.2g} of their rms, learned; by mode {own.min():.2g} to {own.max():.2g}"
+    return noisy(own[:, None]), (_said(len(f), n, words),)
+
+
+def learned_noise(unlikely: np.ndarray) -> tuple[float, np.ndarray]:
+    """Most probable common noise of the shapes, and the noise of each mode (r,).
+
+    ln of the noise of a mode is N(ln of the common one, ``OF_MODES``²).
+
+    Parameters
+    ----------
+    unlikely : (noises, spreads, r)   -2 ln density of each shape
+    """
+    away = np.log(NOISES) - np.log(NOISES)[:, None]
+    prior = -0.5 * (away / OF_MODES) ** 2
+    prior -= logsumexp(prior, axis=1, keepdims=True)  # (common, own)
+    joint = prior[:, :, None, None] - unlikely / 2
+    of_mode = logsumexp(joint, axis=1)  # (common, spreads, r)
+    whole = logsumexp(of_mode.sum(axis=2), axis=1) - (np.log(NOISES / NOISE) / NOISE_SD) ** 2 / 2
+    k = int(whole.argmax())
+    of_spread = of_mode[k].sum(axis=1)
+    weight = np.exp(of_spread - logsumexp(of_spread))
+    share = np.exp(joint[k] - of_mode[k])  # of each noise, by spread and mode
+    return float(NOISES[k]), np.exp(np.einsum("k,ksr,s->r", np.log(NOISES), share, weight))
 
 
 def _said(modes: int, sensors: int, noise: str) -> str:

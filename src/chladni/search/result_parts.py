@@ -12,6 +12,7 @@ from ..inference.hypothesis_fit import HypothesisFit
 from ..inference.identifiability import parameter_names
 from ..inference.joint_fit import JointFit
 from ..inference.likelihood import LN10
+from ..inference.map_fit import Fit
 from ..inference.own_optimum import LocalOptimum
 from ..inference.pole_data import Poles
 from ..inference.residual_localisation import ResidualLocalisation
@@ -253,13 +254,18 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         found = deck if diagnosis.shared else fit
         rows = effect.reported(found.of(effect), fit.sd(effect))
         written = effect.reported(deck.of(effect), fit.sd(effect))
-        each = zip(effect.parameters, parameter_names([effect]), rows, written, strict=True)
-        for parameter, where, row, other in each:
-            given = parameter.value(parameter.nominal)
+        each = zip(parameter_names([effect]), rows, written, _given(effect, fit), strict=True)
+        for where, row, other, given in each:
             called = getattr(effect, "called", "")  # the user's name of the parameter
             where = f"{called}: {where}" if called not in ("", row.name) else where
             out.append(CalibratedParameter(where, row, given, other.value if changed else given))
     return tuple(out)
+
+
+def _given(effect: Effect, fit: Fit) -> list[float]:
+    """The deck's values of the numbers that an effect reports."""
+    nominal = np.array([p.nominal for p in effect.parameters])
+    return [row.value for row in effect.reported(nominal, fit.sd(effect))]
 
 
 def values_kept(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -279,9 +285,8 @@ def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
     for one in joint.fits:
         for effect in (e for e in one.fit.effects if e.kind == "calibration"):
             rows = effect.reported(one.fit.of(effect), one.fit.sd(effect))
-            each = zip(effect.parameters, parameter_names([effect]), rows, strict=True)
-            for parameter, where, row in each:
-                given = parameter.value(parameter.nominal)
+            each = zip(parameter_names([effect]), rows, _given(effect, one.fit), strict=True)
+            for where, row, given in each:
                 seen.setdefault((where, row.name), CalibratedParameter(where, row, given))
     return tuple(seen.values())
 
@@ -294,7 +299,8 @@ def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:
         assert real is not None
         if not real.any():
             return Remainder(False, np.nan, np.nan, "no pole has a partner in the model")
-        left = 100 * float(np.sqrt(prepared.score.Q(plain.fit.state, real, real))) * LN10
+        delta, _ = prepared.score.forced(plain.fit.state, real)
+        left = 100 * float(np.sqrt(np.nanmean(delta[real] ** 2)))
         known = 100 * float(np.median(prepared.score.sd[real]))
         text = f"{left:.2g} % rms of the frequencies, whose standard deviation is {known:.1g} %"
     else:

@@ -38,23 +38,32 @@ def refuse_silent(model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs) 
     silent = _silent(model, outputs, inputs)
     drives, sensors = silent.all(axis=0), silent.all(axis=1)
     if drives.any():
-        what, own, other, said = "drive", drives, outputs, "moves no sensor"
+        what, own, other, said = "drive", drives, outputs, "no sensor"
     elif sensors.any():
-        what, own, other, said = "sensor", sensors, inputs, "moves with no drive"
+        what, own, other, said = "sensor", sensors, inputs, "with no drive"
     else:
         return
     at = _only(sides[what], np.flatnonzero(own))
+    said = f"move{'s' * (len(at.labels) == 1)} {said}"
     ways = [axis for axis, n in AXES if not _silent(model, _along(at, n), other).all()]
     theirs: list[str] = []
     if what == "drive":
         said += f" declared along {_declared(other)}"
         theirs = [axis for axis, n in AXES if not _silent(model, at, _along(other, n)).all()]
     raise LabelError(
-        f"{_listed(what, at.labels)} of the model, declared along {_declared(at)}, {said} (its "
-        f"response is less than {NOTHING:g} of that of the point itself); {_would(ways, theirs)}"
+        f"{_listed(what, at.labels)} of the model, declared along {_declared(at)}, {said} ("
+        f"less than {NOTHING:g} of the response of the point itself); {_would(ways, theirs)}"
         "correct the place or the direction in the label or in sensors.csv, or leave the channel "
         "out with use = no"
     )
+
+
+def silent_sensors(model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs) -> tuple[str, ...]:
+    """Labels of the sensors that move with no drive."""
+    if inputs.base.any():
+        return ()
+    silent = _silent(model, outputs, inputs).all(axis=1)
+    return tuple(np.array(outputs.labels)[silent].tolist())
 
 
 def _declared(at: MeasuredDofs) -> str:

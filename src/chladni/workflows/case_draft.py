@@ -165,7 +165,7 @@ def _missing(
     if weighed is None:
         out.append(
             f"the weighed mass: [test] mass in kg, without sensors; the deck weighs {mass:.4g} "
-            "kg, and the comparison shows a wrong unit system"
+            "kg, and a comparison would show a wrong unit system"
         )
     return out
 

@@ -210,6 +210,8 @@ def _by_shapes(
         sd = np.zeros(psi.shape) if modal.sd is None else np.nan_to_num(modal.sd / norm)
         covariance = sd.T[:, :, None] ** 2 * np.eye(len(psi))
         likely = _likeness(real / norm, covariance, phi, near.frequency, alike.pairs)
+        if modal.sd is None:
+            likely = tuple(replace(one, noise_leaves=float("nan")) for one in likely)
     across, whole = _on_the_model(model, near, phi, psi, float(modal.frequency.max()))
     return Correlation(
         (), case.outputs.labels, None, modal.frequency, near.frequency, alike.mac, alike.pairs,

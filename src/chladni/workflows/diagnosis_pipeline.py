@@ -17,6 +17,7 @@ from ..ema.finding import Finding, Screening
 from ..inference.calibration_result import CalibrationStudy
 from ..inference.implausible_values import error_of_mesh, in_doubt
 from ..inference.joint_fit import Posterior, informed
+from ..inference.result import LeftPlace
 from ..progress import Progress, within
 from ..search.articles import articles_together
 from ..search.basis_refinement import refined
@@ -179,10 +180,13 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     if diagnosing and prepared.too_little and result.verdict == "not in catalogue":
         distrust = (f"no effect is named: {prepared.too_little}", *distrust)
     if result.compared != "responses":
-        left = tuple(left_frequencies(result.frequencies, stages.final.model))
+        left, cause = left_frequencies(result.frequencies, stages.final.model)
         distrust = (*left, *distrust)
         if left and result.verdict == "not in catalogue":
-            result = replace(result, one_of=beyond_calibration(result.one_of))
+            result = replace(result, one_of=beyond_calibration(result.one_of, cause))
+        if cause and result.adequate is not None:
+            there = LeftPlace(f"the joints along the folds, because the deviations show {cause}")
+            result = replace(result, adequate=replace(result.adequate, where=(there,)))
     seen, distrust = known.screening, (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
@@ -197,13 +201,19 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     )  # fmt: skip
 
 
-def beyond_calibration(groups: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+def beyond_calibration(
+    groups: tuple[tuple[str, ...], ...], cause: str = ""
+) -> tuple[tuple[str, ...], ...]:
     """Tied explanations with a cause outside the catalogue in place of calibration alone.
 
-    The calibrated deck leaves too much of the frequencies to be an explanation.
+    The calibrated deck leaves too much of the frequencies to be an explanation. The ``cause`` that
+    these show is named, where nothing explains them it alone.
     """
+    beyond = f"{BEYOND} ({cause})" if cause else BEYOND
+    if cause and not groups:
+        return ((beyond,),)
     return tuple(
-        tuple(dict.fromkeys(BEYOND if name == ALONE else name for name in group))
+        tuple(dict.fromkeys(beyond if name in (ALONE, BEYOND) else name for name in group))
         for group in groups
     )
 

@@ -58,6 +58,7 @@ def ready(
     if prepared.identified is not None:
         refuse_turned_axes(case, prepared.identified, prepared.nominal)
     lines = None if use is None else case.lines(case.frfs[0].frequency) & use
+    progress("faults of the recording", 1.0)
     screening = screened_prepared(case, prepared, lines)
     of_shapes = question.shapes is not None and screening is not None and bool(screening.faults)
     if screening is not None and (unmendable(screening) or of_shapes):
