@@ -99,7 +99,7 @@ def run(
         say(f"open: {', '.join(known.names)}" if known.unknown is None else "nothing is tied")
         _known([known], barred)
         every = advised([known], count, odds, barred)
-        _tell(known.names, every, odds)
+        _tell(known, every, odds)
         drawn = _page(shown_of_run(source) if out else None, [known], every, odds)
         _write(out, source / FILE, known.names, every, drawn, pictures)
         return
@@ -119,7 +119,7 @@ def run(
         every = advised(together, count, odds, barred) if together else ()
     _planned(made)
     if together:
-        _tell(names, every, odds)
+        _tell(together[0], every, odds)
     drawn = list[Section]()
     if out and together:
         model = model_in_si(found, "next")[0]
@@ -152,15 +152,14 @@ def _known(every: Sequence[Outlook], barred: Sequence[str]) -> None:
         )
 
 
-def _tell(names: Sequence[str], every: Sequence[NextMeasurement], odds: float) -> None:
+def _tell(known: Outlook, every: Sequence[NextMeasurement], odds: float) -> None:
     """Tabulate the advice."""
     if every:
         table = next_measurements(every, odds)
         say(table.caption)
         say_table(table)
     else:
-        does = "narrows an interval" if len(names) == 1 else f"tells {' and '.join(names)} apart"
-        say(f"none of the candidates {does}")
+        say(known.nothing_left)
 
 
 def _page(

@@ -12,7 +12,7 @@ from ..inference.calibration_result import (
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Items, Section, Table, Text
 from .typed_fields import as_data
-from .words import number, percent, quantity
+from .words import number, percent, quantity, share
 
 _NONE = "–"
 _FAR = 1.0  # standard deviation of ln value from which a parameter counts as unbounded
@@ -165,14 +165,14 @@ def _regions(study: CalibrationStudy) -> list[Block]:
     if (found := study.guidance) is None:
         return []
     rows = [
-        (r.part, _share(r.worst), _share(r.good), percent(r.factor, 1.0), _share(r.removed),
+        (r.part, share(r.worst), share(r.good), percent(r.factor, 1.0), share(r.removed),
          r.state or _NONE)
         for r in found.regions[:MOST_REGIONS]
     ]  # fmt: skip
     heads = ("part", "energy, worst modes", "energy, others", "change of its stiffness",
              "deviation removed", "in this calibration")  # fmt: skip
     worst = ", ".join(f"{number(m.test_hz, 4)} Hz" for m in found.worst)
-    left = f"The frequencies deviate by {_share(found.rms)} rms. Worst modes: {worst}."
+    left = f"The frequencies deviate by {share(found.rms)} rms. Worst modes: {worst}."
     table = Table(heads, rows, ("part", "in this calibration"), f"{left} {_REGIONS}")
     if not found.words:
         return [table, Text([_NO_REGION])]
@@ -184,10 +184,6 @@ def _damping(study: CalibrationStudy) -> Table:
     rows = [(d.part, number(d.loss_factor, 2), f"{number(d.low, 2)} to {number(d.high, 2)}")
             for d in study.damping]  # fmt: skip
     return Table(("part", "loss factor", "95 %"), rows, ("part",), _LOSSES)
-
-
-def _share(x: float) -> str:
-    return f"{number(100 * x, 2)} %"
 
 
 def _spread(p: ArticleParameter) -> str:

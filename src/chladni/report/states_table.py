@@ -2,11 +2,10 @@
 
 import re
 
-from ..effects.estimate import Estimate
 from ..inference.result import Agreement
 from ..workflows.diagnosis_result import DiagnosisResult, StateResult
 from .blocks import Block, Table
-from .words import interval, number, quantity
+from .words import number, of_estimate, quantity
 
 
 def state_folder(result: DiagnosisResult, k: int) -> str:
@@ -26,7 +25,7 @@ def states_table(result: DiagnosisResult) -> list[Block]:
     out: list[Block] = [Table(heads, rows, words, note)]
     if result.shared:
         shared = [
-            (p.where, quantity(p.deck_value, p.estimate.unit), _size(p.estimate))
+            (p.where, quantity(p.deck_value, p.estimate.unit), of_estimate(p.estimate))
             for p in result.shared
         ]
         said = "Shared by all states and fitted to all their recordings together."
@@ -42,13 +41,9 @@ def _row(s: StateResult, folder: str) -> tuple[str, ...]:
         s.result.verdict,
         "; ".join(e.name for e in effects) or "–",
         "; ".join(e.where.text for e in effects) or "–",
-        "; ".join(", ".join(f"{p.name} = {_size(p)}" for p in e.parameters) for e in effects)
+        "; ".join(", ".join(f"{p.name} = {of_estimate(p)}" for p in e.parameters) for e in effects)
         or "–",
         number(fit.nominal),
         number(fit.after),
         folder,
     )
-
-
-def _size(p: Estimate) -> str:
-    return interval(p.value, p.low, p.high, p.unit)

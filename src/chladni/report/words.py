@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from ..effects.estimate import Estimate
 from ..units import number as number
 
 _PREFIX = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
@@ -59,6 +60,15 @@ def quantity(value: float | None, unit: str = "", reference: float | None = None
     scale, named = display_unit(value if reference is None else reference, unit)
     shown = number(None if value is None else value / scale)
     return f"{shown} {named}".strip() if shown != _NONE else _NONE
+
+
+def share(x: float) -> str:
+    """A share with two digits.
+
+    >>> share(0.01234)
+    '1.2 %'
+    """
+    return f"{number(100 * x, 2)} %"
 
 
 def interval(value: float | None, low: float | None, high: float | None, unit: str = "") -> str:
@@ -150,3 +160,8 @@ def display_unit(value: float | None, unit: str) -> tuple[float, str]:
     power = 3 * math.floor(math.log10(abs(value)) / 3)
     power = min(9, max(power, 0))
     return 10.0**power, _PREFIX[power] + shown
+
+
+def of_estimate(p: Estimate) -> str:
+    """A value with its interval."""
+    return interval(p.value, p.low, p.high, p.unit)

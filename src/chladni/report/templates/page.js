@@ -197,7 +197,7 @@ function structure(at, data, shared, box) {
     if (spot.radius) for (const p of spot.at.slice(0, 3)) traces.push(ball(p, spot.radius, text, tint));
     for (const [mode, by] of spot.at.length ? [["markers+text", 0.03], ["markers", -0.03]] : []) {  // clear of the sheet, on either side
       const [x, y, z] = [0, 1, 2].map((k) => spot.at.map((p) => p[k] + by * mesh.size * eye[k]));
-      traces.push({ type: "scatter3d", mode, name, x, y, z, text: [name], textposition: "top center", textfont: { color: colour(tint), size: 13 }, legendgroup: name, showlegend: by > 0,
+      traces.push({ type: "scatter3d", mode, name, x, y, z, text: [name], textposition: ["top center", "bottom center"][spot.rank], textfont: { color: colour(tint), size: 13 }, legendgroup: name, showlegend: by > 0,
         hoverinfo: "text", hovertext: text, marker: { size: 9, color: colour(tint), symbol: "cross" } });
     }
   }
