@@ -11,7 +11,7 @@ from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..inference.result import NextMeasurement
 from ..output import run_folder, write_json, write_text
-from ..report.blocks import Section, drawings, write_pictures
+from ..report.blocks import Code, Links, Section, drawings, write_pictures
 from ..report.information_map import information_map, shown_of_run
 from ..report.measurement_table import next_measurements
 from ..report.mesh_drawings import mesh_of
@@ -30,7 +30,13 @@ from ..search.next_measurement import (
 from ..workflows.before_any_test import PlannedTests, before_any_test
 from ..workflows.loaded_model import model_in_si, opened
 from .console import say, say_results, say_table, watched
-from .run import Allow, Pictures, Units, folder_named
+from .run import Allow, Pictures, Units, command_line, folder_named
+
+_FILES = (
+    ("next.json", "the measurements for other programs"),
+    ("sensors.csv", "further sensors"),
+    ("plan.json", "further sensors, drives, masses and bands, for chladni bench --add"),
+)
 
 
 def run(
@@ -197,7 +203,9 @@ def _write(
             lead = f"Nothing is tied; the least known quantity is {every[-1].about}."
             if len(names) > 1:
                 lead = f"To tell apart: {', '.join(names)}."
-            files = write_pictures(part, drawings(drawn), pictures)
-            figures = {Path(name).stem: part / name for name, _ in files}
-            write_sections(part / "report.html", title, drawn, lead=lead, figures=figures)
+            made = write_pictures(part, drawings(drawn), pictures)
+            figures = {Path(name).stem: part / name for name, _ in made}
+            body = [*drawn, Section("Files", [Links([*_FILES, *made])]),
+                    Section("Run it again", [Code([command_line()])])]  # fmt: skip
+            write_sections(part / "report.html", title, body, lead=lead, figures=figures)
     say_results(out)

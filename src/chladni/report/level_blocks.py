@@ -87,8 +87,8 @@ def _every_level(tables: Sequence[LevelTable]) -> Table:
 def _measured(r: LevelRow) -> tuple[str, ...]:
     f = f"{number(r.frequency_low_hz, 6)} to {number(r.frequency_high_hz, 6)}"
     z = f"{number(_percent(r.damping_low), 3)} to {number(_percent(r.damping_high), 3)}"
-    z_mid = number(100 * r.damping, 3)
-    return number(1e3 * r.amplitude_m, 3), number(r.frequency_hz, 6), f, z_mid, z
+    a = number(1e3 * r.amplitude_m, 3)
+    return a, number(r.frequency_hz, 6), f, number(100 * r.damping, 3), z
 
 
 def _levels(t: LevelTable) -> Table:

@@ -91,7 +91,8 @@ def odds_of(p: float) -> str:
     ('3 : 1', '1 : 4')
     """
     p = min(max(p, 1e-6), 1 - 1e-6)
-    return f"{number(p / (1 - p), 2)} : 1" if p >= 0.5 else f"1 : {number((1 - p) / p, 2)}"
+    odds = number(rounded(max(p / (1 - p), (1 - p) / p)), 2)
+    return f"{odds} : 1" if p >= 0.5 else f"1 : {odds}"
 
 
 def percent(new: float | None, old: float | None) -> str:
