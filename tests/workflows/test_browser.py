@@ -336,6 +336,9 @@ def test_a_sensor_opens_its_channel_and_faults_that_are_none_are_folded(window, 
     assert window.run(folded) == [False]
     window.pdf()
     assert window.run(folded) == [True]
+    fit = "getComputedStyle(document.documentElement).getPropertyValue('--fit')"
+    wide = "Math.max(...[...document.querySelectorAll('.plot')].map((p) => p.clientWidth))"
+    assert 300 < window.run(f"return {fit} * {wide}") < 718  # of a sheet of A4
     assert not window.complaints()
 
 

@@ -430,6 +430,7 @@ function sortable(table) {
 
 const DRAWN = { structure, remainder, shapes, chart };
 const SPATIAL = ["structure", "remainder", "shapes"];
+const PAPER = 740;  // [px] of a page whose drawings fit a sheet of A4; they keep the width that they have on the screen
 let once = () => {};
 
 // Go to a drawing and show the given part of it.
@@ -448,8 +449,10 @@ async function begin() {
     row.addEventListener("click", () => { if (!getSelection().toString()) go(); });
     row.addEventListener("keydown", (e) => { if (e.key === "Enter") go(); });
   }
-  const unfold = () => document.querySelectorAll("details").forEach((d) => { d.open = true; });
-  addEventListener("beforeprint", unfold);
+  addEventListener("beforeprint", () => {
+    document.querySelectorAll("details").forEach((d) => { d.open = true; });
+    document.documentElement.style.setProperty("--fit", Math.min(1, PAPER / document.querySelector("main").clientWidth));
+  });
   const figures = [...document.querySelectorAll(".live[data-word]")];
   if (!figures.length || !window.DecompressionStream) return;
   const [common, ...words] = document.querySelectorAll(".numbers"), shared = JSON.parse(await unpacked(common));
