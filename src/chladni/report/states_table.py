@@ -2,10 +2,11 @@
 
 import re
 
+from ..effects.estimate import Estimate
 from ..inference.result import Agreement
 from ..workflows.diagnosis_result import DiagnosisResult, StateResult
 from .blocks import Block, Table
-from .words import number, of_estimate, quantity
+from .words import interval, number, quantity
 
 
 def state_folder(result: DiagnosisResult, k: int) -> str:
@@ -47,3 +48,8 @@ def _row(s: StateResult, folder: str) -> tuple[str, ...]:
         number(fit.after),
         folder,
     )
+
+
+def of_estimate(p: Estimate) -> str:
+    """A value with its interval."""
+    return interval(p.value, p.low, p.high, p.unit)

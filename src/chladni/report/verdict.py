@@ -20,8 +20,8 @@ from .calibration_blocks import study_sections
 from .level_blocks import level_section
 from .measurement_table import next_measurements
 from .screening_blocks import screening_section
-from .states_table import states_table
-from .words import criterion, fixed, hertz, number, of_estimate, percent, quantity, share
+from .states_table import of_estimate, states_table
+from .words import criterion, fixed, hertz, number, percent, quantity, share
 
 HEADING = {
     "missing physics": "Missing physics found",

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 
-from ..effects.estimate import Estimate
 from ..units import number as number
 
 _PREFIX = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
@@ -161,8 +160,3 @@ def display_unit(value: float | None, unit: str) -> tuple[float, str]:
     power = 3 * math.floor(math.log10(abs(value)) / 3)
     power = min(9, max(power, 0))
     return 10.0**power, _PREFIX[power] + shown
-
-
-def of_estimate(p: Estimate) -> str:
-    """A value with its interval."""
-    return interval(p.value, p.low, p.high, p.unit)
