@@ -36,6 +36,7 @@ myst_heading_anchors = 3
 exclude_patterns = ["_build", "first_day.ipynb"]
 suppress_warnings = ["config.cache"]
 highlight_language = "none"
+smartquotes_action = "qe"  # --option keeps its dashes
 
 autodoc_typehints = "none"  # the signature of a docstring says shapes and units
 autodoc_preserve_defaults = True

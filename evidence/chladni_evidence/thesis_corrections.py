@@ -12,8 +12,8 @@ from chladni.ema.mode_pairing import pair
 from chladni.fem.energy import mass_properties
 from chladni.io.nastran import write_deck
 from chladni.progress import Progress, within
+from chladni.report import map_page
 from chladni.report.blocks import Block, Items, Picture, Section, Table
-from chladni.report.map_page import map_page
 from chladni.report.words import hertz, number
 from chladni.view import charts
 from chladni.view.chart_png import png
@@ -38,7 +38,7 @@ def mapping_chapter(desk: Desk, progress: Progress) -> Chapter:
     found = map_formed(model, desk.folder / FORMED, progress=within(progress, 0.0, 0.3))
     assert model.deck is not None
     write_deck(model.deck, desk.folder / MAPPED, found.changes)
-    page = map_page(found)
+    page = map_page.as_page(desk.folder, found)
     progress("responses", 0.4)
     mapped = desk.deck(MAPPED)
     before, after = (

@@ -119,7 +119,7 @@ def plan_chapter(desk: Desk, progress: Progress) -> Chapter:
     s = result.scores
     readings = [
         ("observability", "fully ranked", f"rank {s.observability_rank} of {s.states}"),
-        ("quotient of its gramian", f"{QUOTIENT:.4g}", number(s.gramian_quotient)),
+        ("quotient of its gramian", number(QUOTIENT), number(s.gramian_quotient)),
         ("target modes", "24", str(len(found.modal))),
         ("sensors", "30", str(len(found.layout))),
         ("shaker", "c: a and b rattle", result.actuators_together[0].label),

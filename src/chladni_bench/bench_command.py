@@ -124,7 +124,7 @@ def run(
         keep_time=time,
     )
     from .bench_folder import write_bench
-    from .bench_page import bench_page
+    from .bench_page import as_page
 
     with started("bench", source, out, pictures=pictures) as job:
         job.progress("reading", 0.0)
@@ -138,7 +138,7 @@ def run(
             job.progress("writing", 0.95)
             job.files += write_bench(job.folder, case, found)
         job.json("bench.json", to_json(found))
-        job.show(bench_page(found))
+        job.show(as_page(job.folder, found))
         job.say(f"next: chladni diagnose {job.place / 'case'}")
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ _SHOWN = 2  # responses drawn over time
 _POINTS = 2000  # of a curve
 
 
-def bench_page(found: BenchResult) -> PageParts:
+def as_page(folder: Path, found: BenchResult) -> PageParts:
     """Sections of the page."""
     first = found.recordings[0]
     blocks: list[Block] = [Facts(_facts(found)), _table(found)]

@@ -9,7 +9,6 @@ from .bench_workflow import BenchResult
 _PAGED = Paged(
     "bench",
     f"{__package__}.bench_page",
-    lambda m, at, found: m.bench_page(found),
     "bench.json",
     lambda found, at: write_bench(at, found.origin, found),
 )

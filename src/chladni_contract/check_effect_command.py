@@ -31,7 +31,7 @@ def run(
     """
     from chladni.effects import registry
 
-    from .effect_check_page import effect_check_page
+    from .effect_check_page import as_page
 
     family = registry.family(effect)
     with started("check-effect", deck or Path(effect), out) as job:
@@ -39,5 +39,5 @@ def run(
         job.note(() if model is None else model.notes)
         found = check_effect(family, model, progress=within(job.progress, 0.0, 0.95))
         job.json("effect.json", to_json(found))
-        job.show(effect_check_page(job.folder, found))
+        job.show(as_page(job.folder, found))
     found.trusted()

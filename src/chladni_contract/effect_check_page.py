@@ -12,7 +12,7 @@ from .effect_visibility import Visibility
 _HEADS = ("rule", "outcome", "measured, or what to do")
 
 
-def effect_check_page(folder: Path, found: EffectCheck) -> PageParts:
+def as_page(folder: Path, found: EffectCheck) -> PageParts:
     """The page; it has no pictures."""
     return in_words(found)
 

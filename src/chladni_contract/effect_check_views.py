@@ -8,7 +8,6 @@ from .effect_check import EffectCheck
 _PAGED = Paged(
     "check-effect",
     f"{__package__}.effect_check_page",
-    lambda m, at, found: m.effect_check_page(at, found),
     "effect.json",
     needs_origin=False,
 )

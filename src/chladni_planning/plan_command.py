@@ -113,7 +113,7 @@ def run(
         separate=separate,
     )
     from .detectable_page import detectable_json, detectable_section
-    from .plan_page import plan_page
+    from .plan_page import as_page
     from .separation_page import separation_in_words, separation_json
 
     with started("plan", source, out, pictures=pictures) as job:
@@ -127,7 +127,7 @@ def run(
         found = plan(model, settings, progress=within(job.progress, 0.1, 0.6))
         job.json("plan.json", to_json(found))
         job.progress("pictures", 0.7)
-        parts = plan_page(job.folder, model, found)
+        parts = as_page(job.folder, found)
         if detect:
             band, stage = durations(found).band_hz, within(job.progress, 0.8, 1.0)
             smallest = smallest_findings(model, job.folder / "plan.json", band, noise, stage)

@@ -24,7 +24,6 @@ from chladni.report.mesh_drawings import field, layout, mesh_of, mode_shapes
 from chladni.report.shown import Shown
 from chladni.report.words import direction, fixed, hertz, number, percent, rounded
 from chladni.view import annotations, charts
-from chladni.workflows.loaded_model import Model
 
 from .plan_json import plan_json
 from .plan_summary import (
@@ -45,10 +44,10 @@ from .whole_plan import Plan, motion
 _SHOWN = 12  # modes in the picture of shapes
 
 
-def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
+def as_page(folder: Path, found: Plan) -> PageParts:
     """Sections of the page; the table of sensors is written into the folder."""
     write_text(folder / "sensors.csv", sensors_csv(found))
-    result = summary(found)
+    result, model = summary(found), found.origin
     shown = mesh_of(model.seen, model.assembly)
     body = sections(found, result, shown, model.structure)
     files = [("sensors.csv", "sensors and shakers, for case.toml")]

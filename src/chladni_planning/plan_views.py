@@ -8,7 +8,6 @@ from .whole_plan import Plan
 _PAGED = Paged(
     "plan",
     f"{__package__}.plan_page",
-    lambda m, at, found: m.plan_page(at, found.origin, found),
     "plan.json",
 )
 

@@ -94,7 +94,7 @@ def run(
             source, vary or (), settings, out=place, workers=workers, scheduler=scheduler,
             units=units, allow=allow or (), progress=progress,
         )  # fmt: skip
-    from .study_page import study_page
+    from .study_page import as_page
     from .study_tables import write_netcdf
 
     with started("study", source, place, pictures=pictures) as job:
@@ -103,7 +103,7 @@ def run(
         job.notes += write_netcdf(job.keep("study.nc", "all results, for xarray"), found)
         job.files.append(("samples.jsonl", "the samples in the order they finished"))
         job.progress("pictures", 0.5)
-        job.show(study_page(found))
+        job.show(as_page(job.folder, found))
     if 2 * len(found.failed) > len(found.rows):
         number, why = found.failed[0]
         raise AccuracyError(

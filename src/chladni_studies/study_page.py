@@ -1,5 +1,6 @@
 """A parameter study as a page: influences, parallel coordinates, results over parameters."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ def _range(y: np.ndarray) -> dict[str, float] | None:
     return {"low": y.min(), "mean": y.mean(), "high": y.max(), "sd": y.std()}
 
 
-def study_page(found: ParameterStudy) -> PageParts:
+def as_page(folder: Path, found: ParameterStudy) -> PageParts:
     """Sections of the page."""
     said = in_words(found)
     sections = list(said.sections)

@@ -18,7 +18,6 @@ def _tables(found: ParameterStudy, folder: Path) -> Sequence[tuple[str, str]]:
 _PAGED = Paged(
     "study",
     f"{__package__}.study_page",
-    lambda m, at, found: m.study_page(found),
     "study.json",
     _tables,
     needs_origin=False,

@@ -124,7 +124,8 @@ def test_what_is_beside_the_missing_is_what_could_be_meant(tmp_path, monkeypatch
     (tmp_path / "pane").mkdir()
     (tmp_path / "panel").mkdir()
     (tmp_path / "panel" / "case.toml").write_text("")
-    assert call("modes", "pan").stderr.strip().endswith("the same folder has panel")
+    for command in ("modes", "check"):
+        assert call(command, "pan").stderr.strip().endswith("the same folder has panel")
 
 
 FULL = Path("/dev/full")

@@ -136,6 +136,8 @@ def test_choice_takes_what_tells_most_for_its_cost():
     assert picked(two, every, np.array([1.0, 1.0, 1.0, np.inf]), 1) == [2]
     assert picked(two, every, np.array([1.0, 0.01, 1.0, 1.0]), 1) == [1]
     assert picked(two, every[:1], np.ones(1), 1) == []
+    faint = [seen([quiet, quiet], [np.zeros(1), np.array([d])]) for d in (0.01, 0.02)]
+    assert picked(two, faint, np.ones(2), 2) == []
 
 
 def test_one_quantity_is_narrowed_as_its_posterior_is():

@@ -15,7 +15,7 @@ from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.model.assembly import Scalars
 from chladni_planning import PlanSettings, find_sensor_candidates, plan_test, sensors_csv, summary
-from chladni_planning.plan_page import plan_page
+from chladni_planning.plan_page import as_page
 from chladni_planning.whole_plan import target_modes
 from chladni_specimens.plates import box, folded_panel, plate
 
@@ -245,7 +245,7 @@ def test_a_clamped_structure_needs_no_cords(tmp_path):
     held = replace(sheet, supports=np.array([(row, c) for row in edge for c in range(1, 7)]))
     made = chladni.plan(held, sensors=4, modes=3, draws=0)
     assert not len(made.hangers)
-    assert "Shaker" in [s.title for s in plan_page(tmp_path, made.origin, made).sections]
+    assert "Shaker" in [s.title for s in as_page(tmp_path, made).sections]
 
 
 def test_spacing_is_kept(panel, built):

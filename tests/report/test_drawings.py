@@ -204,3 +204,12 @@ def test_places_that_the_data_cannot_distinguish_are_drawn_and_named(plate):
                    ("suspension", "", Location(channels=("9:+Z",)), 1)],
                   replace(plate, parts=["a"]))  # fmt: skip
     assert [(s["name"], s["rank"]) for s in found] == [("point-mass", 0), ("crack", 1)]
+
+
+def test_a_rib_is_its_grids_and_a_lump_a_ball(plate):
+    """The radius of a place of several grids is its extent, which the grids show."""
+    shown = replace(plate, ids=np.arange(len(plate.seen.points)) + 1)
+    rib, lump = (Location(grids=grids, point_m=(0.0, 0.0, 0.0), radius_m=0.1)
+                 for grids in ((1, 2, 3), (1,)))  # fmt: skip
+    found = spots([("stiffener", "", rib, 0), ("point-mass", "", lump, 1)], shown)
+    assert [(len(s["at"]), s["radius"]) for s in found] == [(3, 0.0), (1, 0.1)]

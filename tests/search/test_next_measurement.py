@@ -229,6 +229,18 @@ def test_of_one_explanation_the_least_known_quantity_is_narrowed(problem, tied, 
     assert_allclose(best[-1].bits, -np.log2(left[-1]))
     write_npz(tmp_path / "outlook.npz", **arrays_of(one))
     assert_allclose([m.narrows for m in advised([read_outlook(tmp_path)])], left, rtol=1e-4)
+
+
+def test_nothing_is_advised_where_no_interval_shrinks(problem, tied, tmp_path):
+    """All but a millionth of the variance is what no measurement sees: 7e-7 bits are left."""
+    one = outlook(problem, tied[:1], ("here",), np.ones(1), ("sensor",))
+    a = one.unknown.along
+    known = replace(one, unknown=replace(one.unknown, rest=1e6 * float(a @ a)))
+    assert max(known.information([k]) for k in range(len(known.candidates))) > 0
+    assert advised([known]) == ()
+    write_npz(tmp_path / "outlook.npz", **arrays_of(known))
+    said = ran("next", tmp_path).stdout
+    assert f"none of the candidates narrows the interval of {one.unknown.name}" in said
     assert "nothing is tied" in ran("next", tmp_path, "--out", tmp_path / "out").stdout
 
 

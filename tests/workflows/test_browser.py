@@ -22,6 +22,7 @@ import chladni
 from chladni.dynamics.frf import FRF
 from chladni.geometry.formed_mesh import FormedMesh
 from chladni.io.dyna import write_keyword
+from chladni.output import write_npz
 from chladni.report.blocks import Drawing, Section
 from chladni.report.diagnosis_drawings import drawings
 from chladni.report.diagnosis_folder import shown, write_diagnosis
@@ -335,6 +336,9 @@ def test_a_sensor_opens_its_channel_and_faults_that_are_none_are_folded(window, 
     assert window.run(folded) == [False]
     window.pdf()
     assert window.run(folded) == [True]
+    fit = "getComputedStyle(document.documentElement).getPropertyValue('--fit')"
+    wide = "Math.max(...[...document.querySelectorAll('.plot')].map((p) => p.clientWidth))"
+    assert 300 < window.run(f"return {fit} * {wide}") < 718  # of a sheet of A4
     assert not window.complaints()
 
 
@@ -723,4 +727,28 @@ def test_no_page_runs_a_hostile_name(window, hostile, tmp_path, command):
         window.pointer(("pointerMove", *centre(window, name)))
     assert window.run("return [window.hit, document.querySelector('img[src=x]')]") == [None, None]
     assert window.pdf().startswith(b"%PDF")
+    assert not window.complaints()
+
+
+def test_no_page_about_runs_runs_a_hostile_name(window, hostile, folder_of_run, tmp_path):
+    """A list of runs, two runs and the next measurement."""
+    runs = tmp_path / HOSTILE
+    for name, code in (("correlate", 0), ("calibrate", 3)):
+        ran(name, hostile, "--out", runs / name, code=code)
+    held = dict(np.load(folder_of_run / "outlook.npz"))
+    for name in ("names", "what"):
+        held[name] = np.array([f"{one}{EVIL}" for one in held[name]])
+    (runs / "tied").mkdir()
+    write_npz(runs / "tied" / "outlook.npz", **held)
+    ran("index", runs)
+    ran("compare", runs / "correlate", runs / "calibrate", "--out", tmp_path / "both")
+    ran("next", runs / "tied", "--out", tmp_path / "further")
+    window.size(390, 900)
+    for page in (runs / "index.html", *(tmp_path / n / "report.html" for n in ("both", "further"))):
+        window.open(page)
+        for name in window.run(DRAWN):
+            see(window, name)
+        found = "return [window.hit, document.querySelector('img[src=x], a[href^=javascript]')]"
+        assert window.run(found) == [None, None]
+        assert window.run("return document.documentElement.scrollWidth") <= 390
     assert not window.complaints()

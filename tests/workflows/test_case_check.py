@@ -19,7 +19,7 @@ from chladni.io.uff.uff_function import Axis, FunctionSet
 from chladni.io.uff.write_shapes import write_shapes
 from chladni.io.uff.write_uff import binary_set, head_records, write_sets
 from chladni.output import plain
-from chladni.report.check_page import check_page
+from chladni.report.check_page import as_page
 from chladni.results import to_json
 from chladni.workflows.case_check import CaseFinding
 from chladni.workflows.output_only import with_natural_frequencies
@@ -69,7 +69,7 @@ def test_what_the_command_writes(copied, tmp_path):
         assert word in page
 
 
-def test_the_page_counts_what_it_found(case):
+def test_the_page_counts_what_it_found(case, copied):
     checked = chladni.check(replace(case, recordings=()))
     for faults, rest, said in (
         (1, 0, "1 thing is to be corrected first."),
@@ -78,7 +78,7 @@ def test_the_page_counts_what_it_found(case):
         (0, 0, "Nothing looks wrong with the case."),
     ):
         found = (CaseFinding("a", "b", True),) * faults + (CaseFinding("c", "d"),) * rest
-        assert check_page(case, replace(checked, findings=found)).lead == said
+        assert as_page(copied, replace(checked, findings=found)).lead == said
 
 
 def test_words_nobody_reads_are_told_by_command(copied):

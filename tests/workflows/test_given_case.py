@@ -136,6 +136,8 @@ def test_what_cannot_go_together_is_named(folder, case):
         chladni.calibrate(folder, folder / "frf.npz", mass=1.0)
     with pytest.raises(ChladniError, match=r"argument recording: there is no file '.*nothing.uff'"):
         chladni.diagnose(folder / "plate.bdf", folder / "nothing.uff", units="SI")
+    with pytest.raises(ChladniError, match=r"did you mean 'frf.npz'. there are frf.npz$"):
+        chladni.diagnose(folder / "plate.bdf", folder / "fr.npz", units="SI")
     with pytest.raises(
         ChladniError, match=r"recording of diagnose\(\) is \[1\.0\]; it takes a path"
     ):

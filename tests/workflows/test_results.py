@@ -51,12 +51,13 @@ def subclasses(kind: type) -> set[type]:
 def test_every_type_of_result_has_a_view():
     """No result can be added that prints as a heap of arrays; a package brings its own views."""
     assert all(hasattr(chladni, name) for name in chladni.__all__)  # loads the packages
-    for name in _PAGES:
+    paged = {f"chladni.workflows.{name}" for name in _PAGES}
+    for name in paged:
         import_module(name.rpartition(".")[0])
     assert set(_views) == {full_name(kind) for kind in subclasses(Result) - {Result}}
     packages = {name: name.split(".")[0] for name in _views}
     own = {name for name, package in packages.items() if package == "chladni"}
-    assert own == {*_PAGES, full_name(DiagnosisResult)}
+    assert own == {*paged, full_name(DiagnosisResult)}
     others = sorted(package for package in packages.values() if package != "chladni")
     assert others == ["chladni_bench", "chladni_contract", "chladni_planning", "chladni_studies"]
 

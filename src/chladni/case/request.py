@@ -76,9 +76,11 @@ class Request(ShownBriefly):
         except OSError:
             raise FileError(f"{at} = {said} is no file name") from None
         if not exists:
-            there = sorted(p.name for p in folder.glob("*") if p.is_file())
-            hint = did_you_mean(Path(name).name, there)
-            raise FileError(f"{at}: there is no file {said}; {hint}there are {named(there, 8)}")
+            there = sorted(p.name for p in path.parent.glob("*") if p.is_file())
+            fit = [n for n in there if Path(n).suffix == path.suffix] or there
+            rest = f"there are {named(fit, 8)}" if fit else "its folder has no files"
+            hint = did_you_mean(path.name, there)
+            raise FileError(f"{at}: there is no file {said}; {hint}{rest}")
         return path
 
 

@@ -52,14 +52,14 @@ def run(
         raise typer.BadParameter("--sample draws for one model; leave out --variants")
     words = stated(sensors=sensors, mass=mass, units=units)
     if variants:
-        from ..report.joint_models_page import joint_models_page
+        from ..report.joint_models_page import as_page
         from ..results import to_json
         from ..workflows.joint_models import joint_models
 
         with started("calibrate", source, out) as job:
             found = joint_models(opened(source, recordings or (), words), progress=job.progress)
             job.json("variants.json", to_json(found))
-            job.show(joint_models_page(job.folder, found))
+            job.show(as_page(job.folder, found))
     else:
         fit = partial(calibrate, sample=sample)
         diagnosed("calibrate", source, out, fit, pictures, recordings or (), words)

@@ -47,7 +47,7 @@ def run(
     out: Out = None,
 ) -> None:
     """Check a case before a long run: units, mass, size, places, band, words; or a deck's cards."""
-    from ..report.check_page import check_page
+    from ..report.check_page import as_page
 
     given = stated(sensors=sensors, mass=mass)
     if source.is_file() and not is_case(source) and not (recordings or given):
@@ -61,7 +61,7 @@ def run(
         found = check(case, mesh=mesh, progress=within(job.progress, 0.0, 0.7))
         job.json("check.json", to_json(found))
         job.progress("the picture", 0.7)
-        job.show(check_page(case, found))
+        job.show(as_page(job.folder, found))
         for what, text in found.facts:
             job.say(f"{what}: {text}")
         for f, limit in zip(found.frequency, found.converged, strict=False):

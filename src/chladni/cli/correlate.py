@@ -66,7 +66,7 @@ def run(
 
 
 def _with_test(job: Run, source: Path, recordings: Sequence[Path], words: "CaseWords") -> None:
-    from ..report.correlation_page import correlation_page
+    from ..report.correlation_page import as_page
 
     if source.is_file() and not is_case(source) and not recordings:
         refuse_foreign(source)
@@ -78,16 +78,16 @@ def _with_test(job: Run, source: Path, recordings: Sequence[Path], words: "CaseW
     found = correlate(case, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
-    job.show(correlation_page(case, found, job.folder))
+    job.show(as_page(job.folder, found))
 
 
 def _with_other_modes(
     job: Run, source: Path, modes: Path, units: str | None, allow: list[str]
 ) -> None:
-    from ..report.other_modes_page import other_modes_page
+    from ..report.other_modes_page import as_page
 
     model = load_model(source, units, allow, command="correlate")
     found = other_modes(model, modes, progress=within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
     job.progress("pictures", 0.8)
-    job.show(other_modes_page(model, found))
+    job.show(as_page(job.folder, found))

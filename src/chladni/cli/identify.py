@@ -44,7 +44,7 @@ def run(
     out: Out = None,
 ) -> None:
     """Identify poles, damping and shapes with standard deviations; write a state space."""
-    from ..report.identification_page import identification_page
+    from ..report.identification_page import as_page
 
     limit = limits(band) if band else None
     choice = PoleChoice(states, tuple(drop or ()), tuple(pick or ()))
@@ -53,5 +53,5 @@ def run(
         read = load_case(source) if is_one else load_recordings(source, quantity or None)
         found = identify(read, limit, averages, choice, progress=job.progress)
         job.json("identified.json", to_json(found))
-        job.show(identification_page(job.folder, found, command_line()))
+        job.show(as_page(job.folder, found, command_line()))
     found.trusted()

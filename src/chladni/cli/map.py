@@ -48,7 +48,7 @@ def run(
     FORMED is an LS-DYNA keyword file, VTU or CSV with thickness, or a scan of both faces (STL, PLY,
     OBJ). Writes the deck with a thickness at every corner, and the error of the mapping.
     """
-    from ..report.map_page import map_page
+    from ..report.map_page import as_page
 
     place = "mirrored" if mirror else "aligned" if align else "as it lies"
     pairs = dict(_pair(text) for text in pair or []) or None
@@ -64,7 +64,7 @@ def run(
         write_deck(model.deck, path, found.changes)
         job.json("mapping.json", to_json(found))
         job.progress("pictures", 0.8)
-        job.show(map_page(found))
+        job.show(as_page(job.folder, found))
 
 
 def _pair(text: str) -> tuple[str, int]:

@@ -24,7 +24,7 @@ def run(
     out: Out = None,
 ) -> None:
     """Compute normal modes: frequencies, shapes, mass, energy of each part, VTU file, pictures."""
-    from ..report.modes_page import modes_page
+    from ..report.modes_page import as_page
 
     with started("modes", source, out, pictures=pictures) as job:
         job.progress("reading the model", 0.0)
@@ -32,4 +32,4 @@ def run(
         found = modes(model, count, progress=within(job.progress, 0.0, 0.7))
         job.json("modes.json", to_json(found))
         job.progress("pictures", 0.7)
-        job.show(modes_page(job.folder, model, found))
+        job.show(as_page(job.folder, found))

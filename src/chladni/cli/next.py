@@ -11,7 +11,7 @@ from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..inference.result import NextMeasurement
 from ..output import run_folder, write_json, write_text
-from ..report.blocks import Section, drawings, write_pictures
+from ..report.blocks import Code, Links, Section, drawings, write_pictures
 from ..report.information_map import information_map, shown_of_run
 from ..report.measurement_table import next_measurements
 from ..report.mesh_drawings import mesh_of
@@ -30,7 +30,13 @@ from ..search.next_measurement import (
 from ..workflows.before_any_test import PlannedTests, before_any_test
 from ..workflows.loaded_model import model_in_si, opened
 from .console import say, say_results, say_table, watched
-from .run import Allow, Pictures, Units, folder_named
+from .run import Allow, Pictures, Units, command_line, folder_named
+
+_FILES = (
+    ("next.json", "the measurements for other programs"),
+    ("sensors.csv", "further sensors"),
+    ("plan.json", "further sensors, drives, masses and bands, for chladni bench --add"),
+)
 
 
 def run(
@@ -99,7 +105,7 @@ def run(
         say(f"open: {', '.join(known.names)}" if known.unknown is None else "nothing is tied")
         _known([known], barred)
         every = advised([known], count, odds, barred)
-        _tell(known.names, every, odds)
+        _tell(known, every, odds)
         drawn = _page(shown_of_run(source) if out else None, [known], every, odds)
         _write(out, source / FILE, known.names, every, drawn, pictures)
         return
@@ -119,7 +125,7 @@ def run(
         every = advised(together, count, odds, barred) if together else ()
     _planned(made)
     if together:
-        _tell(names, every, odds)
+        _tell(together[0], every, odds)
     drawn = list[Section]()
     if out and together:
         model = model_in_si(found, "next")[0]
@@ -152,15 +158,14 @@ def _known(every: Sequence[Outlook], barred: Sequence[str]) -> None:
         )
 
 
-def _tell(names: Sequence[str], every: Sequence[NextMeasurement], odds: float) -> None:
+def _tell(known: Outlook, every: Sequence[NextMeasurement], odds: float) -> None:
     """Tabulate the advice."""
     if every:
         table = next_measurements(every, odds)
         say(table.caption)
         say_table(table)
     else:
-        does = "narrows an interval" if len(names) == 1 else f"tells {' and '.join(names)} apart"
-        say(f"none of the candidates {does}")
+        say(known.nothing_left)
 
 
 def _page(
@@ -198,7 +203,9 @@ def _write(
             lead = f"Nothing is tied; the least known quantity is {every[-1].about}."
             if len(names) > 1:
                 lead = f"To tell apart: {', '.join(names)}."
-            files = write_pictures(part, drawings(drawn), pictures)
-            figures = {Path(name).stem: part / name for name, _ in files}
-            write_sections(part / "report.html", title, drawn, lead=lead, figures=figures)
+            made = write_pictures(part, drawings(drawn), pictures)
+            figures = {Path(name).stem: part / name for name, _ in made}
+            body = [*drawn, Section("Files", [Links([*_FILES, *made])]),
+                    Section("Run it again", [Code([command_line()])])]  # fmt: skip
+            write_sections(part / "report.html", title, body, lead=lead, figures=figures)
     say_results(out)

@@ -202,10 +202,12 @@ def opened(
     from ..case import load_case
     from ..io.mesh_format import refuse_foreign
     from ..workflows.given_case import given_case
-    from ..workflows.loaded_model import is_case
+    from ..workflows.loaded_model import is_case, similar_names
 
     if recordings or words:
         return given_case(source, list(recordings), words)
+    if not source.exists():
+        raise FileError(f"no file or folder {source}{similar_names(source)}")
     if source.exists() and not is_case(source):
         refuse_foreign(source)
         raise FileError(

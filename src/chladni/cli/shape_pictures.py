@@ -9,8 +9,9 @@ from ..arrays import real_number
 from ..errors import FileError
 from ..geometry.cross_section import cross_section, thick_lines
 from ..io.scanned_surface import read_scan
-from ..report.blocks import Picture, Table
+from ..report.blocks import Drawing, Picture, Table, write_pictures
 from ..report.words import number
+from ..view import charts
 from ..workflows.loaded_model import Model, on_faces
 from ..workflows.scan_comparison import ScanComparison, compare_with_scan
 from .run import Run
@@ -30,14 +31,13 @@ def plane(text: str) -> tuple[int, float]:
 
 
 def cuts(job: Run, model: Model, texts: list[str]) -> None:
-    """One picture for each plane."""
-    pictures = [_cut(job, model, text) for text in texts]
-    job.section("Sections", [Picture(p) for p in pictures])
+    """One drawing for each plane."""
+    drawn = [_cut(model, text) for text in texts]
+    job.files += write_pictures(job.folder, drawn, True)
+    job.section("Sections", drawn)
 
 
-def _cut(job: Run, model: Model, text: str) -> Path:
-    from ..view.section_plot import section_plot
-
+def _cut(model: Model, text: str) -> Drawing:
     axis, at = plane(text)
     seen, shells = model.seen, len(model.assembly.shells)
     section = cross_section(seen.points, seen.faces, axis, at)
@@ -52,16 +52,14 @@ def _cut(job: Run, model: Model, text: str) -> Path:
     walls, sheet = thick_lines(section, seen.points, seen.faces, thickness), section.face < shells
     scale, unit = (1e3, "mm") if model.unit == "m" else (1.0, model.unit)
     title = f"{'xyz'[axis]} = {at:g} {model.unit}".rstrip()
-    return section_plot(
-        job.keep(f"section_{'xyz'[axis]}_{at:g}.png", f"section at {title}"),
-        scale * walls[sheet],
-        np.asarray(seen.part)[section.face[sheet]],
-        [p.name for p in model.assembly.parts],
+    parts, of_wall = model.assembly.parts, np.asarray(seen.part)[section.face[sheet]]
+    chart = charts.section(
+        [(parts[k].name, scale * walls[sheet][of_wall == k]) for k in np.unique(of_wall).tolist()],
         scale * section.lines[~sheet],
-        "xyz".replace("xyz"[axis], ""),
+        [f"{a} [{unit}]" if unit else a for a in "xyz".replace("xyz"[axis], "")],
         title,
-        unit,
     )
+    return Drawing(f"section_{'xyz'[axis]}_{at:g}", chart, what=f"section at {title}")
 
 
 def against_scan(job: Run, model: Model, path: Path, aligned: bool) -> None:

@@ -48,7 +48,7 @@ def run(
 
     The universal file it writes goes straight into a case.
     """
-    from ..report.evaluation_page import evaluation_page
+    from ..report.evaluation_page import as_page
 
     settings = EstimateSettings(
         cast(Excitation, excitation) if excitation else None,
@@ -63,4 +63,4 @@ def run(
         read = load_case(source) if is_one else load_recordings(source, quantity or None)
         found = evaluate_recordings(read, settings, progress=job.progress)
         job.json("test.json", to_json(found))
-        job.show(evaluation_page(job.folder, found))
+        job.show(as_page(job.folder, found))

@@ -54,7 +54,7 @@ def jumping_phase(frf: FRF, rough: float) -> tuple[list[Finding], Check]:
         for one in (frf, replace(frf, values=np.abs(frf.values) + 0j))
     ]
     if noisy[0] <= rough or noisy[1] > JUMPING * noisy[0]:
-        return [], Check("phase over frequency", f"noise over power {noisy[0]:.2g}")
+        return [], Check("phase over frequency", f"noise over power {number(noisy[0], 2)}")
     text = (
         "the magnitudes of the FRFs are smooth over frequency, but their phases jump from line to "
         "line: phases in degrees that were read in radians look like this."

@@ -21,6 +21,7 @@ from ..results import ShownBriefly
 DRAWS = 256  # of the data of a measurement, under each hypothesis
 SEED = 20261127
 UNSEEN = 1e-3  # of the noise: variance of predictions that tells nothing
+FAINT = np.log1p(UNSEEN) / 2  # [nat] of data that move by no more than that
 SETTLED = 0.01  # of the entropy: no further measurement is chosen below it
 
 
@@ -178,6 +179,8 @@ def chosen(
 ) -> list[int]:  # fmt: skip
     """Choose measurements one after the other, each with the most information for its cost.
 
+    One that tells no more than data that hide in their noise is not chosen.
+
     Parameters
     ----------
     information : [nat] of some measurements together, by their positions
@@ -191,7 +194,7 @@ def chosen(
     while len(out) < count and left and now <= (1 - SETTLED) * most:
         after = np.array([information([*out, k]) for k in left])
         best = int(np.argmax((after - now) / cost[left]))
-        if not after[best] > now:
+        if not after[best] - now > FAINT:
             break
         now = float(after[best])
         out.append(left.pop(best))

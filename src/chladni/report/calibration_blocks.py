@@ -12,7 +12,7 @@ from ..inference.calibration_result import (
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Items, Section, Table, Text
 from .typed_fields import as_data
-from .words import number, percent, quantity
+from .words import interval, number, percent, quantity, share
 
 _NONE = "–"
 _FAR = 1.0  # standard deviation of ln value from which a parameter counts as unbounded
@@ -150,7 +150,7 @@ def _profiles(study: CalibrationStudy) -> Table:
 def _articles(study: CalibrationStudy) -> Table:
     """Common mean, spread and values of several articles."""
     rows = [
-        (p.name, _within(p.mean, p.low, p.high, p.unit), _spread(p),
+        (p.name, interval(p.mean, p.low, p.high, p.unit), _spread(p),
          *(f"{quantity(a.value, p.unit)} ({100 * a.away:+.2g} ± {100 * a.reach:.2g} %)"
            for a in p.articles))
         for p in study.articles
@@ -165,14 +165,14 @@ def _regions(study: CalibrationStudy) -> list[Block]:
     if (found := study.guidance) is None:
         return []
     rows = [
-        (r.part, _share(r.worst), _share(r.good), percent(r.factor, 1.0), _share(r.removed),
+        (r.part, share(r.worst), share(r.good), percent(r.factor, 1.0), share(r.removed),
          r.state or _NONE)
         for r in found.regions[:MOST_REGIONS]
     ]  # fmt: skip
     heads = ("part", "energy, worst modes", "energy, others", "change of its stiffness",
              "deviation removed", "in this calibration")  # fmt: skip
     worst = ", ".join(f"{number(m.test_hz, 4)} Hz" for m in found.worst)
-    left = f"The frequencies deviate by {_share(found.rms)} rms. Worst modes: {worst}."
+    left = f"The frequencies deviate by {share(found.rms)} rms. Worst modes: {worst}."
     table = Table(heads, rows, ("part", "in this calibration"), f"{left} {_REGIONS}")
     if not found.words:
         return [table, Text([_NO_REGION])]
@@ -186,10 +186,6 @@ def _damping(study: CalibrationStudy) -> Table:
     return Table(("part", "loss factor", "95 %"), rows, ("part",), _LOSSES)
 
 
-def _share(x: float) -> str:
-    return f"{number(100 * x, 2)} %"
-
-
 def _spread(p: ArticleParameter) -> str:
     high = "not bounded" if p.spread_high is None else _percent(p.spread_high)
     return f"{_percent(p.spread)} ({_percent(p.spread_low)} to {high})"
@@ -200,18 +196,14 @@ def _sample(study: CalibrationStudy) -> list[Block]:
     if (found := study.sample) is None:
         return []
     rows = [
-        (p.name, _within(p.median, p.low, p.high, p.unit),
-         _within(p.mode, p.gaussian_low, p.gaussian_high, p.unit),
+        (p.name, interval(p.median, p.low, p.high, p.unit),
+         interval(p.mode, p.gaussian_low, p.gaussian_high, p.unit),
          number(p.sd_ratio, 3), number(p.autocorrelation_time, 3), number(p.effective, 3))
         for p in found.parameters
     ]  # fmt: skip
     heads = ("parameter", "draws", "Gaussian", "sd, draws / Gaussian", "autocorrelation [steps]",
              "effective draws")  # fmt: skip
     return [Table(heads, rows, ("parameter",), f"{_DRAWN} {found.sentence}.")]
-
-
-def _within(value: float, low: float, high: float, unit: str) -> str:
-    return f"{quantity(value, unit)} ({quantity(low, unit)} to {quantity(high, unit)})"
 
 
 def calibration_json(result: DiagnosisResult) -> dict[str, Any]:

@@ -10,6 +10,14 @@ from .blocks import Drawing
 
 MOST = 8  # parameters in a picture of pairs
 _ANGLE = np.linspace(0, 2 * np.pi, 60)
+_CAPTIONS = {
+    "profiles": "Profile likelihood of each parameter, and the parabola that its interval assumes; "
+    "across: the limit of 95 %.",
+    "corner": "Posterior of each pair of parameters, change in %: one and two standard deviations "
+    "of the Gaussian; points and steps are draws, if there are any.",
+    "articles": "Deviation of each article from the mean of all, with 95 % intervals.",
+    "bands": "Responses with the damping of the search: 90 % of the posterior, and the test.",
+}
 _SIGNIFICANT = 3.84  # χ² of one degree of freedom at 95 %
 
 
@@ -17,32 +25,19 @@ def study_drawings(study: CalibrationStudy | None) -> Iterator[Drawing]:
     """All that the study allows."""
     if study is None:
         return
-    if study.profiles:
-        yield _drawing(
-            "profiles", profiles(study), "Profile likelihood of each parameter, and the parabola "
-            "that its interval assumes; across: the limit of 95 %.",
-        )  # fmt: skip
     names, C, draws = study.names, np.array(study.covariance), None
     if (sample := study.sample) is not None:
         names = tuple(p.name for p in sample.parameters)
         C = np.array(sample.gaussian_covariance)
         draws = np.array(sample.draws) - np.array(sample.gaussian_mean)
-    if len(names) > 1:
-        yield _drawing(
-            "corner", corner(names, C, draws), "Posterior of each pair of parameters, change in %: "
-            "one and two standard deviations of the Gaussian; points and steps are draws, if there "
-            "are any.",
-        )  # fmt: skip
-    if study.articles:
-        what = "Deviation of each article from the mean of all, with 95 % intervals."
-        yield _drawing("articles", articles(study), what)
-    if study.bands:
-        what = "Responses with the damping of the search: 90 % of the posterior, and the test."
-        yield _drawing("bands", bands(study), what)
-
-
-def _drawing(name: str, chart: Chart, caption: str) -> Drawing:
-    return Drawing(name, chart, caption, place="study")
+    for name, there, chart in (
+        ("profiles", study.profiles, profiles),
+        ("corner", len(names) > 1, lambda _: corner(names, C, draws)),
+        ("articles", study.articles, articles),
+        ("bands", study.bands, bands),
+    ):
+        if there:
+            yield Drawing(name, chart(study), _CAPTIONS[name], place="study")
 
 
 def profiles(study: CalibrationStudy) -> Chart:

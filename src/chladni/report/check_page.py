@@ -1,15 +1,12 @@
 """A checked case as a page: its content, suspected errors, places of the sensors."""
 
-from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from ..case import Case
 from ..output import plain
-from ..view.surface import surface
 from ..workflows.case_check import CaseCheck, CheckedDof
-from ..workflows.case_model import cords, markers
 from .blocks import Facts, Items, PageParts, Section, Table
-from .mesh_drawings import layout, mesh_of
+from .mesh_drawings import case_shown, layout
 from .words import counted, direction, fixed, hertz, number, percent
 
 
@@ -25,14 +22,10 @@ def as_json(found: CaseCheck) -> dict[str, Any]:
     }
 
 
-def check_page(case: Case, found: CaseCheck) -> PageParts:
+def as_page(folder: Path, found: CaseCheck) -> PageParts:
     """Sections of the page."""
-    shown = replace(
-        mesh_of(surface(case.assembly), case.assembly),
-        outputs=markers(case.outputs), inputs=markers(case.inputs), cords=cords(case),
-    )  # fmt: skip
     caption = "Sensors, shakers and cords; arrows: their directions."
-    drawn = layout("where", shown, "sensors", caption, "sensors on the mesh")
+    drawn = layout("where", case_shown(found.origin), "sensors", caption, "sensors on the mesh")
     looks, facts, *told = in_words(found).sections
     sections = [looks, facts, Section("Sensors", [drawn, _table(found.dofs)]), *told]
     return PageParts(_lead(found), sections)

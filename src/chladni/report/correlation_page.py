@@ -1,7 +1,6 @@
 """A correlation as a page: paired modes, MAC, Q by band and channel."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,15 +11,12 @@ from ..case import Case
 from ..ema.correlation import Quality
 from ..ema.mac_significance import Likeness
 from ..view import charts
-from ..view.surface import surface
-from ..workflows.case_model import cords, markers
 from ..workflows.correlate import Correlation
 from . import frf_charts
 from .blocks import Block, Drawing, Facts, PageParts, Section, Table, Text
 from .diagnosis_drawings import frequencies
-from .mesh_drawings import layout, mesh_of, shape_pairs
+from .mesh_drawings import case_shown, layout, shape_pairs
 from .screening_blocks import screening_json, screening_section
-from .shown import Shown
 from .words import criterion, hertz, number, percent
 
 _SAME = 1e-6  # Q of responses that nobody could tell apart
@@ -57,9 +53,10 @@ _ACROSS = (
 _MAC = "Modal assurance criterion in per cent; framed: the pairs of the table. Click one to see it."
 
 
-def correlation_page(case: Case, found: Correlation, folder: Path | None = None) -> PageParts:
+def as_page(folder: Path, found: Correlation) -> PageParts:
     """Sections of the page; the test's shapes on the whole model are written into the folder."""
-    p, shown = found.pairs, _shown(case)
+    case, p = found.origin, found.pairs
+    shown = case_shown(case)
     drawn: list[Block] = []
     if found.mac is not None and found.mac.size:
         pairs = list(zip(p.test.tolist(), p.model.tolist(), strict=True))
@@ -84,7 +81,7 @@ def correlation_page(case: Case, found: Correlation, folder: Path | None = None)
             screening_section(found.screening, folded=True),
         ],
         found.notes,
-        [] if folder is None else expanded_shapes(folder, case, found),
+        expanded_shapes(folder, case, found),
     )
 
 
@@ -145,13 +142,6 @@ def _off_by(q: Quality) -> str:
         return "next to nothing"
     factor, angle = 10 ** np.sqrt(q.magnitude), np.degrees(np.log(10) * np.sqrt(q.phase))
     return f"a factor of {number(float(factor), 3)} and {angle:.0f}° of phase (rms)"
-
-
-def _shown(case: Case) -> Shown:
-    return replace(
-        mesh_of(surface(case.assembly), case.assembly),
-        outputs=markers(case.outputs), inputs=markers(case.inputs), cords=cords(case),
-    )  # fmt: skip
 
 
 def _modes(found: Correlation) -> Table:

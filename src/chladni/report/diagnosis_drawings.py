@@ -108,18 +108,15 @@ def _structure(
 
 def _place_still(effect: NamedEffect, shown: Shown) -> Still | None:
     """A marked point, else the grids, else the parts in colour; None without any."""
-    where, place, faces = effect.where, None, None
-    if where.point_m is not None:
-        place = np.array(where.point_m, dtype=float)
-    elif len(shown.ids) and (marked := np.isin(shown.ids, where.grids)).any():
-        place = shown.seen.points[marked]  # rows as ids
-    elif (named := np.isin(list(shown.parts), list(where.parts))).any():
+    where, faces = effect.where, None
+    place, radius = live_mesh.marked(where, shown)
+    if not len(place):
+        if not (named := np.isin(list(shown.parts), list(where.parts))).any():
+            return None
         faces = named[np.asarray(shown.seen.part)]
-    if place is None and faces is None:
-        return None
     text = " – ".join(t for t in (effect.name, where.text) if t)
-    return partial(scene.location, seen=shown.seen, point=place, radius=where.radius_m or 0.0,
-                   text=text, faces=faces)  # fmt: skip
+    return partial(scene.location, seen=shown.seen, point=place if len(place) else None,
+                   radius=radius, text=text, faces=faces)  # fmt: skip
 
 
 def _responses(shown: Shown) -> Iterator[Drawing]:
@@ -176,11 +173,8 @@ def frequencies(
     sides = {names[0]: before}
     if np.isfinite(after).any():
         sides[names[1]] = after
-    chart, caption = (
-        charts.ladder(test, sides, "shapes"),
-        "Deviation of each frequency from the test.",
-    )
-    yield Drawing("ladder", chart, caption, {"frequencies": still(chart)}, place="modes")
+    chart, text = charts.ladder(test, sides, "shapes"), "Deviation of each frequency from the test."
+    yield Drawing("ladder", chart, text, {"frequencies": still(chart)}, place="modes")
 
 
 def q_steps(q: Scores, named: bool) -> dict[str, float]:

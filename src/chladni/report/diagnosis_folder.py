@@ -10,14 +10,13 @@ from ..output import write_json, write_npz
 from ..progress import Progress, silent
 from ..search import earlier_answer
 from ..search.next_measurement import FILE, arrays_of
-from ..view.surface import surface
-from ..workflows.case_model import cords, markers
 from ..workflows.diagnosis_result import ChangedDeck, DiagnosisResult
 from .blocks import Code, Section, Text, write_pictures
 from .calibration_blocks import calibration_json
 from .diagnosis_drawings import drawings
 from .diagnosis_json import diagnosis_json
 from .information_map import with_surface
+from .mesh_drawings import case_shown
 from .page import write_page
 from .shown import Shown
 from .states_table import state_folder
@@ -123,16 +122,11 @@ def _changed(case: Case, result: DiagnosisResult) -> list[Section]:
 def shown(case: Case, result: DiagnosisResult) -> Shown:
     """Mesh, sensors, test and model responses for the pictures."""
     models, compared = result.models, result.compared == "responses"
-    return Shown(
-        surface(case.assembly),
-        [p.name for p in case.assembly.parts],
-        case.assembly.ids,
-        {} if models is None else models.curves,
-        () if models is None else models.held_out,
-        compared,
-        [case.band] if case.band and compared else [],
-        list(case.exclude),
-        markers(case.outputs),
-        markers(case.inputs),
-        cords(case),
+    return replace(
+        case_shown(case),
+        curves={} if models is None else models.curves,
+        held_out=() if models is None else models.held_out,
+        compared=compared,
+        fitted=[case.band] if case.band and compared else [],
+        excluded=list(case.exclude),
     )

@@ -28,7 +28,7 @@ _SHOWN = 12  # channels drawn
 _POINTS, _LEAST = 2000, 200  # of a curve; of one among many
 
 
-def evaluation_page(folder: Path, found: Evaluation) -> PageParts:
+def as_page(folder: Path, found: Evaluation) -> PageParts:
     """Sections of the page; the FRFs of time data are written into the folder."""
     sections = [screening_section(*(r.screening for r in found.recordings))]
     files: list[tuple[str, str]] = []
@@ -84,12 +84,9 @@ def _blocks(stem: str, r: RecordingEvaluation, share: int) -> list[Block]:
             frf.outputs[i] if alone else f"{frf.outputs[i]} from {frf.inputs[j]}":
             frf.coherence[:, i, j] for i, j in channels
         }  # fmt: skip
-        axis, text = (
-            ChartAxis("coherence [-]", limits=(0.0, 1.02)),
-            "low values show noise or leakage.",
-        )
+        axis, text = ChartAxis("coherence [-]", limits=(0.0, 1.02)), "Low: noise or leakage."
         drawn = over_frequency(frf.frequency, lines, axis, share)
-        blocks.append(Drawing(f"coherence{stem}", drawn, f"Coherence: {text}", what="coherence"))
+        blocks.append(Drawing(f"coherence{stem}", drawn, text, what="coherence"))
     distortion = r.estimate.distortion if r.estimate is not None else None
     if distortion is not None:
         each = {o: 100 * distortion[:, i] for i, o in enumerate(frf.outputs[:_SHOWN])}

@@ -24,8 +24,7 @@ from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_levels, write_poles
 from ..view import charts
 from ..view.chart import Chart, ChartAxis, Mark, Panel, Series
-from ..view.surface import Surface, surface
-from ..workflows.case_model import markers
+from ..view.surface import Surface
 from ..workflows.correlate import on_whole_mesh
 from ..workflows.identify import Identification, RecordingModes
 from . import frf_charts
@@ -33,7 +32,7 @@ from .blocks import Block, Drawing, PageParts, Section, Table, still
 from .level_blocks import level_drawings, level_section
 from .live_mesh import ModeSet
 from .live_mesh import shapes as live_shapes
-from .mesh_drawings import EXPANDED, ON_MESH, TURN, mesh_of, spatial
+from .mesh_drawings import EXPANDED, ON_MESH, TURN, case_shown, spatial
 from .screening_blocks import SEVERAL, screening_json, screening_section
 from .shown import Shown
 from .typed_fields import as_data
@@ -62,7 +61,7 @@ _POLES = (
 _AROUND = 4.0  # half bandwidths of a circle
 
 
-def identification_page(folder: Path, found: Identification, command: str = "") -> PageParts:
+def as_page(folder: Path, found: Identification, command: str = "") -> PageParts:
     """Sections of the page; its tables are written into the folder.
 
     ``command`` is the line to which a click on a pole adds it.
@@ -117,18 +116,10 @@ def _table(r: RecordingModes) -> Table:
         m.frequency, m.frequency_sd, 100 * m.damping, 100 * m.damping_sd, phase, spread, seen,
     )  # fmt: skip
     rows = [
-        (
-            str(k + 1),
-            hertz(f),
-            number(sf, 2),
-            f"{z:#.3g}",
-            number(sz, 2),
-            f"{c:.3f}",
-            number(v, 2),
-            f"{100 * s:.0f}",
-        )
-        for k, (f, sf, z, sz, c, v, s) in enumerate(zip(*columns, strict=True))
-    ]
+        (str(k), hertz(f), number(sf, 2), f"{z:#.3g}", number(sz, 2), f"{c:.3f}", number(v, 2),
+         f"{100 * s:.0f}")
+        for k, (f, sf, z, sz, c, v, s) in enumerate(zip(*columns, strict=True), 1)
+    ]  # fmt: skip
     heads = ("mode", "Hz", "± Hz", "damping [%]", "± %", "MPC", "shape ± %", "orders [%]")
     caption = (
         f"Residual over noise: {number(r.modes.chi, 3)} (1: only noise remains). MPC: 1 where all "
@@ -159,9 +150,8 @@ def _places(found: Identification) -> tuple[Shown | None, dict[str, "Marker"]]:
     from ..view.annotations import Marker
 
     if isinstance(case := found.origin, Case):
-        return mesh_of(surface(case.assembly), case.assembly), {
-            m.label: m for m in markers(case.outputs)
-        }
+        whole = case_shown(case)
+        return whole, {m.label: m for m in whole.outputs}
     nodes: dict[int, np.ndarray] = {}
     axes: dict[int, np.ndarray] = {}
     lines: list[tuple[int, int]] = []

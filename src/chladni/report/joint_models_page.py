@@ -17,7 +17,7 @@ _CAPTION = (
 )
 
 
-def joint_models_page(folder: Path, found: JointModels) -> PageParts:
+def as_page(folder: Path, found: JointModels) -> PageParts:
     """Sections of the page; a deck of every variant is written into the folder."""
     files = []
     for row in found.rows[1:]:

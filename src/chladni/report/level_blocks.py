@@ -19,6 +19,15 @@ _WHAT = (
     "of the fitted levels. The amplitude is the displacement of the output at which the mode was "
     "seen."
 )
+_EVERY = (
+    "Every mode at every level, with the 95 % interval from the recording's noise; runs repeat to "
+    "0.05 % in frequency and 5 % in damping. The amplitude is the displacement of the output at "
+    "which the mode was seen; –: not found at that level."
+)
+_ELEMENTS = (
+    "Best first. Runs of one level are assumed to repeat to 0.05 % in frequency and 5 % in "
+    "damping. p below 0.01: the element does not explain the levels."
+)
 
 
 def level_section(tables: Sequence[LevelTable], drawn: Mapping[int, Block]) -> Section:
@@ -58,9 +67,8 @@ def _summary(tables: Sequence[LevelTable]) -> Table:
     ]
     heads = ("mode", "Hz, lowest level", "highest", "damping [%], lowest", "highest ", "levels",
              "p of one frequency", "p of one damping", "signature")  # fmt: skip
-    return Table(heads, rows, ("signature",), "Modes over levels; p: probability of such "
-                                              "differences if the mode has one frequency and one "
-                                              "damping.")  # fmt: skip
+    caption = "p: probability of such differences if the mode has one frequency and one damping."
+    return Table(heads, rows, ("signature",), f"Modes over levels; {caption}")
 
 
 def _every_level(tables: Sequence[LevelTable]) -> Table:
@@ -73,26 +81,14 @@ def _every_level(tables: Sequence[LevelTable]) -> Table:
             r = held.get(level)
             rows.append((str(k), number(level), *(_measured(r) if r else ("–",) * 5)))
     heads = ("mode", "level", "amplitude [mm]", "Hz", "Hz, 95 %", "damping [%]", "damping, 95 %")
-    return Table(
-        heads,
-        rows,
-        (),
-        "Every mode at every level, with the 95 % interval from the recording's noise; runs "
-        "repeat to 0.05 % in frequency and 5 % in damping. The amplitude is the displacement of "
-        "the output at which the mode was seen; –: not found at that level.",
-    )
+    return Table(heads, rows, caption=_EVERY)
 
 
 def _measured(r: LevelRow) -> tuple[str, ...]:
-    f = (number(r.frequency_low_hz, 6), number(r.frequency_high_hz, 6))
-    z = (number(_percent(r.damping_low), 3), number(_percent(r.damping_high), 3))
-    return (
-        number(1e3 * r.amplitude_m, 3),
-        number(r.frequency_hz, 6),
-        " to ".join(f),
-        number(100 * r.damping, 3),
-        " to ".join(z),
-    )
+    f = f"{number(r.frequency_low_hz, 6)} to {number(r.frequency_high_hz, 6)}"
+    z = f"{number(_percent(r.damping_low), 3)} to {number(_percent(r.damping_high), 3)}"
+    a = number(1e3 * r.amplitude_m, 3)
+    return a, number(r.frequency_hz, 6), f, number(100 * r.damping, 3), z
 
 
 def _levels(t: LevelTable) -> Table:
@@ -129,13 +125,7 @@ def _elements(t: LevelTable) -> Table:
         for e in t.elements
     ]
     heads = ("element", "χ²", "data", "BIC", "p", "numbers (95 %)")
-    return Table(
-        heads,
-        rows,
-        ("element", "numbers (95 %)"),
-        "Best first. Runs of one level are assumed to repeat to 0.05 % in frequency and 5 % in "
-        "damping. p below 0.01: the element does not explain the levels.",
-    )
+    return Table(heads, rows, ("element", "numbers (95 %)"), _ELEMENTS)
 
 
 def _p(p: float | None) -> str:

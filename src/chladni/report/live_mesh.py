@@ -68,24 +68,25 @@ def _triangles(seen: Surface) -> tuple[np.ndarray, np.ndarray]:
     return corners, np.concatenate([np.arange(len(seen.faces)), np.flatnonzero(four)])
 
 
+def marked(where: Location | LeftPlace, shown: Shown) -> tuple[np.ndarray, float]:
+    """Points (k, 3) of a place, and the radius about its only one: several grids, else a point."""
+    grids, point = getattr(where, "grids", ()), where.point_m
+    if len(shown.ids) and (len(grids) > 1 or point is None) and np.isin(shown.ids, grids).any():
+        return shown.seen.points[np.isin(shown.ids, grids)], 0.0  # rows as ids
+    known = np.array([] if point is None else point, dtype=float)
+    return known.reshape(-1, 3), getattr(where, "radius_m", None) or 0.0
+
+
 def spots(
     places: Sequence[tuple[str, str, Location | LeftPlace, int]], shown: Shown
 ) -> list[dict[str, Any]]:
-    """Places (name, words, place, rank): a point with its radius, else grids, parts, channels."""
-    from ..effects.estimate import Location as Place
-
+    """Places (name, words, place, rank): points with a radius, else channels, else parts."""
     found = []
     for name, text, where, rank in places:
-        at, radius = np.zeros((0, 3)), 0.0
-        if where.point_m is not None:
-            at = np.array([where.point_m], dtype=float)
-        if isinstance(where, Place):
-            radius = where.radius_m or 0.0
-            if not len(at) and len(shown.ids):
-                at = shown.seen.points[np.isin(shown.ids, where.grids)]
-            if not len(at):
-                marked = [m.point for m in shown.outputs if m.label in where.channels]
-                at = np.array(marked).reshape(-1, 3)
+        at, radius = marked(where, shown)
+        if not len(at) and (channels := getattr(where, "channels", ())):
+            sensors = [m.point for m in shown.outputs if m.label in channels]
+            at = np.array(sensors).reshape(-1, 3)
         parts = [] if len(at) else [k for k, p in enumerate(shown.parts) if p in where.parts]
         if len(at) or parts:
             found.append({"name": name, "text": text, "at": at, "radius": radius, "parts": parts,

@@ -1,6 +1,7 @@
 """A mapped thickness as a page: result for each part, its accuracy, places of change."""
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ _GUESS = (
 )
 
 
-def map_page(found: MappedDeck) -> PageParts:
+def as_page(folder: Path, found: MappedDeck) -> PageParts:
     """Sections of the page."""
     from ..view import scene
 
@@ -67,18 +68,11 @@ def _lead(found: MappedDeck) -> str:
 
 def _parts(found: MappedDeck) -> Table:
     rows = [
-        (
-            p.part,
-            p.source,
-            f"{100 * p.coverage:.1f}",
-            f"{1e3 * p.distance_95:.2f}",
-            f"{1e3 * p.mean:.3f}",
-            number(p.mass_after),
-            number(p.mass_before),
-            f"{100 * p.round_trip:.2f}" if np.isfinite(p.round_trip) else "–",
-        )
+        (p.part, p.source, f"{100 * p.coverage:.1f}", f"{1e3 * p.distance_95:.2f}",
+         f"{1e3 * p.mean:.3f}", number(p.mass_after), number(p.mass_before),
+         f"{100 * p.round_trip:.2f}" if np.isfinite(p.round_trip) else "–")
         for p in found.found.mapped.parts
-    ]
+    ]  # fmt: skip
     return Table(_HEADS, rows, words=("part", "taken from"), caption=_CAPTION)
 
 

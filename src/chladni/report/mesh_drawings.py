@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from ..case import Case
     from ..model.assembly import Assembly
     from ..view.paired_shapes import PairedShapes
     from ..view.surface import Surface
@@ -34,6 +36,17 @@ _OUTSIDE = 0.02  # of the structure's size: as far from a wall a place is looked
 def mesh_of(seen: Surface, assembly: Assembly) -> Shown:
     """A structure with the names of its parts and grids."""
     return Shown(seen, [p.name for p in assembly.parts], assembly.ids)
+
+
+def case_shown(case: Case) -> Shown:
+    """The structure of a case with its sensors, shakers and cords."""
+    from ..view.surface import surface
+    from ..workflows.case_model import cords, markers
+
+    return replace(
+        mesh_of(surface(case.assembly), case.assembly),
+        outputs=markers(case.outputs), inputs=markers(case.inputs), cords=cords(case),
+    )  # fmt: skip
 
 
 def spatial(draw: str, shown: Shown, data: Callable[[], Mapping[str, Any]]) -> Spatial | None:

@@ -24,11 +24,11 @@ _MASS = (
 _NODES = 20_000  # in the universal file, a text of a hundred bytes per node and mode
 
 
-def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
+def as_page(folder: Path, found: NormalModes) -> PageParts:
     """Sections of the page; the shapes for other programs are written into the folder."""
     from ..io.vtu import write_vtu
 
-    modal = found.modal
+    model, modal = found.origin, found.modal
     motion, f = model.motion(modal.shapes), modal.frequency
     write_vtu(folder / "modes.vtu", model.assembly, motion, f)
     other, notes = _universal(folder, model, motion, f)

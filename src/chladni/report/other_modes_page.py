@@ -1,11 +1,11 @@
 """Modes of a model compared with those of another program, as a page."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..view import charts
-from ..workflows.loaded_model import Model
 from ..workflows.other_modes import OtherModes
 from .blocks import Block, Drawing, PageParts, Section, Table
 from .mesh_drawings import mesh_of, two_models
@@ -20,9 +20,9 @@ _CAPTION = (
 )
 
 
-def other_modes_page(model: Model, found: OtherModes) -> PageParts:
+def as_page(folder: Path, found: OtherModes) -> PageParts:
     """Sections of the page."""
-    p, other = found.pairs, found.source.name
+    p, other, model = found.pairs, found.source.name, found.origin
     shown = mesh_of(model.seen, model.assembly)
     pairs = list(zip(p.test.tolist(), p.model.tolist(), strict=True))
     notes = list(found.notes)

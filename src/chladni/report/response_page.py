@@ -1,6 +1,7 @@
 """Frequency responses as a page: the outputs that move most."""
 
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,13 @@ def response_page(found: FRF) -> PageParts:
     block = Drawing("frf", chart, frf_charts.CAPTION, stills, "a response")
     sections = [Section("Responses", [block, *said.sections[0].blocks])]
     return PageParts(said.lead, sections, notes)
+
+
+def as_page(folder: Path, found: FrequencyResponses) -> PageParts:
+    """The pages of all sets of responses as one."""
+    parts = [response_page(one) for one in found.frfs]
+    notes = [*found.notes, *(text for p in parts for text in p.notes)]
+    return PageParts(parts[0].lead, [s for p in parts for s in p.sections], notes)
 
 
 def in_words(found: FrequencyResponses) -> PageParts:

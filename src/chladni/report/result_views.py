@@ -1,7 +1,7 @@
 """How results are put into words, drawn and saved: what the commands write, from Python."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -25,9 +25,7 @@ class Paged:
     """
 
     command: str
-    # with ``in_words``, ``as_json`` and a function that draws the page; ``.name``: one of this room
-    module: str
-    page: Callable[[ModuleType, Path, Any], PageParts]  # (module, folder, result) -> PageParts
+    module: str  # with ``as_page``, ``in_words``, ``as_json``; ``.name``: one of this room
     json: str = ""  # name of the file with the result by ``as_json``; "": none
     # writes more files into the folder and returns (name, what it is) of each
     files: Callable[[Any, Path], Sequence[tuple[str, str]]] = lambda *_: ()
@@ -53,13 +51,13 @@ class Paged:
     def _stills(self, module: ModuleType, found: Any) -> Mapping[str, Still]:
         """Functions that draw the pictures; files of the page are not used here."""
         with TemporaryDirectory(prefix="chladni-") as folder:
-            parts = self.page(module, Path(folder), found)
+            parts = module.as_page(Path(folder), found)
         return {name: draw for d in drawings(parts.sections) for name, draw in d.pictures.items()}
 
     def _write(self, module: ModuleType, found: Any, folder: Path, pictures: bool) -> None:
         from .page import write_sections
 
-        parts = self.page(module, folder, found)
+        parts = module.as_page(folder, found)
         drawn = write_pictures(folder, drawings(parts.sections), pictures)
         files = [*self.files(found, folder), *parts.files, *drawn]
         if self.json:
@@ -134,17 +132,6 @@ def _mapped(found: "MappedDeck", folder: Path) -> Sequence[tuple[str, str]]:
     return [("mapped.bdf", "the deck with mapped thickness")]
 
 
-def _responses(module: ModuleType, folder: Path, found: "FrequencyResponses") -> PageParts:
-    """The pages of all sets of responses as one."""
-    parts = [module.response_page(one) for one in found.frfs]
-    return replace(
-        parts[0],
-        sections=[s for p in parts for s in p.sections],
-        notes=[*found.notes, *(text for p in parts for text in p.notes)],
-        files=[f for p in parts for f in p.files],
-    )
-
-
 def _arrays(found: "FrequencyResponses", folder: Path) -> Sequence[tuple[str, str]]:
     from ..io.tables.write_tables import write_csv, write_npz
 
@@ -157,54 +144,20 @@ def _arrays(found: "FrequencyResponses", folder: Path) -> Sequence[tuple[str, st
     return files
 
 
-_PAGES: Mapping[str, Paged] = {
-    "chladni.workflows.modes.NormalModes": Paged(
-        "modes", ".modes_page", lambda m, at, x: m.modes_page(at, x.origin, x), "modes.json"
+_PAGES = {  # class of ``chladni.workflows``: how it is shown
+    "modes.NormalModes": Paged("modes", ".modes_page", "modes.json"),
+    "correlate.Correlation": Paged("correlate", ".correlation_page", "correlation.json"),
+    "other_modes.OtherModes": Paged("correlate", ".other_modes_page", "correlation.json"),
+    "identify.Identification": Paged(
+        "identify", ".identification_page", "identified.json", needs_origin=False
     ),
-    "chladni.workflows.correlate.Correlation": Paged(
-        "correlate",
-        ".correlation_page",
-        lambda m, at, x: m.correlation_page(x.origin, x, at),
-        "correlation.json",
-    ),
-    "chladni.workflows.other_modes.OtherModes": Paged(
-        "correlate",
-        ".other_modes_page",
-        lambda m, at, x: m.other_modes_page(x.origin, x),
-        "correlation.json",
-    ),
-    "chladni.workflows.identify.Identification": Paged(
-        "identify",
-        ".identification_page",
-        lambda m, at, x: m.identification_page(at, x),
-        "identified.json",
-        needs_origin=False,
-    ),
-    "chladni.workflows.evaluation.Evaluation": Paged(
-        "test",
-        ".evaluation_page",
-        lambda m, at, x: m.evaluation_page(at, x),
-        "test.json",
-        needs_origin=False,
-    ),
-    "chladni.workflows.map.MappedDeck": Paged(
-        "map", ".map_page", lambda m, at, x: m.map_page(x), "mapping.json", _mapped
-    ),
-    "chladni.workflows.joint_models.JointModels": Paged(
-        "calibrate",
-        ".joint_models_page",
-        lambda m, at, x: m.joint_models_page(at, x),
-        "variants.json",
-    ),
-    "chladni.workflows.case_check.CaseCheck": Paged(
-        "check", ".check_page", lambda m, at, x: m.check_page(x.origin, x), "check.json"
-    ),
-    "chladni.workflows.frf.FrequencyResponses": Paged(
-        "frf", ".response_page", _responses, files=_arrays, needs_origin=False
-    ),
+    "evaluation.Evaluation": Paged("test", ".evaluation_page", "test.json", needs_origin=False),
+    "map.MappedDeck": Paged("map", ".map_page", "mapping.json", _mapped),
+    "joint_models.JointModels": Paged("calibrate", ".joint_models_page", "variants.json"),
+    "case_check.CaseCheck": Paged("check", ".check_page", "check.json"),
+    "frf.FrequencyResponses": Paged("frf", ".response_page", files=_arrays, needs_origin=False),
 }
-
 
 show_by("chladni.workflows.diagnosis_result.DiagnosisResult", _diagnosis)
 for _kind, _paged in _PAGES.items():
-    show_by(_kind, _paged.view)
+    show_by(f"chladni.workflows.{_kind}", _paged.view)

@@ -14,6 +14,7 @@ from .verdict import three_numbers
 from .words import hertz, interval, number, percent
 
 _MOST = 300  # numbers in the table
+_OF_TEST = ("test", "coherence")  # the same in both runs
 _OTHERS = {"@after": "@calm", "@before": "@warn", "@neutral": "@found"}  # colours of the second run
 Json = dict[str, Any]
 
@@ -116,7 +117,7 @@ def overlaid(a: Any, b: Any, names: tuple[str, str]) -> Json | None:
         t["type"] == "heatmap" for c in charts for t in c["data"]
     ):
         return None
-    kept = [k for k, t in enumerate(b["data"]) if t.get("name") != "test"]
+    kept = [k for k, t in enumerate(b["data"]) if t.get("name") not in _OF_TEST]
     made = {k: v for k, v in a.items() if k not in ("choices", "pick")}
     made["data"] = [_named(t, names[0]) for t in a["data"]]
     made["data"] += [_named(b["data"][k], names[1], _OTHERS) for k in kept]
@@ -151,7 +152,7 @@ def _named(trace: Json, run: str, colours: Mapping[str, str] | None = None) -> J
     for old, new in (colours or {}).items():
         text = text.replace(f'"{old}"', f'"{new}"')
     made: Json = json.loads(text)
-    if trace.get("name") not in ("test", ""):
+    if trace.get("name") not in (*_OF_TEST, ""):
         run = run.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
         made |= {"name": f"{trace['name']} ({run})", "legendgroup": f"{trace['name']} {run}"}
         if "hovertemplate" in made:

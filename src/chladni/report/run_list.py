@@ -16,7 +16,7 @@ from ..errors import FileError
 from ..inference.result import Agreement
 from ..output import LIST, name_of
 from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Items, PageParts, Section, Table
+from .blocks import PageParts, Section, Table
 from .diagnosis_json import read_diagnosis
 from .sentence import sentence
 from .words import number, percent
@@ -119,9 +119,8 @@ def index_page(folder: Path, place: Path) -> PageParts:
         rows.append((date, run.command, run.source, run.lead, data, *cells))
     caption = (
         "Times are UTC. Q of the given deck and of the last; on other data it is another number. A "
-        "click on a head sorts."
+        "click on a head sorts. `chladni compare A B` puts two of these folders next to each other."
     )
     table = Table(_HEADS, rows, _HEADS[:5], caption, links=[r.page_from(place) for r in runs])
-    more = "chladni compare A B puts two of these folders next to each other."
     counted = f"{len(runs)} run{'s' * (len(runs) > 1)} in {folder.resolve().name}"
-    return PageParts(f"{counted}.", [Section("Runs", [table, Items([more])])])
+    return PageParts(f"{counted}.", [Section("Runs", [table])])

@@ -26,7 +26,7 @@ def states_table(result: DiagnosisResult) -> list[Block]:
     out: list[Block] = [Table(heads, rows, words, note)]
     if result.shared:
         shared = [
-            (p.where, quantity(p.deck_value, p.estimate.unit), _size(p.estimate))
+            (p.where, quantity(p.deck_value, p.estimate.unit), of_estimate(p.estimate))
             for p in result.shared
         ]
         said = "Shared by all states and fitted to all their recordings together."
@@ -42,7 +42,7 @@ def _row(s: StateResult, folder: str) -> tuple[str, ...]:
         s.result.verdict,
         "; ".join(e.name for e in effects) or "–",
         "; ".join(e.where.text for e in effects) or "–",
-        "; ".join(", ".join(f"{p.name} = {_size(p)}" for p in e.parameters) for e in effects)
+        "; ".join(", ".join(f"{p.name} = {of_estimate(p)}" for p in e.parameters) for e in effects)
         or "–",
         number(fit.nominal),
         number(fit.after),
@@ -50,5 +50,6 @@ def _row(s: StateResult, folder: str) -> tuple[str, ...]:
     )
 
 
-def _size(p: Estimate) -> str:
+def of_estimate(p: Estimate) -> str:
+    """A value with its interval."""
     return interval(p.value, p.low, p.high, p.unit)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import mean
 
-from ..effects.estimate import Estimate, Location
+from ..effects.estimate import Location
 from ..inference.calibration_result import ParameterKnowledge
 from ..inference.result import (
     Adequacy,
@@ -20,8 +20,8 @@ from .calibration_blocks import study_sections
 from .level_blocks import level_section
 from .measurement_table import next_measurements
 from .screening_blocks import screening_section
-from .states_table import states_table
-from .words import criterion, fixed, hertz, interval, number, percent, quantity
+from .states_table import of_estimate, states_table
+from .words import criterion, fixed, hertz, number, percent, quantity, share
 
 HEADING = {
     "missing physics": "Missing physics found",
@@ -71,7 +71,7 @@ def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
         text = f"{one} deck {number(before, 3)} → {last} deck {number(after, 3)}"
         facts.append(("Held-out deviation Q", f"{text} ({percent(after, before)})"))
     if (off := [_off(result, key) for key in ("before_hz", "after_hz")])[0]:
-        text = " → ".join(_in_percent(mean(x)) for x in off if x)
+        text = " → ".join(share(mean(x)) for x in off if x)
         facts.append(("Frequencies, mean deviation", text))
     if mass is not None and mass.model_kg is not None:
         weighed = f", weighed {number(mass.weighed_kg)} kg" if mass.weighed_kg else ", not weighed"
@@ -83,10 +83,6 @@ def _off(result: DiagnosisResult, key: str) -> list[float]:
     """|f/f_test - 1| of the modes with a partner."""
     return [abs(f / r.test_hz - 1) for r in result.frequencies if r.test_hz
             if (f := getattr(r, key))]  # fmt: skip
-
-
-def _in_percent(x: float) -> str:
-    return f"{number(100 * x, 2)} %"
 
 
 def _joints(result: DiagnosisResult) -> Table:
@@ -153,7 +149,7 @@ def _glance(result: DiagnosisResult) -> Facts:
         facts.append(("Q, fitted data", text))
     for name in ("before", "after"):
         if off := _off(result, f"{name}_hz"):
-            text = f"mean error {_in_percent(mean(off))}, largest {_in_percent(max(off))}"
+            text = f"mean error {share(mean(off))}, largest {share(max(off))}"
             facts.append((f"Frequencies {name}", text))
     if result.adequate is not None:
         facts.append(("Test of fit", _fits(result.adequate)))
@@ -203,15 +199,11 @@ def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
 
 def _estimates(effect: NamedEffect) -> list[tuple[str, ...]]:
     """A row for each number of an effect: as found, and as the updated deck has it."""
-    rows: list[tuple[str, ...]] = [(p.name, _interval(p)) for p in effect.parameters]
+    rows: list[tuple[str, ...]] = [(p.name, of_estimate(p)) for p in effect.parameters]
     if not effect.written:
         return rows
     each = zip(rows, effect.parameters, effect.written, strict=True)
     return [(*row, _beside(value, p.value, p.unit)) for row, p, value in each]
-
-
-def _interval(p: Estimate) -> str:
-    return interval(p.value, p.low, p.high, p.unit)
 
 
 def _place(where: Location) -> list[tuple[str, str]]:
@@ -239,7 +231,7 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
         (
             c.where,
             quantity(c.deck_value, c.estimate.unit),
-            _interval(c.estimate),
+            of_estimate(c.estimate),
             percent(c.estimate.value, c.deck_value),
             _written(c, result),
         )
@@ -337,18 +329,11 @@ _MEANING = {
 
 def _frequencies(result: DiagnosisResult) -> Table:
     rows = [
-        (
-            hertz(r.test_hz),
-            "–" if r.damping is None else f"{100 * r.damping:#.3g}",
-            hertz(r.before_hz),
-            percent(r.before_hz, r.test_hz),
-            hertz(r.after_hz),
-            percent(r.after_hz, r.test_hz),
-            criterion(r.mac_before),
-            criterion(r.mac_after),
-        )
+        (hertz(r.test_hz), "–" if r.damping is None else f"{100 * r.damping:#.3g}",
+         hertz(r.before_hz), percent(r.before_hz, r.test_hz), hertz(r.after_hz),
+         percent(r.after_hz, r.test_hz), criterion(r.mac_before), criterion(r.mac_after))
         for r in result.frequencies
-    ]
+    ]  # fmt: skip
     heads = ("test [Hz]", "damping [%]", "before [Hz]", "off", "after [Hz]", "off ", "MAC before",
              "MAC after")  # fmt: skip
     return Table(heads, rows, opens="shapes", at=range(len(rows)))

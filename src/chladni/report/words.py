@@ -61,6 +61,15 @@ def quantity(value: float | None, unit: str = "", reference: float | None = None
     return f"{shown} {named}".strip() if shown != _NONE else _NONE
 
 
+def share(x: float) -> str:
+    """A share with two digits.
+
+    >>> share(0.01234)
+    '1.2 %'
+    """
+    return f"{number(100 * x, 2)} %"
+
+
 def interval(value: float | None, low: float | None, high: float | None, unit: str = "") -> str:
     """A value and its interval in the same unit.
 
@@ -81,7 +90,8 @@ def odds_of(p: float) -> str:
     ('3 : 1', '1 : 4')
     """
     p = min(max(p, 1e-6), 1 - 1e-6)
-    return f"{number(p / (1 - p), 2)} : 1" if p >= 0.5 else f"1 : {number((1 - p) / p, 2)}"
+    odds = number(rounded(max(p / (1 - p), (1 - p) / p)), 2)
+    return f"{odds} : 1" if p >= 0.5 else f"1 : {odds}"
 
 
 def percent(new: float | None, old: float | None) -> str:

@@ -104,6 +104,14 @@ class Outlook(ShownBriefly):
             return -float(np.log(self.unknown.narrowed(made)))
         return self.rivals.forecast(made).information
 
+    @property
+    def nothing_left(self) -> str:
+        """The sentence for no candidate that is worth its measurement."""
+        does = f"tells {' and '.join(self.names)} apart"
+        if self.unknown is not None:
+            does = f"narrows the interval of {self.unknown.name}, the least known quantity"
+        return f"Nothing further is worth measuring: none of the candidates {does}."
+
     def without(self, barred: Sequence[str]) -> "Outlook":
         """The outlook without the candidates of some kinds or labels."""
         kept = np.flatnonzero(~self.excluded(barred))

@@ -338,7 +338,7 @@ def _mass_note(question: Question, problem: UpdatingProblem) -> list[str]:
     w = question.mass_measurement
     if w is None:
         return [NOT_WEIGHED]
-    said = f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is fitted with the other data"
+    said = f"the weighed mass, {w.mass:.4g} kg ± {w.sd:.2g} kg, is fitted with the other data"
     off = off_the_scales(problem)
     return [said, f"{off}: {ANOTHER_MASS}"] if off else [said]
 

@@ -203,10 +203,10 @@ def _tint(tint: str) -> str:
     return f"@{tint}" if tint in TINTS else tint
 
 
-def _numbers(values: np.ndarray, axis: ChartAxis) -> Any:
+def _numbers(values: np.ndarray, axis: ChartAxis, fine: bool = False) -> Any:
     """Values of an axis; on a logarithmic one whole thousandths of a decade, short when packed."""
     if not axis.log:
-        return short(values, 7 if axis.title.startswith("frequency") else 5)
+        return short(values, 7 if fine or axis.title.startswith("frequency") else 5)
     every = np.asarray(values, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         whole = np.rint(np.log10(every) / _DECADES)
@@ -217,9 +217,9 @@ def _traces(s: Series, looks: Any, show: bool, panel: Panel) -> list[Spec]:
     tint, dash = looks.get(s.name, ("ink", "solid"))
     colour, dash = _tint(s.tint or tint), s.dash or dash
     name = escape(s.name, False)
-    of_y = panel.right if s.right and panel.right else panel.y
+    of_y, fine = panel.right if s.right and panel.right else panel.y, s.kind == "shape"
     made: Spec = {
-        "x": _numbers(s.x, panel.x), "y": _numbers(s.y, of_y), "name": name,
+        "x": _numbers(s.x, panel.x, fine), "y": _numbers(s.y, of_y, fine), "name": name,
         "legendgroup": name, "showlegend": show, "opacity": s.opacity,
     }  # fmt: skip
     made |= _bar(s, colour, panel) if s.kind == "bars" else _scatter(s, colour, dash)

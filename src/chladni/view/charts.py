@@ -248,3 +248,26 @@ def over(x: ChartAxis, *panels: tuple[ChartAxis, Sequence[Series]], **more: Any)
     made = [Panel(series, x, axis) for axis, series in panels]
     return Chart.of(*made, one_x=True, size=(8.2, 1.0 + 2.0 * len(made)),
                     height=8 + 11 * len(made), **more)  # fmt: skip
+
+
+def section(
+    walls: Sequence[tuple[str, np.ndarray]], solids: np.ndarray, axes: Sequence[str], title: str
+) -> Chart:
+    """A cut to scale: walls (k, 4, 2) of each part, outlines of solids (j, 2, 2) in grey.
+
+    The longer extent is horizontal.
+    """
+    every = np.concatenate([solids.reshape(-1, 2), *(w.reshape(-1, 2) for _, w in walls)])
+    extent = np.ptp(every, axis=0)
+    x, y = (0, 1) if extent[0] >= extent[1] else (1, 0)
+
+    def pieces(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        parted = np.pad(corners, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan).reshape(-1, 2)
+        return parted[:, x], parted[:, y]
+
+    drawn = [Series(name, *pieces(corners), "shape") for name, corners in walls]
+    if len(solids):
+        drawn.append(Series("welds, adhesive, solids", *pieces(solids), tint="soft", width=0.8))
+    panel = Panel(drawn, ChartAxis(axes[x]), ChartAxis(axes[y]), title, equal=True)
+    height = float(np.clip(10 * extent[y] / extent[x], 1.5, 8))
+    return Chart.of(panel, size=(11, height + 1), height=8 + 3 * height)

@@ -194,9 +194,12 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     ahead = known.outlook
+    further = () if ahead is None else advised([ahead])
+    if ahead is not None and not further:
+        notes = (*notes, ahead.nothing_left)
     return replace(
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen, study=study,
-        outlook=ahead, next_measurements=() if ahead is None else advised([ahead]),
+        outlook=ahead, next_measurements=further,
         posterior=known.posterior,
     )  # fmt: skip
 

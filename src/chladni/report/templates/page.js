@@ -197,7 +197,7 @@ function structure(at, data, shared, box) {
     if (spot.radius) for (const p of spot.at.slice(0, 3)) traces.push(ball(p, spot.radius, text, tint));
     for (const [mode, by] of spot.at.length ? [["markers+text", 0.03], ["markers", -0.03]] : []) {  // clear of the sheet, on either side
       const [x, y, z] = [0, 1, 2].map((k) => spot.at.map((p) => p[k] + by * mesh.size * eye[k]));
-      traces.push({ type: "scatter3d", mode, name, x, y, z, text: [name], textposition: "top center", textfont: { color: colour(tint), size: 13 }, legendgroup: name, showlegend: by > 0,
+      traces.push({ type: "scatter3d", mode, name, x, y, z, text: [name], textposition: ["top center", "bottom center"][spot.rank], textfont: { color: colour(tint), size: 13 }, legendgroup: name, showlegend: by > 0,
         hoverinfo: "text", hovertext: text, marker: { size: 9, color: colour(tint), symbol: "cross" } });
     }
   }
@@ -430,6 +430,7 @@ function sortable(table) {
 
 const DRAWN = { structure, remainder, shapes, chart };
 const SPATIAL = ["structure", "remainder", "shapes"];
+const PAPER = 740;  // [px] of a page whose drawings fit a sheet of A4; they keep the width that they have on the screen
 let once = () => {};
 
 // Go to a drawing and show the given part of it.
@@ -448,8 +449,10 @@ async function begin() {
     row.addEventListener("click", () => { if (!getSelection().toString()) go(); });
     row.addEventListener("keydown", (e) => { if (e.key === "Enter") go(); });
   }
-  const unfold = () => document.querySelectorAll("details").forEach((d) => { d.open = true; });
-  addEventListener("beforeprint", unfold);
+  addEventListener("beforeprint", () => {
+    document.querySelectorAll("details").forEach((d) => { d.open = true; });
+    document.documentElement.style.setProperty("--fit", Math.min(1, PAPER / document.querySelector("main").clientWidth));
+  });
   const figures = [...document.querySelectorAll(".live[data-word]")];
   if (!figures.length || !window.DecompressionStream) return;
   const [common, ...words] = document.querySelectorAll(".numbers"), shared = JSON.parse(await unpacked(common));
