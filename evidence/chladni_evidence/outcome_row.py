@@ -118,12 +118,15 @@ def outcome_of(answer: Answer, name: str, truth: Row) -> str:
     if not given - hidden:
         return "part"
     apart = set((given - hidden) + (hidden - given))
-    return "among" if any(apart <= names for names in among) else "wrong"
+    listed = any(apart <= names for names in among) or _listed(answer.result, truth)
+    return "among" if listed else "wrong"
 
 
 def _listed(d: Row, truth: Row) -> bool:
     lists = [set(names) for names in d.get("one_of") or []]
     hidden = set() if truth["effect"] in NULLS else set(members(truth["effect"]))
+    if any(_is(name, truth) for names in lists for name in names):  # also of a kind without a name
+        return True
     return any(hidden <= names for names in lists)
 
 

@@ -57,6 +57,8 @@ def told(effect="point-mass", **more):
         (answer(), told(), "right"),
         (answer("suspension"), told(), "wrong"),
         (answer("suspension", one_of=[["suspension", "point-mass", "weigh it"]]), told(), "among"),
+        (answer("suspension", one_of=[["suspension", "stiffener"]]), told("rib"), "among"),
+        (answer("suspension", one_of=[["suspension", "crack"]]), told("rib"), "wrong"),
         (answer(None, "calibration only"), told(), "none"),
         (answer(None, "nothing missing"), told("calibration"), "right"),
         (answer(), told("nothing"), "wrong"),
