@@ -16,7 +16,7 @@ from chladni.search.search_round import (
     BEHIND,
     _closer,
     _finished,
-    _jointly,
+    _joint,
     _leaders,
     _own_optima,
     _tried,
@@ -73,7 +73,8 @@ def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, w
     problem, done = problem_of({k: joint[k] for k in range(3)}, expected)
     tried = [Candidate(e, np.zeros(1), np.zeros(1)) for e in effects_at("mass", 3)]
     optima = _own_optima(problem, NULL, [*tried, tried[0]])
-    found = by_family(_jointly(problem, NULL, optima).whole(problem, NULL, worst))
+    (lead,), others = _joint(problem, NULL)(optima)
+    found = by_family(others.tried(problem, NULL, lead, worst))
     assert done == fitted
     assert found[0].fit.neg2_log_evidence == min(joint[k] for k in fitted)
     known = {found[0].effect.k, *(v.effect.k for v in found[0].optima)}
@@ -97,8 +98,9 @@ def test_families_whose_own_optimum_is_far_behind_are_not_fitted(hidden, least, 
     problem, done = problem_of(joint, expected)
     effects = [effects_at(f"family-{k}", 7)[k] for k in range(7)]
     families = ([hypothesis_of(e, expected[e.k])] for e in effects)
-    every = [*_leaders(problem, NULL, families, least)]
-    assert sorted(t.effect.k for some in every for fits in some for t in fits) == list(range(7))
+    left = []
+    found = [t for fits, _ in _leaders(problem, NULL, families, least, left) for t in fits]
+    assert sorted(t.effect.k for t in (*found, *left)) == list(range(7))
     assert len(done) == fitted
 
 

@@ -7,7 +7,7 @@ of an effect in addition to the others.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from itertools import compress
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
 from .decision_rules import TIED
 
-T = TypeVar("T")
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 FIRST = 5  # families that are fitted jointly, whatever they promise; ``LATER`` in later rounds
 RUNNING = 3  # families that are fitted to the end, at rest or not; more where they are tied
@@ -55,10 +54,14 @@ def search_round(
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
     progress(f"trying {len(tried)} candidates", 0.0)
     hypotheses, left = list[HypothesisFit](), list[HypothesisFit]()
-    for fits, behind in _family_fits(problem, null, tried, progress, least):
+    others = dict[str, _Others]()
+    for fits, rest in _family_fits(problem, null, tried, progress, least, left):
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
-        left += behind
+        others |= {t.effect.name: rest for t in fits}
         give_back_freed_memory()
+    worst = BEHIND + min((t.neg2_log_evidence for t in hypotheses), default=0.0)
+    more = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
+    hypotheses = _lighter(problem, by_family([t for fits in more for t in fits]), whole)
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(by_family([*hypotheses, *left]), null.neg2_log_evidence)
     progress("refining the place", 0.8)
@@ -118,33 +121,64 @@ def _by_name(tried: Sequence[Candidate]) -> dict[str, list[Candidate]]:
     return out
 
 
-Fits = tuple[list[HypothesisFit], list[HypothesisFit]]
+@dataclass(frozen=True, eq=False)
+class _Others:
+    """Other own optima of a family than that of its joint fit, best first.
+
+    ``slack`` is the largest difference of a joint fit from its own optimum.
+    """
+
+    optima: Sequence[HypothesisFit] = ()
+    slack: float = 0.0
+
+    def tried(
+        self, problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit, worst: float
+    ) -> list[HypothesisFit]:
+        """Fit those jointly that may become the best of the family, and better than ``worst``.
+
+        The linear base may be as wrong about another as it was about the best. An optimum
+        that is not fitted is known only where it cannot be better than the best fit.
+        """
+        fits, slack = [lead], self.slack
+        for k, own in enumerate(self.optima):
+            expected, best = own.neg2_log_evidence, fits[0].neg2_log_evidence
+            if expected - slack > min(best, worst):
+                behind = [t.own for t in self.optima[k:] if t.neg2_log_evidence - slack > best]
+                return [fits[0].knowing(behind), *fits[1:]]
+            found = _from_own(problem, null, own)
+            slack = max([slack, *(abs(expected - t.neg2_log_evidence) for t in found)])
+            fits = sorted([*fits, *found], key=lambda t: t.neg2_log_evidence)
+        return fits
+
+
+Fits = tuple[list[HypothesisFit], _Others]
 
 
 def _family_fits(
     problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
-    least: float | None,
+    least: float | None, left: list[HypothesisFit],
 ) -> Iterator[Fits]:  # fmt: skip
-    """Rough joint fits, one family after the other, and the own optima of those behind.
+    """Rough joint fits, one family after the other; ``left`` gets own optima of those behind.
 
     Poles are paired anew by every change: each candidate is fitted from its start.
     """
-    families = _by_name(tried)
+    responses, families = isinstance(problem.data, Responses), _by_name(tried)
 
-    def said(each: Iterable[T]) -> Iterator[T]:
-        for k, (name, fits) in enumerate(zip(families, each, strict=True)):
+    def begun(some: Sequence[Candidate]) -> list[HypothesisFit]:
+        if responses:
+            return _own_optima(problem, null, some)
+        return [t for c in some for t in _tried(problem, null, c.effect, c.start, c.base)]
+
+    def each() -> Iterator[list[HypothesisFit]]:
+        every = in_parallel(begun, families.values())
+        for k, (name, fits) in enumerate(zip(families, every, strict=True)):
             progress(f"tried {name}", 0.8 * (k + 1) / len(families))
             yield fits
 
-    if isinstance(problem.data, Responses):
-        every = in_parallel(lambda some: _own_optima(problem, null, some), families.values())
-        yield from _leaders(problem, null, said(every), least)
-        return
-    for fits in said(in_parallel(
-        lambda some: [t for c in some for t in _tried(problem, null, c.effect, c.start, c.base)],
-        families.values(),
-    )):  # fmt: skip
-        yield fits, []
+    if responses:
+        yield from _leaders(problem, null, each(), least, left)
+    else:
+        yield from ((fits, _Others()) for fits in each())
 
 
 def _own_optima(
@@ -171,9 +205,9 @@ def _own_optima(
 
 def _leaders(
     problem: UpdatingProblem, null: HypothesisFit, families: Iterable[list[HypothesisFit]],
-    least: float | None,
+    least: float | None, left: list[HypothesisFit],
 ) -> Iterator[Fits]:  # fmt: skip
-    """Joint fits of the leaders of all families that may win; of the others their own optimum.
+    """Joint fits of the leaders of all families that may win; ``left`` gets the others.
 
     The linear base may hide as much of one family as it hid of the leading ones. The most that a
     joint fit of these gained over its own optimum is the slack of all others.
@@ -188,68 +222,32 @@ def _leaders(
         ranked = sorted([*ranked, optima], key=lambda each: each[0].neg2_log_evidence)
         for each in ranked[first:]:
             each[0] = on_common_basis(problem, each[0])
-    fits = list(in_parallel(lambda each: _jointly(problem, null, each), ranked[:first]))
-    joint = [min((t.neg2_log_evidence for t in each.fits), default=np.inf) for each in fits]
-    hidden = (own.neg2_log_evidence - S for (own, *_), S in zip(ranked, joint, strict=False))
-    slack, best = max(hidden, default=0.0), min(joint, default=np.inf)
-    worst = min(best + BEHIND, np.inf if least is None else null.neg2_log_evidence - least)
-    may, behind = list[list[HypothesisFit]](), list[HypothesisFit]()
-    for lead, *others in ranked[first:]:
-        if lead.neg2_log_evidence - max(slack, 0.0) < worst:
-            may.append([lead, *others])
-        else:
-            behind.append(lead.knowing([t.own for t in others]))
-    fits += in_parallel(lambda each: _jointly(problem, null, each), may)
-    best = min((t.neg2_log_evidence for each in fits for t in each.fits), default=np.inf)
-    yield [], behind
-    for more in in_parallel(lambda each: each.whole(problem, null, BEHIND + best), fits):
-        yield more, []
+    slack, worst = 0.0, np.inf if least is None else null.neg2_log_evidence - least
+    jointly, leading = _joint(problem, null), ranked[:first]
+    for (own, *_), found in zip(leading, in_parallel(jointly, leading), strict=True):
+        joint = min((t.neg2_log_evidence for t in found[0]), default=np.inf)
+        slack, worst = max(slack, own.neg2_log_evidence - joint), min(worst, joint + BEHIND)
+        yield found
+    may = [own[0].neg2_log_evidence - slack < worst for own in ranked[first:]]
+    for chance, (own, *others) in zip(may, ranked[first:], strict=True):
+        if not chance:
+            left.append(own.knowing([t.own for t in others]))
+    yield from in_parallel(jointly, compress(ranked[first:], may))
 
 
-@dataclass(frozen=True, eq=False)
-class _Leader:
-    """Joint fits of the best of a family, and the own optima of its others, best first.
+def _joint(
+    problem: UpdatingProblem, null: HypothesisFit
+) -> Callable[[Sequence[HypothesisFit]], Fits]:
+    """A function that fits the first of a family's own optima that is a structure, roughly."""
 
-    ``slack`` is the largest difference of a joint fit from its own optimum.
-    """
+    def jointly(optima: Sequence[HypothesisFit]) -> Fits:
+        for k, own in enumerate(optima):
+            if fits := _from_own(problem, null, own):
+                slack = max(abs(own.neg2_log_evidence - t.neg2_log_evidence) for t in fits)
+                return fits, _Others(optima[k + 1 :], slack)
+        return [], _Others()
 
-    fits: Sequence[HypothesisFit]
-    others: Sequence[HypothesisFit]
-    slack: float
-
-    def whole(
-        self, problem: UpdatingProblem, null: HypothesisFit, worst: float
-    ) -> list[HypothesisFit]:
-        """Joint fits of all that may become the best of the family, and better than ``worst``.
-
-        An optimum that is not fitted is known only where it cannot be better than the best fit.
-        """
-        fits, slack = by_evidence(self.fits), self.slack
-        for k, own in enumerate(self.others):
-            expected, best = own.neg2_log_evidence, fits[0].neg2_log_evidence
-            if expected - slack > min(best, worst):
-                behind = [t.own for t in self.others[k:] if t.neg2_log_evidence - slack > best]
-                return [fits[0].knowing(behind), *fits[1:]]
-            found = _from_own(problem, null, own)
-            slack = max([slack, *(abs(expected - t.neg2_log_evidence) for t in found)])
-            fits = by_evidence([*fits, *found])
-        return fits
-
-
-def by_evidence(hypotheses: Iterable[HypothesisFit]) -> list[HypothesisFit]:
-    """Hypotheses, best first."""
-    return sorted(hypotheses, key=lambda t: t.neg2_log_evidence)
-
-
-def _jointly(
-    problem: UpdatingProblem, null: HypothesisFit, optima: Sequence[HypothesisFit]
-) -> _Leader:
-    """Rough joint fits of the first of a family's own optima that is a structure."""
-    for k, own in enumerate(optima):
-        if fits := _from_own(problem, null, own):
-            slack = max(abs(own.neg2_log_evidence - t.neg2_log_evidence) for t in fits)
-            return _Leader(fits, optima[k + 1 :], slack)
-    return _Leader([], [], 0.0)
+    return jointly
 
 
 def _from_own(
@@ -295,7 +293,7 @@ def by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
             best[t.effect.name] = t.among(lead)
         else:
             best[t.effect.name] = lead.among(t)
-    return by_evidence(best.values())
+    return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
 
 
 def _lighter(
