@@ -15,7 +15,7 @@ from .effect_context import EffectContext, ElementGrids
 from .joints import Connection
 
 NEIGHBOURS = 6  # places round a place of a sheet
-MOVES, NEAREST = 8, 6  # of a line: steps at most, and neighbours whose optima are found in each
+MOVES, NEAREST = 8, 3  # of a line: steps at most, and neighbours whose optima are found in each
 BETTER = 0.5  # least gain of a move in -2 ln evidence
 E = TypeVar("E", bound=Effect)
 
