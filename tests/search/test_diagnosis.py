@@ -16,7 +16,7 @@ from chladni.search.search_round import (
     BEHIND,
     _closer,
     _finished,
-    _joint,
+    _jointly,
     _leaders,
     _own_optima,
     _tried,
@@ -73,7 +73,7 @@ def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, w
     problem, done = problem_of({k: joint[k] for k in range(3)}, expected)
     tried = [Candidate(e, np.zeros(1), np.zeros(1)) for e in effects_at("mass", 3)]
     optima = _own_optima(problem, NULL, [*tried, tried[0]])
-    (lead,), others = _joint(problem, NULL)(optima)
+    (lead,), others = _jointly(problem, NULL, optima)
     found = by_family(others.tried(problem, NULL, lead, worst))
     assert done == fitted
     assert found[0].fit.neg2_log_evidence == min(joint[k] for k in fitted)

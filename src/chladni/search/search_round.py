@@ -7,6 +7,7 @@ of an effect in addition to the others.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import compress
 
 import numpy as np
@@ -223,7 +224,7 @@ def _leaders(
         for each in ranked[first:]:
             each[0] = on_common_basis(problem, each[0])
     slack, worst = 0.0, np.inf if least is None else null.neg2_log_evidence - least
-    jointly, leading = _joint(problem, null), ranked[:first]
+    jointly, leading = partial(_jointly, problem, null), ranked[:first]
     for (own, *_), found in zip(leading, in_parallel(jointly, leading), strict=True):
         joint = min((t.neg2_log_evidence for t in found[0]), default=np.inf)
         slack, worst = max(slack, own.neg2_log_evidence - joint), min(worst, joint + BEHIND)
@@ -235,19 +236,15 @@ def _leaders(
     yield from in_parallel(jointly, compress(ranked[first:], may))
 
 
-def _joint(
-    problem: UpdatingProblem, null: HypothesisFit
-) -> Callable[[Sequence[HypothesisFit]], Fits]:
-    """A function that fits the first of a family's own optima that is a structure, roughly."""
-
-    def jointly(optima: Sequence[HypothesisFit]) -> Fits:
-        for k, own in enumerate(optima):
-            if fits := _from_own(problem, null, own):
-                slack = max(abs(own.neg2_log_evidence - t.neg2_log_evidence) for t in fits)
-                return fits, _Others(optima[k + 1 :], slack)
-        return [], _Others()
-
-    return jointly
+def _jointly(
+    problem: UpdatingProblem, null: HypothesisFit, optima: Sequence[HypothesisFit]
+) -> Fits:
+    """Rough joint fits of the first of a family's own optima that is a structure."""
+    for k, own in enumerate(optima):
+        if fits := _from_own(problem, null, own):
+            slack = max(abs(own.neg2_log_evidence - t.neg2_log_evidence) for t in fits)
+            return fits, _Others(optima[k + 1 :], slack)
+    return [], _Others()
 
 
 def _from_own(
