@@ -35,7 +35,7 @@ def test_it_is_the_joint_fit_of_linear_responses(model, weighed):
     found = own_optimum(model, [base], effect, data, weighed, [about], np.zeros(1))
     assert_allclose(found.x, due.x, atol=1e-2)
     assert_allclose(found.covariance, due.covariance, rtol=1e-6)
-    assert found.misfit == pytest.approx(due.misfit, abs=1e-3)
+    assert found.misfit == pytest.approx(due.misfit, rel=1e-2)
     assert found.neg2_log_evidence == pytest.approx(due.neg2_log_evidence, abs=1e-6)
 
 
@@ -83,5 +83,6 @@ def test_an_effect_on_few_dofs_may_be_added_to_a_state(reduced, responses):
     found = own_optimum(model, base, effect, data, weighed, about, start, local)
     assert_allclose(found.x, due.x, atol=1e-3)
     assert_allclose(found.sd(effect), due.sd(effect), rtol=1e-3)
-    assert found.misfit == pytest.approx(due.misfit, abs=1e-2)
+    assert_allclose(found.x[:2], due.x[:2], atol=1e-4)
+    assert found.misfit == pytest.approx(due.misfit, rel=1e-3)
     assert found.neg2_log_evidence == pytest.approx(due.neg2_log_evidence, abs=0.01)
