@@ -353,7 +353,7 @@ def _closer(
 def _of_the_same_lump(
     problem: UpdatingProblem, hypotheses: Sequence[HypothesisFit]
 ) -> list[HypothesisFit]:
-    """Families behind the leading mass that may be it, begun at its place with its mass.
+    """Families that are not tied with the leading mass, begun at its place with its mass.
 
     A point mass at the edge of a tailgate (tuning 561) had converged 16 mm from its place with a
     gain of 113, and a resonator led with 222. Begun at the resonator's place, the mass gains 226.
