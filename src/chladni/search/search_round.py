@@ -56,9 +56,9 @@ def search_round(
     progress(f"trying {len(tried)} candidates", 0.0)
     hypotheses, left = list[HypothesisFit](), list[HypothesisFit]()
     others = dict[str, _Others]()
-    for fits, rest in _family_fits(problem, null, tried, progress, least, left):
+    for fits, behind in _family_fits(problem, null, tried, progress, least, left):
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
-        others |= {t.effect.name: rest for t in fits}
+        others |= {t.effect.name: behind for t in fits}
         give_back_freed_memory()
     worst = BEHIND + min((t.neg2_log_evidence for t in hypotheses), default=0.0)
     more = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
