@@ -130,7 +130,7 @@ def test_a_line_that_was_fitted_goes_on_to_a_better_one_beside_it():
 
     context = SimpleNamespace(
         scan=bending_slopes, where=SimpleNamespace(groups=groups), bases=(None, "of the fit"),
-        scores=scores, own=own,
+        scores=scores, own=own, idle=np.inf,
     )  # fmt: skip
     effect, x = crack(groups, begun, 100), np.array([-0.3])
     better = closer(context, effect, x)

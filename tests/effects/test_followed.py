@@ -17,6 +17,7 @@ def context(best):
             [[abs(line - best) + 1e3 * (x[0] - 1 / line) ** 2 for x in starts]]
         ),
         own=lambda line, start: (2 * BETTER * abs(line - best), np.array([1 / line])),
+        idle=99.0,
     )
 
 
@@ -40,3 +41,9 @@ def test_moves_end_at_a_small_gain_without_neighbours_and_in_time():
     assert followed(known, 2, np.ones(1), longer_or_shorter)[0] == 2
     assert followed(context(5), 2, np.ones(1), lambda line: [])[0] == 2
     assert followed(context(LONGEST), 1, np.ones(1), longer_or_shorter)[0] == 1 + MOVES
+
+
+def test_what_explains_nothing_does_not_move():
+    known = context(5)
+    known.idle = known.own(2, None)[0]
+    assert followed(known, 2, np.ones(1), longer_or_shorter)[0] == 2

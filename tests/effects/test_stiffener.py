@@ -168,7 +168,7 @@ def test_a_heavy_rib_is_sought_where_a_mass_explains_most(where):
     context = SimpleNamespace(
         where=where, bases=(None, "null"), scores=scores,
         scan=SimpleNamespace(bending_scores=bending, point_scores=masses),
-        own=lambda line, x: (float(scores(line, [x], True)[0, 0]), x),
+        own=lambda line, x: (float(scores(line, [x], True)[0, 0]), x), idle=np.inf,
     )  # fmt: skip
     best = candidates(context)[0]
     X = made.points[made.rows(np.array(best.effect.grids))]

@@ -67,6 +67,10 @@ class Catalogue:
     def bases(self) -> tuple[np.ndarray, ...]:
         return (np.zeros(0),)
 
+    @property
+    def idle(self) -> float:
+        return np.inf
+
     @cached_property
     def fasteners(self):
         return tuple((one.joint, one.share) for one in singles(loosened_rows(self.reduced)))

@@ -1,5 +1,6 @@
 """A hypothesis that holds the null within it never loses to it for want of a start."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,13 +11,14 @@ from chladni.errors import ModelError
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import Status
-from chladni.inference.own_optimum import LocalOptimum
 from chladni.search import search_round
 from chladni.search.search_round import (
     BEHIND,
     _closer,
     _finished,
-    _leader,
+    _jointly,
+    _leaders,
+    _own_optima,
     _tried,
     by_family,
 )
@@ -68,26 +70,10 @@ def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
 )
 def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, worst, fitted):
     """The linear base may be as wrong about one place as about another; all places are known."""
-    done = []
-
-    def own(effect, start, bases):
-        if expected[effect.k] is None:
-            raise ModelError("an effect left negative stiffness")
-        return LocalOptimum(effect, expected[effect.k], start, start), bases[0], effect
-
-    def fit(effect, start, base, steps, model):
-        done.append(effect.k)
-        assert (model is effect) == (len(done) == 1)  # the first has its model already
-        return hypothesis_of(effect, joint[effect.k])
-
-    problem = SimpleNamespace(own_optimum=own, fitted_with=fit, mean=lambda: NULL.fit.x)
-    nowhere = SimpleNamespace(point_m=None, radius_m=None)
-    effects = [
-        SimpleNamespace(k=k, name="mass", text=f"at grid {k}", location=lambda x, sd: nowhere)
-        for k in range(3)
-    ]
-    tried = [Candidate(e, np.zeros(1), np.zeros(1)) for e in (*effects, effects[0])]
-    (lead,), others = _leader(problem, NULL, tried)
+    problem, done = problem_of({k: joint[k] for k in range(3)}, expected)
+    tried = [Candidate(e, np.zeros(1), np.zeros(1)) for e in effects_at("mass", 3)]
+    optima = _own_optima(problem, NULL, [*tried, tried[0]])
+    (lead,), others = _jointly(problem, NULL, optima)
     found = by_family(others.tried(problem, NULL, lead, worst))
     assert done == fitted
     assert found[0].fit.neg2_log_evidence == min(joint[k] for k in fitted)
@@ -96,12 +82,72 @@ def test_what_may_be_the_best_of_its_family_is_fitted_jointly(expected, joint, w
     assert known == {k for k in range(3) if expected[k] is not None} - left_out
 
 
+@pytest.mark.parametrize(
+    ("hidden", "least", "fitted"),
+    [
+        (0.0, None, 5),  # those with the best own optima alone: the sixth is 31.6 behind
+        (2.0, None, 6),  # the base hid 2 of the fourth
+        (0.0, 22.0, 2),  # a later round: the third gains 21
+        (2.0, 22.0, 3),
+    ],
+)
+def test_families_whose_own_optimum_is_far_behind_are_not_fitted(hidden, least, fitted):
+    """They stay hypotheses at that optimum; what joint fits gain over it is room for others."""
+    expected = [50.0, 70.0, 81.6, 79.0, 80.0, 81.5, 90.0]
+    joint = {k: S for k, S in enumerate(expected)} | {1: 70.0 - hidden, 3: 79.0 - hidden}
+    problem, done = problem_of(joint, expected)
+    effects = [effects_at(f"family-{k}", 7)[k] for k in range(7)]
+    families = ([hypothesis_of(e, expected[e.k])] for e in effects)
+    left = []
+    found = [t for fits, _ in _leaders(problem, NULL, families, least, left) for t in fits]
+    assert sorted(t.effect.k for t in (*found, *left)) == list(range(7))
+    assert len(done) == fitted
+
+
+def effects_at(name, count):
+    nowhere = SimpleNamespace(point_m=None, radius_m=None)
+    return [
+        SimpleNamespace(k=k, name=name, text=f"at grid {k}", location=lambda x, sd: nowhere)
+        for k in range(count)
+    ]
+
+
+def problem_of(joint, expected):
+    """A problem with these own optima and joint fits, and the list of the latter."""
+    done = []
+
+    def own(effect, start, bases):
+        if expected[effect.k] is None:
+            raise ModelError("an effect left negative stiffness")
+        return hypothesis_of(effect, expected[effect.k])
+
+    def fit(effect, start, base, steps, model):
+        done.append(effect.k)
+        return hypothesis_of(effect, joint[effect.k])
+
+    common = SimpleNamespace(model=None)
+    return SimpleNamespace(
+        own_optimum=own, fitted_with=fit, mean=lambda: NULL.fit.x, base=(), reduced=common
+    ), done
+
+
+@dataclass(frozen=True)
+class OneParameter:
+    neg2_log_evidence: float
+    data: object
+    effects: tuple = ()
+
+    def of(self, effect):
+        return np.zeros(1)
+
+    def sd(self, effect):
+        return np.ones(1)
+
+
 def hypothesis_of(effect, evidence):
     """A fit of one effect with this evidence."""
-    fit = SimpleNamespace(
-        neg2_log_evidence=evidence, of=lambda e: np.zeros(1), sd=lambda e: np.ones(1)
-    )
-    return HypothesisFit(effect, fit, None)
+    data = SimpleNamespace(rebased=lambda model: None)
+    return HypothesisFit(effect, OneParameter(evidence, data), None)
 
 
 @pytest.mark.parametrize("status", list(Status))

@@ -161,7 +161,7 @@ def test_no_other_lump_is_begun_where_one_was_found(two, place, begun):
     held = replace(two, families=catalogue()).holding([(mass, x)])
     effect, start = PointMass.of_lump(held.where, np.append(place, 0.0), 0.05)
     fit = SimpleNamespace(of=lambda e: start, effects=())
-    lead = SimpleNamespace(effect=effect, effects=(effect,), fit=fit)
+    lead = SimpleNamespace(effect=effect, effects=(effect,), fit=fit, neg2_log_evidence=0.0)
     assert len(_of_the_same_lump(held, [lead])) == begun
 
 

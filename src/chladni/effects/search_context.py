@@ -15,7 +15,7 @@ from .effect_context import EffectContext, ElementGrids
 from .joints import Connection
 
 NEIGHBOURS = 6  # places round a place of a sheet
-MOVES, NEAREST = 8, 6  # of a line: steps at most, and neighbours whose optima are found in each
+MOVES, NEAREST = 8, 3  # of a line: steps at most, and neighbours whose optima are found in each
 BETTER = 0.5  # least gain of a move in -2 ln evidence
 E = TypeVar("E", bound=Effect)
 
@@ -148,6 +148,10 @@ class SearchContext(Protocol):
         """Base parameters of the best fit without any effect."""
 
     @property
+    def idle(self) -> float:
+        """-2 ln evidence of that fit, to compare with :meth:`own`; inf if only poles are known."""
+
+    @property
     def weighs_more(self) -> float:
         """Weighed mass minus that of the nominal model [kg]; 0 if nothing was weighed."""
 
@@ -233,13 +237,13 @@ def best_places(
 def followed(
     context: SearchContext, effect: E, start: np.ndarray, around: Callable[[E], Sequence[E]]
 ) -> tuple[E, np.ndarray]:
-    """Move an effect to its neighbours while they explain more, each at its own optimum.
+    """Move an effect that explains anything to its neighbours while they explain more.
 
-    A longer line needs less strength: at the strength of the shorter one it explains nothing. The
-    optima of the ``NEAREST`` neighbours by score are found.
+    Each is at its own optimum. A longer line needs less strength: at the strength of the shorter
+    one it explains nothing. The optima of the ``NEAREST`` neighbours by score are found.
     """
     least, x = context.own(effect, start)
-    for _ in range(MOVES):
+    for _ in range(MOVES if least < context.idle else 0):
         near = around(effect)
         scores = [float(context.scores(e, [x], True).min()) for e in near]
         best = [near[k] for k in np.argsort(scores)[:NEAREST]]

@@ -200,10 +200,10 @@ class UpdatingProblem:
 
     def own_optimum(
         self, effect: Effect, start: np.ndarray, bases: Sequence[np.ndarray]
-    ) -> tuple[LocalOptimum, np.ndarray, Reduced | None]:
+    ) -> HypothesisFit:
         """Optimise one effect from a start, the base linear about the best of some (n_base,).
 
-        The second value is the base that goes with it, the third the model if it needed its own.
+        The model is that of the problem where the effect needs no basis of its own.
         """
         kept, model = self.without(effect), self.reduced.model
         inside = self._positions(kept)
@@ -213,9 +213,9 @@ class UpdatingProblem:
         local = LocalEffect.of(self.reduced, kept, effect, state, x, start)
         if local is None:
             model = self.reduced.model_for(effect, start)
-        data, mass, whole = self.data.rebased(model), self.mass_measurement, bases[0].copy()
-        found, whole[inside] = own_optimum(model, kept, effect, data, mass, about, start, local)
-        return found, whole, None if local else model
+        data, mass = self.data.rebased(model), self.mass_measurement
+        found = own_optimum(model, kept, effect, data, mass, about, start, local)
+        return HypothesisFit(effect, found, model, tuple(e for e, _ in self.found))
 
     def _positions(self, kept: Sequence[Effect]) -> np.ndarray:
         """Mask over the parameters of the base of some of its effects."""

@@ -20,9 +20,11 @@ from ..reduced.reduced_model import Reduced, State, evaluate
 from .likelihood import Data
 from .linear_model import LinearModel, Squares, cost
 from .map_fit import (
+    Fit,
     MassMeasurement,
     Objective,
     Point,
+    Status,
     constants,
     descend,
     prior_residuals,
@@ -77,12 +79,11 @@ def own_optimum(
     model: Reduced, base: Sequence[Effect], effect: Effect, data: Data,
     mass_measurement: MassMeasurement | None, about: Sequence[Base], start: np.ndarray,
     local: LocalEffect | None = None,
-) -> tuple[LocalOptimum, np.ndarray]:  # fmt: skip
+) -> Fit:  # fmt: skip
     """Optimise an effect from a start, with the base linear about the best of some states.
 
-    The evidence is that of responses linear in the base.  The second value is the base (n,) that
-    goes with the optimum. A strong effect spoils the base of a fit without it; that of the deck is
-    then the nearer.
+    The evidence is that of responses linear in the base.  A strong effect spoils the base of a fit
+    without it; that of the deck is then the nearer.
 
     Parameters
     ----------
@@ -111,19 +112,23 @@ def own_optimum(
     limit = np.array([p.step for p in effect.parameters])
     y, _, (whole, r, r0), _ = descend(ways[best], start, limit, STEPS, CLOSE, begun[best])
     x, squares = about[best].x, whole.squares(r, r0)
-    n, moved = len(x), x
+    n, z, state = len(x), np.concatenate([x, y]), None
+    misfit = squares.cost - float(r0 @ r0)
     step = np.linalg.solve(squares.information[:n, :n], squares.gradient[:n])
     for share in SHARES:
         with suppress(ModelError):
-            there = x - share * step
-            state, z = state_of(there, y), np.concatenate([there, y])
-            rest = prior_residuals(effects, mass_measurement, z, state)[0]
-            if cost(data.error, data.scaled(state, False)[0], rest) < squares.cost:
-                moved = there
+            there, moved = x - share * step, state_of(x - share * step, y)
+            rest = prior_residuals(effects, mass_measurement, at := np.append(there, y), moved)[0]
+            whole_cost = cost(data.error, data.scaled(moved, False)[0], rest)
+            if whole_cost < squares.cost:
+                z, state, misfit = at, moved, whole_cost - float(rest @ rest)
                 break
+    state = state_of(x, y, about[best].state) if state is None else state
     S = whole.neg2_log_evidence(r, r0) + constants(effects)
-    sd = np.sqrt(np.diag(np.linalg.inv(squares.information))[n:])
-    return LocalOptimum(effect, S, y, sd), moved
+    covariance = np.linalg.inv(squares.information)
+    return Fit(
+        tuple(effects), z, covariance, misfit, S, state.without_slopes(), data, Status.CONVERGED
+    )
 
 
 def _objective(

@@ -11,7 +11,7 @@ from ..effects.model_errors import MeshError
 from ..errors import ModelError
 from .hypothesis_fit import HypothesisFit, fitted
 from .implausible_values import is_strained
-from .map_fit import Fit, MassMeasurement, fit
+from .map_fit import MassMeasurement, fit, posterior
 from .pole_data import Poles
 
 
@@ -19,6 +19,8 @@ def as_written(
     hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None, halved: bool = False
 ) -> HypothesisFit:
     """Fit what a deck can hold: calibrated numbers and the effects of the hypothesis.
+
+    The fit begins at the found or at the given values, where its residual is smaller.
 
     Every deck is a fit of its own, so that the decks of one diagnosis are nested: the given deck,
     the calibrated deck and the deck with the effects. Each is judged as its file stands. Mesh
@@ -49,19 +51,20 @@ def as_written(
     ]
     numbers = [calibrated_family(e) if is_strained(e, found.of(e)) else e for e in kept]
     mesh = [e.halved for e in found.effects if type(e) is MeshError] if halved else []
-    data, fits = hypothesis.data, list[Fit]()
+    data, starts = hypothesis.data, list[tuple[float, np.ndarray]]()
     made = fitted if isinstance(data, Poles) else fit  # poles have the spread of the deck itself
     if isinstance(data, Poles) and data.listed and data.shapes is None:
         data = data.all_paired()
+    every = hypothesis.model, [*numbers, *mesh], data, mass_measurement
     for given in (False, True):
         x = [_given(e) if given and e.kind == "calibration" else found.of(e) for e in kept]
         start = np.concatenate([np.zeros(0), *x])
         with suppress(ModelError):
-            fits.append(made(hypothesis.model, [*numbers, *mesh], data, mass_measurement, start))
-    if not fits:
-        raise ModelError("neither the calibrated nor the given values belong to a structure")
-    best = min(fits, key=lambda f: f.neg2_log_evidence)
-    return replace(hypothesis, fit=best.kept(), optima=())
+            starts.append((posterior(*every, start).cost, start))
+    for _, start in sorted(starts, key=lambda each: each[0]):
+        with suppress(ModelError):
+            return replace(hypothesis, fit=made(*every, start).kept(), optima=())
+    raise ModelError("neither the calibrated nor the given values belong to a structure")
 
 
 def preferred_mesh(

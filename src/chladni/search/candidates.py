@@ -143,7 +143,10 @@ class UpdatingContext:
 
     @cached_property
     def bases(self) -> tuple[np.ndarray, ...]:
-        """Base parameters of the nominal and of the calibrated model, scatter idle in both."""
+        """Base parameters of the nominal and of the calibrated model, scatter idle in both.
+
+        With effects in place the calibrated model is near enough, and stands for both.
+        """
         nominal = self.problem.mean()
         if self.about is not None:
             return nominal, self.about
@@ -152,7 +155,8 @@ class UpdatingContext:
             e.kind == "calibration" or e in found for e in self.problem.base for _ in e.parameters
         ]
         calibrated = np.where(kinds, self.null_fit.fit.x, nominal)
-        return nominal, calibrated if self._stands(calibrated) else self.null_fit.fit.x
+        calibrated = calibrated if self._stands(calibrated) else self.null_fit.fit.x
+        return (calibrated,) if found else (nominal, calibrated)
 
     def _stands(self, x: np.ndarray) -> bool:
         """True if base parameters x are a structure."""
@@ -166,6 +170,11 @@ class UpdatingContext:
     def null(self) -> np.ndarray:
         """Base parameters of the best fit without any effect."""
         return self.null_fit.fit.x
+
+    @property
+    def idle(self) -> float:
+        """-2 ln evidence of that fit; inf if only poles are known."""
+        return np.inf if self.scan is None else self.null_fit.neg2_log_evidence
 
     @cached_property
     def baselines(self) -> tuple[Baseline, ...]:
@@ -263,10 +272,10 @@ class UpdatingContext:
             return float(self.scores(effect, [start], True).min()), start
         bases = (self.null, self.bases[0]) if self.about is None else (self.about,)
         try:
-            found, *_ = self.problem.own_optimum(effect, start, bases)
+            found = self.problem.own_optimum(effect, start, bases)
         except FAILED:
             return np.inf, start
-        return found.neg2_log_evidence, found.x
+        return found.neg2_log_evidence, found.fit.of(effect)
 
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""

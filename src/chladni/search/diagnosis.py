@@ -2,7 +2,7 @@
 
 1. Null: calibration parameters and scatter alone, from several starts.
 2. Scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0.
-3. Own optima of every candidate, with the base linear; joint fits of the leaders of every family.
+3. Own optima of every candidate, with the base linear; joint fits of the families that may win.
 4. Evidence: Laplace, with 2 ln of the number of places tried. Leaders restart the null.
 5. Verdict.
 6. Sets of several effects (``several``), if an effect is named or nothing fits.

@@ -33,7 +33,7 @@ SHARE = 0.02  # of the mass of the structure: the mass that is put on
 WEIGHED = 1e-3  # [kg] standard deviation of a good weighing
 GAIN = 0.01  # relative standard deviation of the gain of a sensor or gauge
 UNSEEN = 0.01  # of the noise: mean variance of the predictions that may be left out
-MOST_FORMS = 1000  # entries of the errors of form
+MOST_FORMS = 400  # entries of the errors of form
 ABOVE = 1.25  # times the highest line: reach of a wider band
 
 

@@ -4,9 +4,11 @@ The base of the round contains the effects found before it. A later round theref
 of an effect in addition to the others.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import compress
 
 import numpy as np
 
@@ -29,6 +31,7 @@ from .candidates import UpdatingContext, already_there
 from .decision_rules import TIED
 
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
+FIRST = 5  # families that are fitted jointly, whatever they promise; ``LATER`` in later rounds
 RUNNING = 3  # families that are fitted to the end, at rest or not; more where they are tied
 LATER = 2  # of them in later rounds
 WHOLE = 6  # that keep their model, 10 to 300 MB each on a tailgate
@@ -48,21 +51,20 @@ def search_round(
     null : the best without any of them
     least : gain in -2 ln evidence by rough fits, below which none is followed further
     """
-    hypotheses: list[HypothesisFit] = []
     later = least is not None  # the bases of the first round are still there
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
     progress(f"trying {len(tried)} candidates", 0.0)
-    families, others = _by_name(tried), dict[str, _Others]()
-    every = in_parallel(_fits(problem, null), families.values())
-    for k, (name, (fits, others[name])) in enumerate(zip(families, every, strict=True)):
-        progress(f"tried {name}", 0.8 * (k + 1) / len(families))
+    hypotheses, left = list[HypothesisFit](), list[HypothesisFit]()
+    others = dict[str, _Others]()
+    for fits, behind in _family_fits(problem, null, tried, progress, least, left):
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
+        others |= {t.effect.name: behind for t in fits}
         give_back_freed_memory()
     worst = BEHIND + min((t.neg2_log_evidence for t in hypotheses), default=0.0)
     more = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
     hypotheses = _lighter(problem, by_family([t for fits in more for t in fits]), whole)
     if least is not None and not _gained(null, hypotheses, least):
-        return simplest_first(hypotheses, null.neg2_log_evidence)
+        return simplest_first(by_family([*hypotheses, *left]), null.neg2_log_evidence)
     progress("refining the place", 0.8)
     running = running if later else max(running, _in_the_running(hypotheses[:whole]))
     ahead, rest = hypotheses[:running], hypotheses[running:]
@@ -73,7 +75,7 @@ def search_round(
     closer = in_parallel(lambda t: _closer(problem, null, t), hypotheses[:running])
     best = by_family([*hypotheses, *(t for fits in closer for t in fits)])
     best = by_family([*best, *_of_the_same_lump(problem, best)])
-    return simplest_first(best, null.neg2_log_evidence)
+    return simplest_first(by_family([*best, *left]), null.neg2_log_evidence)
 
 
 def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[HypothesisFit]:
@@ -122,13 +124,12 @@ def _by_name(tried: Sequence[Candidate]) -> dict[str, list[Candidate]]:
 
 @dataclass(frozen=True, eq=False)
 class _Others:
-    """Other optima of a family than the best, best first; each with its base (n_base,).
+    """Other own optima of a family than that of its joint fit, best first.
 
-    ``slack`` is the largest difference of a joint fit from what its own optimum let expect.
+    ``slack`` is the largest difference of a joint fit from its own optimum.
     """
 
-    optima: Sequence[LocalOptimum] = ()
-    bases: Mapping[LocalOptimum, np.ndarray] = field(default_factory=dict)
+    optima: Sequence[HypothesisFit] = ()
     slack: float = 0.0
 
     def tried(
@@ -141,51 +142,119 @@ class _Others:
         """
         fits, slack = [lead], self.slack
         for k, own in enumerate(self.optima):
-            expected = own.neg2_log_evidence
-            best = fits[0].neg2_log_evidence
+            expected, best = own.neg2_log_evidence, fits[0].neg2_log_evidence
             if expected - slack > min(best, worst):
-                behind = [v for v in self.optima[k:] if v.neg2_log_evidence - slack > best]
+                behind = [t.own for t in self.optima[k:] if t.neg2_log_evidence - slack > best]
                 return [fits[0].knowing(behind), *fits[1:]]
-            found = _tried(problem, null, own.effect, own.x, self.bases[own])
+            found = _from_own(problem, null, own)
             slack = max([slack, *(abs(expected - t.neg2_log_evidence) for t in found)])
             fits = sorted([*fits, *found], key=lambda t: t.neg2_log_evidence)
         return fits
 
 
-def _fits(
-    problem: UpdatingProblem, null: HypothesisFit
-) -> Callable[[Sequence[Candidate]], tuple[list[HypothesisFit], _Others]]:
-    """A function that fits the candidates of a family roughly.
+Fits = tuple[list[HypothesisFit], _Others]
 
-    Poles are paired anew by every change: each candidate is fitted from its start. With responses
-    each candidate's own parameters are optimised first, and the base is linear about the null or
-    the deck. The best is then fitted jointly.
+
+def _family_fits(
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
+    least: float | None, left: list[HypothesisFit],
+) -> Iterator[Fits]:  # fmt: skip
+    """Rough joint fits, one family after the other; ``left`` gets own optima of those behind.
+
+    Poles are paired anew by every change: each candidate is fitted from its start.
     """
-    if isinstance(problem.data, Responses):
-        return lambda tried: _leader(problem, null, tried)
-    return lambda tried: (
-        [t for c in tried for t in _tried(problem, null, c.effect, c.start, c.base)], _Others()
-    )  # fmt: skip
+    responses, families = isinstance(problem.data, Responses), _by_name(tried)
+
+    def begun(some: Sequence[Candidate]) -> list[HypothesisFit]:
+        if responses:
+            return _own_optima(problem, null, some)
+        return [t for c in some for t in _tried(problem, null, c.effect, c.start, c.base)]
+
+    def each() -> Iterator[list[HypothesisFit]]:
+        every = in_parallel(begun, families.values())
+        for k, (name, fits) in enumerate(zip(families, every, strict=True)):
+            progress(f"tried {name}", 0.8 * (k + 1) / len(families))
+            yield fits
+
+    if responses:
+        yield from _leaders(problem, null, each(), least, left)
+    else:
+        yield from ((fits, _Others()) for fits in each())
 
 
-def _leader(
+def _own_optima(
     problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate]
-) -> tuple[list[HypothesisFit], _Others]:
-    """Rough joint fits of the leading candidate of a family, from its own optimum; the others."""
-    bases, lead = dict[LocalOptimum, np.ndarray](), None
+) -> list[HypothesisFit]:
+    """Own optima of a family, each once, best first; only the first keeps its basis.
+
+    The own parameters of every candidate are optimised, and the base is linear about the null or
+    the deck.
+    """
+    about, every = (null.fit.x, problem.mean()), dict[LocalOptimum, HypothesisFit]()
     for c in {(c.effect.text, *c.start): c for c in tried}.values():
         with suppress(*FAILED):
-            about = null.fit.x, problem.mean()
-            own, base, model = problem.own_optimum(c.effect, c.start, about)
-            if all(own.neg2_log_evidence < other.neg2_log_evidence for other in bases):
-                lead = model  # the only one of them that is kept
-            bases[own] = base
-    optima = distinct(bases)
+            found = problem.own_optimum(c.effect, c.start, about)
+            lead = min(every, key=lambda v: v.neg2_log_evidence, default=None)
+            if lead is not None:
+                if found.neg2_log_evidence < lead.neg2_log_evidence:
+                    every[lead] = on_common_basis(problem, every[lead])
+                else:
+                    found = on_common_basis(problem, found)
+            every[found.own] = found
+    return [every[own] for own in distinct(every)]
+
+
+def _leaders(
+    problem: UpdatingProblem, null: HypothesisFit, families: Iterable[list[HypothesisFit]],
+    least: float | None, left: list[HypothesisFit],
+) -> Iterator[Fits]:  # fmt: skip
+    """Joint fits of the leaders of all families that may win; ``left`` gets the others.
+
+    The linear base may hide as much of one family as it hid of the leading ones. The most that a
+    joint fit of these gained over its own optimum is the slack of all others.
+
+    Parameters
+    ----------
+    families : own optima of each, as :func:`_own_optima` gives them
+    least : gain in -2 ln evidence that a hypothesis must reach
+    """
+    first, ranked = FIRST if least is None else LATER, list[list[HypothesisFit]]()
+    for optima in (each for each in families if each):
+        ranked = sorted([*ranked, optima], key=lambda each: each[0].neg2_log_evidence)
+        for each in ranked[first:]:
+            each[0] = on_common_basis(problem, each[0])
+    slack, worst = 0.0, np.inf if least is None else null.neg2_log_evidence - least
+    jointly, leading = partial(_jointly, problem, null), ranked[:first]
+    for (own, *_), found in zip(leading, in_parallel(jointly, leading), strict=True):
+        joint = min((t.neg2_log_evidence for t in found[0]), default=np.inf)
+        slack, worst = max(slack, own.neg2_log_evidence - joint), min(worst, joint + BEHIND)
+        yield found
+    may = [own[0].neg2_log_evidence - slack < worst for own in ranked[first:]]
+    for chance, (own, *others) in zip(may, ranked[first:], strict=True):
+        if not chance:
+            left.append(own.knowing([t.own for t in others]))
+    yield from in_parallel(jointly, compress(ranked[first:], may))
+
+
+def _jointly(
+    problem: UpdatingProblem, null: HypothesisFit, optima: Sequence[HypothesisFit]
+) -> Fits:
+    """Rough joint fits of the first of a family's own optima that is a structure."""
     for k, own in enumerate(optima):
-        if fits := _tried(problem, null, own.effect, own.x, bases[own], None if k else lead):
+        if fits := _from_own(problem, null, own):
             slack = max(abs(own.neg2_log_evidence - t.neg2_log_evidence) for t in fits)
-            return fits, _Others(optima[k + 1 :], bases, slack)
+            return fits, _Others(optima[k + 1 :], slack)
     return [], _Others()
+
+
+def _from_own(
+    problem: UpdatingProblem, null: HypothesisFit, own: HypothesisFit
+) -> list[HypothesisFit]:
+    """Rough joint fits from an own optimum, over its basis if it has one."""
+    each = (own.fit.of(e) if e in own.fit.effects else problem.begun([e]) for e in problem.base)
+    model = None if own.model is problem.reduced.model else own.model
+    base = np.concatenate([np.zeros(0), *each])
+    return _tried(problem, null, own.effect, own.fit.of(own.effect), base, model)
 
 
 def _tried(
@@ -240,6 +309,8 @@ def _lighter(
 def on_common_basis(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisFit:
     """A hypothesis that keeps its fit, not the vectors that were added to the basis for it."""
     model = problem.reduced.model
+    if hypothesis.model is model:
+        return hypothesis
     fit = replace(hypothesis.fit, data=hypothesis.data.rebased(model))
     return replace(hypothesis, fit=fit, model=model)
 
@@ -282,7 +353,7 @@ def _closer(
 def _of_the_same_lump(
     problem: UpdatingProblem, hypotheses: Sequence[HypothesisFit]
 ) -> list[HypothesisFit]:
-    """Other hypotheses that may be the leading mass, begun at its place with its mass.
+    """Families that are not tied with the leading mass, begun at its place with its mass.
 
     A point mass at the edge of a tailgate (tuning 561) had converged 16 mm from its place with a
     gain of 113, and a resonator led with 222. Begun at the resonator's place, the mass gains 226.
@@ -293,11 +364,14 @@ def _of_the_same_lump(
     x = lead.fit.of(lead.effect)
     lump = np.array(lead.effect.location(x).point_m), lead.effect.parameters[0].value(x[0])
     base, out = taken(problem, lead, ("calibration", "nuisance")), list[HypothesisFit]()
-    for family in (f for f in problem.families if f.name != lead.effect.name):
+    tied = {t.effect.name for t in hypotheses[: _in_the_running(hypotheses)]}
+    for family in (f for f in problem.families if f.name not in tied):
         begun = None if family.of_lump is None else family.of_lump(problem.where, *lump)
         if begun is not None and not already_there(problem, *begun):
             with suppress(*FAILED):
-                out.append(problem.fitted_with(*begun, base))
+                rough = problem.fitted_with(*begun, base, ROUGH)
+                near = rough.neg2_log_evidence < lead.neg2_log_evidence + BEHIND
+                out.append(_finished(problem, rough, True) if near else rough)
     return out
 
 
