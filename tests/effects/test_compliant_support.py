@@ -13,6 +13,7 @@ from chladni.effects.compliant_support import SupportDirection, on_springs
 from chladni.effects.effect_context import EffectContext, Setup
 from chladni.effects.masses import sensor_mass
 from chladni.effects.model_errors import mesh_errors
+from chladni.effects.rigid_ties import rigid_ties, sprung
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.base_motion import base_motion
@@ -22,6 +23,7 @@ from chladni.fem.released import clamps
 from chladni.geometry.refine import refined
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.added_points import with_points
 from chladni.model.assembly import RigidBody
 from chladni.model.properties import Isotropic
 from chladni.reduced.accuracy import accuracy
@@ -206,6 +208,19 @@ def test_what_hangs_together_is_one_clamp_and_what_all_points_hold_is_none():
     assert [len(c.grids) for c in two] == [3, 3]
     assert not np.concatenate([c.held[:, 5] for c in two]).any()
     assert clamps(replace(flat, supports=drilling)) == ()
+
+
+def test_a_clamped_bolt_is_a_clamp_though_its_spider_is_searched_on_springs():
+    """The held point leads an RBE2; over-constraint puts this tie on a spring in the search."""
+    flat = strip(0.0, L)
+    bolted, (head,) = with_points(flat, flat.points[[0]] + [0, 0, 0.01])
+    body = RigidBody(900, int(head), (0, 1, 2), ((1, 2, 3, 4, 5, 6),) * 3)
+    held = np.array([(int(head), c) for c in range(1, 7)])
+    bolted = replace(bolted, rigid=(body,), supports=held)
+    (tie,) = rigid_ties(bolted)
+    for made in (bolted, sprung(bolted, tie, 1e8)):
+        (clamp,) = clamps(made)
+        assert clamp.grids.tolist() == [bolted.ids[head]]
 
 
 def test_a_free_structure_is_asked_nothing():

@@ -55,8 +55,11 @@ def clamps(assembly: Assembly) -> tuple[Clamp, ...]:
 
 
 def _elements(assembly: Assembly) -> sp.csr_array:
-    """Incidence of points on each element or rigid body (elements, points)."""
-    tables = [assembly.shells.nodes, assembly.beams.nodes, *(s.nodes for s in assembly.solids)]
+    """Incidence of points on each element, spring or rigid body (elements, points)."""
+    springs = [each.nodes[(each.nodes >= 0).all(axis=1)]
+               for each in (assembly.bushes, assembly.springs)]  # fmt: skip
+    solids = (s.nodes for s in assembly.solids)
+    tables = [assembly.shells.nodes, assembly.beams.nodes, *springs, *solids]
     each = [nodes for table in tables for nodes in table.tolist()]
     for body in assembly.rigid:
         if isinstance(body, RigidBody):
