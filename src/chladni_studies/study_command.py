@@ -38,10 +38,10 @@ def run(
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help='Parameter and range (repeatable): "t of inner=0.6:0.8" in the deck\'s units, '
-            '"E=90%:110%" of the deck\'s value, "K of PBUSH 7=10:1e4:log", or an effect '
-            'such as "point-mass at 412=1e-5:2e-4" (10 to 200 g in mm-t-s); default: the '
-            "[[parameter]] of the case."
+            help='Parameter and range (repeatable), in the deck\'s units: "t of inner=0.6:0.8", '
+            '"K of PBUSH 7=10:1e4:log". In per cent of the deck\'s value: "E=90%:110%". An effect: '
+            '"point-mass at 412=1e-5:2e-4" (10 to 200 g in mm-t-s). Default: the [[parameter]] of '
+            "the case."
         ),
     ] = None,
     samples: Annotated[int, typer.Option(help="Maximum number of samples.")] = 100,

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni.effects.search_context import BETTER, MOVES, followed
+from chladni.effects.search_context import BETTER, MOVES, best_places, followed
 
 LONGEST = MOVES + 3
 
@@ -47,3 +47,19 @@ def test_what_explains_nothing_does_not_move():
     known = context(5)
     known.idle = known.own(2, None)[0]
     assert followed(known, 2, np.ones(1), longer_or_shorter)[0] == 2
+
+
+@pytest.mark.parametrize("optimised", [False, True])
+def test_a_strong_effect_leads_by_its_own_optimum_and_by_no_start(optimised):
+    """Its data are sharp: a start beside the optimum scores worse than a wrong place."""
+    places = [SimpleNamespace(point=(float(k), 0.0, 0.0), best=k == 3) for k in range(7)]
+    for e in places:
+        e.starts = lambda: [np.zeros(1), np.ones(1)]
+    known = SimpleNamespace(
+        bases=("null",),
+        scores=lambda e, starts, extended: np.array([[9e4, 5e4] if e.best else [9.0, 8.0]]),
+        own=lambda e, start: (1.0 if e.best else 7.0, start + 0.5),
+    )
+    (led,) = best_places(known, places, 1, anywhere=True, optimised=optimised)
+    assert led.effect.best == optimised
+    assert led.start == pytest.approx(1.5 if optimised else 1.0)

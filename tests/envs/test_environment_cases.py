@@ -107,7 +107,7 @@ def test_info_names_what_is_kept(ready, case):
 
 def test_identify_moves_the_test_on_the_mesh_of_its_case(case, tmp_path):
     """As its sensors do; a recording alone, and a mesh that takes long, move sensors only."""
-    page = identification_page.identification_page
+    page = identification_page.as_page
     (drawing, *_), *_ = (s.blocks for s in page(tmp_path, chladni.identify(case)).sections)
     sides = drawing.content.data["sides"]
     assert list(sides) == ["expanded", "test"]

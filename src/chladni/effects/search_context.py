@@ -213,7 +213,7 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
 
 def best_places(
     context: SearchContext, effects: Sequence[Effect], wanted: int = 2, *, anywhere: bool = False,
-    extended: bool = False, point: np.ndarray | None = None,
+    extended: bool = False, point: np.ndarray | None = None, optimised: bool = False,
 ) -> list[Candidate]:  # fmt: skip
     """The best places of an effect, evaluated at many places with all its starts.
 
@@ -222,13 +222,15 @@ def best_places(
     anywhere : the best wherever they are, not those of different valleys
     extended : see :meth:`SearchContext.scores`
     point : (n_effects, 3)   their places [m], where these are not the points of the effects
+    optimised : each at its own optimum from its best start; a strong effect scores well at no start
     """
     if not effects:
         return []
     point, options = np.array([e.point for e in effects]) if point is None else point, []
     for effect in effects:
         scores = context.scores(effect, effect.starts(), extended)[0]
-        options.append((float(scores.min()), effect.starts()[int(np.argmin(scores))]))
+        start = effect.starts()[int(np.argmin(scores))]
+        options.append(context.own(effect, start) if optimised else (float(scores.min()), start))
     least = np.array([score for score, _ in options])
     best = np.argsort(least)[:wanted] if anywhere else valleys(least, point, wanted=wanted)
     return [Candidate(effects[k], options[k][1], context.bases[-1]) for k in best]

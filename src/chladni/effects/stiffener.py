@@ -203,8 +203,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
     """The lines of grids that explain most, next to the lines of shells that want more bending.
 
     A rib is heavy as well as stiff: lines through the shell that wants more mass are tried, too.
-    Scores of lines of shells are linearised, scores of lines of grids are exact. The best line of
-    grids is moved while it explains more.
+    Scores of lines of shells are linearised, lines of grids have their own optima. The best of them
+    is moved while it explains more.
     """
     where = context.where
     assembly = where.groups.structure.assembly
@@ -229,7 +229,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     if alone:
         leading = best_places(context, effects, BEGUN, anywhere=True)
         effects = [c.effect for c in leading if isinstance(c.effect, Stiffener)]
-    best = best_places(context, effects, FOLLOWED, extended=True)
+    best = best_places(context, effects, FOLLOWED, extended=True, optimised=not alone)
     return [closer(context, best[0].effect, best[0].start) or best[0], *best[1:]] if best else []
 
 
