@@ -279,10 +279,22 @@ def test_the_badge_is_no_surer_than_the_sentence(verdict):
     found = replace(RESULT, verdict=verdict, effects=RESULT.effects * (verdict[0] == "m"))
     assert badge(found) == HEADING[verdict]
     assert badge(replace(found, distrust=("the basis",))) == "Physics may be missing"
-    calibrated = replace(found, distrust=("the basis",), searched=False)
-    assert badge(calibrated) == HEADING[verdict]
     tied = replace(found, one_of=(("crack", "doubler"),))
     assert badge(tied) == (HEADING[verdict] if found.effects else "No effect named")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "distrust", "said"),
+    [
+        ("not in catalogue", ("the basis",), "Calibrated: does not fit"),
+        ("calibration only", ("the basis",), "Calibrated: in doubt"),
+        ("nothing missing", (), "Calibrated: fits"),
+        ("measurement fault", (), "Measurement fault"),
+    ],
+)
+def test_the_badge_of_a_calibration_names_no_search(verdict, distrust, said):
+    found = replace(RESULT, verdict=verdict, distrust=distrust, one_of=(), effects=())
+    assert badge(replace(found, searched=False)) == said
 
 
 def test_a_written_number_that_is_not_the_found_one_has_its_reason(tmp_path):

@@ -20,6 +20,7 @@ from .calibration_blocks import study_sections
 from .level_blocks import level_section
 from .measurement_table import next_measurements
 from .screening_blocks import screening_section
+from .sentence import only_fitted
 from .states_table import of_estimate, states_table
 from .words import criterion, fixed, hertz, number, percent, quantity, share
 
@@ -55,6 +56,9 @@ _FILES = {
 
 def badge(result: DiagnosisResult) -> str:
     """The verdict in a few words, no surer than its sentence."""
+    if only_fitted(result):
+        fits = "in doubt" if result.distrust else "fits"
+        return f"Calibrated: {'does not fit' if result.verdict == 'not in catalogue' else fits}"
     if result.one_of and not result.effects:
         return "No effect named"
     if result.searched and result.distrust and result.verdict in ONE_ANSWER:
