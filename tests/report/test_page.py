@@ -10,6 +10,7 @@ from html.parser import HTMLParser
 import pytest
 
 from chladni.errors import FileError
+from chladni.inference.calibration_result import CalibrationStudy
 from chladni.inference.result import FrequencyError
 from chladni.output import plain
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
@@ -297,11 +298,29 @@ def test_the_badge_of_a_calibration_names_no_search(verdict, distrust, said):
     assert badge(replace(found, searched=False)) == said
 
 
-def test_a_written_number_that_is_not_the_found_one_has_its_reason(tmp_path):
-    for value, told in ((3.1e9, False), (4.9e9, True)):
-        effect = replace(RESULT.effects[0], written=(value,))
-        text, _ = read(write_page(tmp_path, replace(RESULT, effects=(effect,), calibrated=())))
-        assert ("+58 %: fitted without errors of mesh and scatter" in text) == told
+@pytest.mark.parametrize(("value", "told"), [(3.1e9, False), (4.9e9, True)])
+def test_a_written_number_that_is_not_the_found_one_has_its_reason(value, told):
+    """The reason stands in the caption: in a cell it pushes its column off the page."""
+    effect = replace(RESULT.effects[0], written=(value,))
+    (found,) = (s.blocks for s in sections(replace(RESULT, effects=(effect,)), {}, (), (), "")
+                if s.title == "Findings")  # fmt: skip
+    (table,) = (b for b in found if isinstance(b, Table) and b.columns[0] == "parameter")
+    assert table.rows[0][2].endswith(" (+58 %)") == told
+    assert ("fitted without errors of mesh and scatter" in table.caption) == told
+
+
+@pytest.mark.parametrize("changed", [True, False])
+def test_cells_of_calibrated_values_are_short_and_the_caption_explains_them(changed):
+    (moved,) = RESULT.calibrated[:1]
+    written = (replace(moved, written_value=1.1 * moved.estimate.value),)
+    verdict = "calibration only" if changed else "nothing missing"
+    found = replace(RESULT, verdict=verdict, study=CalibrationStudy(), calibrated=written)
+    (blocks,) = (s.blocks for s in sections(found, {}, (), (), "")
+                 if s.title == "Calibrated parameters")  # fmt: skip
+    assert blocks[0].rows[0][4].endswith(" (+10 %)") == changed
+    assert len(blocks[0].rows[0][4]) < 20
+    assert ("in brackets" in blocks[0].caption) == changed
+    assert ("keeps its values" in blocks[0].caption) != changed
 
 
 @pytest.mark.parametrize("compared", ["responses", "frequencies"])
