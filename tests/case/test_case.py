@@ -211,7 +211,7 @@ def test_labels_without_a_place(folder, outputs, said):
 
 def test_a_place_in_millimetres_is_noticed(folder):
     change(folder, "0.25,0.1,0.002", "250,100,2", "sensors.csv")
-    with pytest.raises(ChladniError, match=r"269 m from .* places are in metres"):
+    with pytest.raises(ChladniError, match=r"^sensors.csv, line \d: .*269 m from .* metres"):
         load_case(folder)
 
 

@@ -8,6 +8,7 @@ import pytest
 from chladni.inference.calibration_result import (
     ArticleParameter,
     ArticleValue,
+    Basin,
     CalibrationStudy,
     PosteriorSample,
     RegionShare,
@@ -52,6 +53,15 @@ def test_each_part_of_a_study_has_its_table():
     assert isinstance(words, Code)
     assert words.lines == ("[[parameter]]", 'parts = ["a"]', 'field = "E"')
     assert not any(sections(CalibrationStudy()).values())
+
+
+def test_a_basin_without_starts_is_explained_and_a_stiffness_beyond_a_doubling_is_a_factor():
+    far = replace(NEXT, regions=(RegionShare("doubler", 0.6, 0.2, 2966.48, 0.9),))
+    found = sections(CalibrationStudy(basins=(Basin(0.0, 0, ()),), starts=12, guidance=far))
+    (basins,), (regions, *_) = found["Basins of the fit"], found["Regions to free next"]
+    assert basins.rows[0][1] == "0"
+    assert "where it alone ended, starts is 0" in basins.caption
+    assert regions.rows[0][3] == "2966 times"
 
 
 def test_chains_that_have_not_converged_say_so_on_the_page():

@@ -54,6 +54,15 @@ def test_outside_the_catalogue_the_place_that_does_not_fit_comes_first():
     assert "hem" in found[0]
 
 
+@pytest.mark.parametrize("verdict", ["not in catalogue", "calibration only", "nothing missing"])
+def test_a_calibration_is_followed_by_a_diagnosis(verdict):
+    spot = {"text": "largest near 293 Hz", "grid": 9, "parts": ["hem"]}
+    test = {"passes": False, "p": 0.0, "what": "misfit", "where": [spot]}
+    found = steps(verdict=verdict, searched=False, adequate=test)
+    assert found[0] == "Run chladni diagnose, which searches for missing physics."
+    assert not any("grid 9" in s for s in found)
+
+
 def test_a_misfit_of_all_modes_is_at_no_place():
     spot = {"text": "over all modes", "grid": None, "parts": []}
     test = {"passes": False, "p": 0.0, "what": "misfit", "where": [spot]}

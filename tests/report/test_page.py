@@ -10,6 +10,7 @@ from html.parser import HTMLParser
 import pytest
 
 from chladni.errors import FileError
+from chladni.inference.calibration_result import CalibrationStudy
 from chladni.inference.result import FrequencyError
 from chladni.output import plain
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
@@ -279,17 +280,47 @@ def test_the_badge_is_no_surer_than_the_sentence(verdict):
     found = replace(RESULT, verdict=verdict, effects=RESULT.effects * (verdict[0] == "m"))
     assert badge(found) == HEADING[verdict]
     assert badge(replace(found, distrust=("the basis",))) == "Physics may be missing"
-    calibrated = replace(found, distrust=("the basis",), searched=False)
-    assert badge(calibrated) == HEADING[verdict]
     tied = replace(found, one_of=(("crack", "doubler"),))
     assert badge(tied) == (HEADING[verdict] if found.effects else "No effect named")
 
 
-def test_a_written_number_that_is_not_the_found_one_has_its_reason(tmp_path):
-    for value, told in ((3.1e9, False), (4.9e9, True)):
-        effect = replace(RESULT.effects[0], written=(value,))
-        text, _ = read(write_page(tmp_path, replace(RESULT, effects=(effect,), calibrated=())))
-        assert ("+58 %: fitted without errors of mesh and scatter" in text) == told
+@pytest.mark.parametrize(
+    ("verdict", "distrust", "said"),
+    [
+        ("not in catalogue", ("the basis",), "Calibrated: does not fit"),
+        ("calibration only", ("the basis",), "Calibrated: in doubt"),
+        ("nothing missing", (), "Calibrated: fits"),
+        ("measurement fault", (), "Measurement fault"),
+    ],
+)
+def test_the_badge_of_a_calibration_names_no_search(verdict, distrust, said):
+    found = replace(RESULT, verdict=verdict, distrust=distrust, one_of=(), effects=())
+    assert badge(replace(found, searched=False)) == said
+
+
+@pytest.mark.parametrize(("value", "told"), [(3.1e9, False), (4.9e9, True)])
+def test_a_written_number_that_is_not_the_found_one_has_its_reason(value, told):
+    """The reason stands in the caption: in a cell it pushes its column off the page."""
+    effect = replace(RESULT.effects[0], written=(value,))
+    (found,) = (s.blocks for s in sections(replace(RESULT, effects=(effect,)), {}, (), (), "")
+                if s.title == "Findings")  # fmt: skip
+    (table,) = (b for b in found if isinstance(b, Table) and b.columns[0] == "parameter")
+    assert table.rows[0][2].endswith(" (+58 %)") == told
+    assert ("fitted without errors of mesh and scatter" in table.caption) == told
+
+
+@pytest.mark.parametrize("changed", [True, False])
+def test_cells_of_calibrated_values_are_short_and_the_caption_explains_them(changed):
+    (moved,) = RESULT.calibrated[:1]
+    written = (replace(moved, written_value=1.1 * moved.estimate.value),)
+    verdict = "calibration only" if changed else "nothing missing"
+    found = replace(RESULT, verdict=verdict, study=CalibrationStudy(), calibrated=written)
+    (blocks,) = (s.blocks for s in sections(found, {}, (), (), "")
+                 if s.title == "Calibrated parameters")  # fmt: skip
+    assert blocks[0].rows[0][4].endswith(" (+10 %)") == changed
+    assert len(blocks[0].rows[0][4]) < 20
+    assert ("in brackets" in blocks[0].caption) == changed
+    assert ("keeps its values" in blocks[0].caption) != changed
 
 
 @pytest.mark.parametrize("compared", ["responses", "frequencies"])

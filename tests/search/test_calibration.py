@@ -173,6 +173,14 @@ def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
     assert "largest on top" in stands
 
 
+@pytest.mark.parametrize(
+    ("x", "said"), [(np.log(3.198), "stiffer by a factor of 3.2"), (-7.0, "softer by a factor of")]
+)
+def test_a_stiffness_beyond_a_doubling_is_a_factor(reduced, x, said):
+    *_, stands = compensating(calibrated_plate(reduced, x), AGREES, None, SCALES, None, True)
+    assert f"plate {said}" in stands
+
+
 def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
     """Where the mesh errs by more than any value, nothing changes, and the weighing says so."""
     mass = MassComparison(1.4, 1.5)

@@ -13,7 +13,7 @@ from tests.search.test_several import HERE, THERE, lump, null_of, problem_of
 from chladni.fem.energy import mass_properties
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.inference.likelihood import LN10
-from chladni.output import write_npz
+from chladni.output import run_folder, write_npz
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import measurement_forecasts
 from chladni.search.conclusion import open_explanations
@@ -310,6 +310,13 @@ def test_a_fixed_sensor_is_forecast_in_its_own_direction(problem, tied):
                     FurtherPlaces(every.grids[[5]], np.ones(1), at))  # fmt: skip
     assert [c.fixed for c in known.candidates] == [True, False]
     assert_allclose(known.information([0]), known.information([1]), rtol=0.05)
+
+
+def test_a_calibration_has_no_next_measurement(tmp_path):
+    with run_folder(tmp_path / "calib", "calibrate"):
+        pass
+    said = refused("next", tmp_path / "calib", "--out", tmp_path / "out")
+    assert "calib is a calibration; next needs the folder of a diagnosis" in said
 
 
 @pytest.mark.parametrize(

@@ -267,11 +267,12 @@ def test_places_off_a_deck_in_the_wrong_units_point_to_the_units(deck, frf, tmp_
         chladni.load_case(tmp_path)
 
 
-def test_a_recording_in_the_place_of_the_deck_is_named(deck, frf, tmp_path):
+@pytest.mark.parametrize("command", ["init", "check"])
+def test_a_recording_in_the_place_of_the_deck_is_named(deck, frf, tmp_path, command):
     """Deck and recording are easily given in the wrong order."""
     write_uff(tmp_path / "a.uff", frf)
-    sentence = refused("init", tmp_path / "a.uff", deck, "--out", tmp_path / "case")
-    assert "a.uff is a universal file, not a Nastran deck" in sentence
+    sentence = refused(command, tmp_path / "a.uff", deck, "--out", tmp_path / "case")
+    assert f"the deck comes first, as in {deck} {tmp_path / 'a.uff'}" in sentence
 
 
 def test_a_plan_is_read(deck, frf, tmp_path):

@@ -43,6 +43,14 @@ def test_a_deck_that_fits_in_no_system_says_so(case):
         refuse_other_units(heavy)
 
 
+def test_grams_are_refused_in_words_of_case_and_command(case):
+    """The mass may be an option, and where no case is written its name is that of the deck."""
+    grams = replace(case, setup=replace(case.setup, mass=1e3 * case.setup.mass))
+    said = r"^\S+: the deck read in SI weighs .*: the mass is in kg: write"
+    with pytest.raises(FileError, match=said):
+        refuse_other_units(grams)
+
+
 @pytest.mark.parametrize("times", [0.21, 1.0, 4.9])
 def test_what_an_effect_may_weigh_is_not_refused(case, times):
     deck = chladni.modes(case, 7).mass

@@ -79,8 +79,11 @@ def recorded_labels(
 
 
 def placed(made: Assembly, sensors: Sequence[Sensor], where: str) -> MeasuredDofs:
-    """Sensors (or exciters) on the structure; ``where`` begins the sentence of what is refused."""
-    rows = [_place(f"{where}: label {s.label!r}", s, made) for s in sensors]
+    """Sensors (or exciters) on the structure.
+
+    File and line of a sensor, else ``where``, begin the sentence of what is refused.
+    """
+    rows = [_place(f"{s.source or where}: label {s.label!r}", s, made) for s in sensors]
     return MeasuredDofs(
         labels=tuple(s.label for s in sensors),
         grids=np.array([r[0] for r in rows], dtype=np.int64),

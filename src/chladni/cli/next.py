@@ -16,6 +16,7 @@ from ..report.information_map import information_map, shown_of_run
 from ..report.measurement_table import next_measurements
 from ..report.mesh_drawings import mesh_of
 from ..report.page import write_sections
+from ..report.run_list import finished_run
 from ..report.shown import Shown
 from ..report.typed_fields import as_data
 from ..report.words import odds_of
@@ -100,6 +101,12 @@ def run(
             raise FileError(
                 f"{source} is no folder of a diagnosis; before any test give --effects, for "
                 "example --effects weld-missing,adhesive-stiffness"
+            )
+        run = finished_run(source)
+        if run is not None and run.command == "calibrate":
+            raise FileError(
+                f"{source} is a calibration; next needs the folder of a diagnosis, which "
+                "chladni diagnose writes"
             )
         known = read_outlook(source)
         say(f"open: {', '.join(known.names)}" if known.unknown is None else "nothing is tied")

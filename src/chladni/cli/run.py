@@ -202,8 +202,9 @@ def opened(
     from ..case import load_case
     from ..io.mesh_format import refuse_foreign
     from ..workflows.given_case import given_case
-    from ..workflows.loaded_model import is_case, similar_names
+    from ..workflows.loaded_model import is_case, refuse_exchanged, similar_names
 
+    refuse_exchanged(source, recordings)
     if recordings or words:
         return given_case(source, list(recordings), words)
     if not source.exists():

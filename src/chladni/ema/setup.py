@@ -221,6 +221,7 @@ class Sensor(ShownBriefly):
     position_sd : standard deviation of the place [m]
     gain : recorded value over true value [-]
     use : False leaves an output out
+    source : file and line that say it; "" if no table does
     """
 
     label: str
@@ -232,6 +233,7 @@ class Sensor(ShownBriefly):
     position_sd: float = 0.0  # [m]
     gain: float = 1.0  # what is recorded over what was there
     use: bool = True  # an output that is left out is as if it had not been recorded
+    source: str = ""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ _KNOWN = (
 )
 _BASINS = (
     "Fits from a Latin hypercube of {n} starts. Starts that end within 1 in -2 ln evidence and one "
-    "standard deviation of every parameter are one basin."
+    "standard deviation of every parameter are one basin. The calibration's own fit, from the "
+    "deck's values, is not counted: where it alone ended, starts is 0."
 )
 _PROFILE = (
     "-2 ln profile likelihood above the best, all other parameters fitted again, at one and two "

@@ -8,7 +8,7 @@ from ..errors import named
 from ..inference.result import CalibratedParameter
 from ..search.next_measurement import ODDS
 from ..workflows.diagnosis_result import DiagnosisResult
-from .sentence import against
+from .sentence import against, only_fitted
 from .words import interval, percent, quantity
 
 _FAR = 0.05  # relative change of a calibration parameter that is worth a measurement
@@ -38,7 +38,8 @@ def _steps(result: DiagnosisResult) -> list[str]:
     first, last = [*_advised(result), *_settle(result)], list[str]()
     if not result.one_of:
         first, last = [], _advised(result)
-    of_verdict = by_verdict.get(result.verdict, _keep)(result)
+    advise = _search if only_fitted(result) else by_verdict.get(result.verdict, _keep)
+    of_verdict = advise(result)
     steps = [*_mend(result), *first, *of_verdict, *_weigh(result), *last]
     return list(dict.fromkeys(steps))
 
@@ -198,12 +199,13 @@ def _odd_checks(result: DiagnosisResult) -> list[str]:
     return [f"Check the recording, {c.name}: {c.result}." for c in checks if c.passed is False]
 
 
+def _search(result: DiagnosisResult) -> list[str]:
+    """Advise after a calibration, which cannot say where physics is missing."""
+    run = "Run chladni diagnose, which searches for missing physics."
+    return [run, *_odd_checks(result), *_take_the_deck(result)]
+
+
 def _check_values(result: DiagnosisResult) -> list[str]:
-    if not result.searched:
-        return [
-            *_take_the_deck(result),
-            "Run chladni diagnose, which searches for missing physics.",
-        ]
     finer = [
         f"Refine the mesh, which takes frequencies up to {100 * result.mesh_error:.2g} % off, and "
         "diagnose again: effects that are smaller than this are then seen."

@@ -39,7 +39,7 @@ def _sentence(result: DiagnosisResult) -> str:
         signs = ", ".join(dict.fromkeys(t.signature for t in result.levels if t.sentence))
         why = what or signs or "no linear model fits"
         return f"The structure does not answer in proportion to the force: {why}."
-    if not result.searched and not result.effects:
+    if only_fitted(result):
         return f"Calibration parameters were fitted; missing physics was not searched{gain}."
     if verdict in ("calibration only", "nothing missing") and result.one_of:
         better = " or ".join(result.one_of[0][1:])
@@ -72,6 +72,12 @@ def _sentence(result: DiagnosisResult) -> str:
         near = f": {what}" if what else ""
         return f"The model lacks physics that is not in the catalogue{near}."
     return verdict
+
+
+def only_fitted(result: DiagnosisResult) -> bool:
+    """True for a calibration: no physics was searched, and the recording is not at fault."""
+    other = ("missing physics", "measurement fault", "nonlinear")
+    return not (result.searched or result.effects or result.verdict in other)
 
 
 def against(result: DiagnosisResult) -> str:

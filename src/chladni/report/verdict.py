@@ -10,7 +10,6 @@ from ..inference.calibration_result import ParameterKnowledge
 from ..inference.result import (
     Adequacy,
     Agreement,
-    CalibratedParameter,
     LeftPlace,
     NamedEffect,
 )
@@ -20,6 +19,7 @@ from .calibration_blocks import study_sections
 from .level_blocks import level_section
 from .measurement_table import next_measurements
 from .screening_blocks import screening_section
+from .sentence import only_fitted
 from .states_table import of_estimate, states_table
 from .words import criterion, fixed, hertz, number, percent, quantity, share
 
@@ -55,6 +55,9 @@ _FILES = {
 
 def badge(result: DiagnosisResult) -> str:
     """The verdict in a few words, no surer than its sentence."""
+    if only_fitted(result):
+        fits = "in doubt" if result.distrust else "fits"
+        return f"Calibrated: {'does not fit' if result.verdict == 'not in catalogue' else fits}"
     if result.one_of and not result.effects:
         return "No effect named"
     if result.searched and result.distrust and result.verdict in ONE_ANSWER:
@@ -191,7 +194,8 @@ def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
         place = [(name, text) for name, text in _place(effect.where) if text]
         if rows := _estimates(effect):
             columns = ("parameter", "found (95 % interval)", "updated deck")[: len(rows[0])]
-            blocks.append(Table(columns, rows, ("parameter",)))
+            note = _BRACKETS if any("%" in cell for row in rows for cell in row[2:]) else ""
+            blocks.append(Table(columns, rows, ("parameter",), note))
         if place:
             blocks.append(Table(("where", ""), place, ("where", "")))
     return blocks
@@ -233,7 +237,9 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
             quantity(c.deck_value, c.estimate.unit),
             of_estimate(c.estimate),
             percent(c.estimate.value, c.deck_value),
-            _written(c, result),
+            _beside(
+                c.written_value, c.estimate.value if result.deck_changed else None, c.estimate.unit
+            ),
         )
         for c in result.calibrated
     ]
@@ -244,23 +250,16 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
         if f.frozen
     ]  # fmt: skip
     heads = ("parameter", "deck", "found (95 % interval)", "change", "updated deck")
-    return [Table(heads, rows, ("parameter",), _REACHED)]
+    note = f"{_REACHED} {_BRACKETS}" if result.deck_changed else f"{_REACHED} {_KEPT}"
+    return [Table(heads, rows, ("parameter",), note)]
 
 
-def _written(c: CalibratedParameter, result: DiagnosisResult) -> str:
-    """The value of the updated deck, with the reason where it is not the one that was found."""
-    if not result.deck_changed:
-        value = quantity(c.written_value, c.estimate.unit)
-        return f"{value} (kept: the found value gains too little)"
-    return _beside(c.written_value, c.estimate.value, c.estimate.unit)
-
-
-def _beside(written: float | None, found: float, unit: str) -> str:
-    """A written value, with the reason where it is not the one that was found."""
+def _beside(written: float | None, found: float | None, unit: str) -> str:
+    """A written value, with its difference from the one that was found, if there is any."""
     value = quantity(written, unit)
     if written is None or not found or abs(written / found - 1) < APART:
         return value
-    return f"{value} ({percent(written, found)}: fitted without errors of mesh and scatter)"
+    return f"{value} ({percent(written, found)})"
 
 
 def _range(p: ParameterKnowledge) -> str:
@@ -274,6 +273,11 @@ _REACHED = (
     "does not contain these errors and may need other values for the same response. Scores and "
     "Frequencies show the result: before and after."
 )
+_BRACKETS = (
+    "Updated deck, in brackets: difference from the found value, because it was fitted without "
+    "errors of mesh and scatter."
+)
+_KEPT = "The deck keeps its values, because the found ones gain too little."
 
 
 def _scores(result: DiagnosisResult) -> Table:

@@ -95,15 +95,17 @@ def odds_of(p: float) -> str:
 
 
 def percent(new: float | None, old: float | None) -> str:
-    """Format a change in per cent, to a hundredth if it is small.
+    """Format a change in per cent, to a hundredth if it is small; beyond a doubling as a factor.
 
     >>> percent(0.02, 0.2), percent(1.03, 1.0), percent(0.9997, 1.0), percent(1.0, None)
     ('-90 %', '+3.0 %', '-0.03 %', '–')
-    >>> percent(0.999999, 1.0)
-    '0.00 %'
+    >>> percent(0.999999, 1.0), percent(2.0, 1.0), percent(7.5, 2.0)
+    ('0.00 %', '+100 %', '3.75 times')
     """
     if new is None or not old or not math.isfinite(new / old):
         return _NONE
+    if new / old > 2:
+        return f"{number(new / old, 3)} times"
     change = 100 * (new / old - 1)
     decimals = 0 if abs(change) >= 10 else 1 if abs(change) >= 1 else 2
     sign = "+" if round(change, decimals) > 0 else ""

@@ -100,7 +100,16 @@ def _log_change(effect: Effect, x: np.ndarray) -> float:
 
 
 def _more(of: np.ndarray, up: str, down: str) -> Iterator[str]:
-    """A change of more than half a per cent and its standard deviation in words."""
+    """A change of more than half a per cent and its standard deviation in words.
+
+    It is a factor where it is beyond a doubling or a half.
+    """
     change, variance = of
+    way = up if change > 0 else down
     if abs(change) > max(LEAST, np.sqrt(variance)):
-        yield f"{100 * abs(np.expm1(change)):.1f} % {up if change > 0 else down}"
+        far = abs(change) > np.log(2)
+        yield (
+            f"{way} by a factor of {np.exp(abs(change)):.3g}"
+            if far
+            else (f"{100 * abs(np.expm1(change)):.1f} % {way}")
+        )

@@ -272,12 +272,17 @@ def _size(case: Case) -> list[CaseFinding]:
 
 def _labels(case: Case) -> list[CaseFinding]:
     """Report a row of the table that no recording has, where a recorded dof has no row."""
-    out = []
-    for table, found in ((case.setup.outputs, case.outputs), (case.setup.inputs, case.inputs)):
-        rows = unrecorded_rows(table, found)
+    out, setup = [], case.setup
+    sides = ((setup.outputs, case.outputs), (setup.inputs, case.inputs))
+    lost = [unrecorded_rows(table, found) for table, found in sides]
+    every, unused = sum(s.use for table, _ in sides for s in table), sum(map(len, lost))
+    for (table, found), rows in zip(sides, lost, strict=True):
         bare = [label for label in found.labels if label not in {s.label for s in table}]
         if rows and bare:
             said = f"the table of sensors has {rows[0]}, the recording {bare[0]}"
+            if unused == every:
+                none = f"0 of {every} {'row is' if every == 1 else 'rows are'} used: {said}"
+                return [CaseFinding(none, "correct the labels, or leave the table out", True)]
             out.append(CaseFinding(said, "correct the label, else the row is not used"))
     return out
 

@@ -24,7 +24,7 @@ from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..units import Units
 from ..units import units as unit_system
-from .loaded_model import load_deck, similar_names
+from .loaded_model import load_deck, refuse_exchanged, similar_names
 from .matched_dofs import MatchedDof, matched
 from .unit_guess import guessed_units
 
@@ -90,6 +90,7 @@ def draft(
             raise FileError(
                 f"{path}: a case.toml holds only printable UTF-8; rename this file or its folder"
             )
+    refuse_exchanged(deck, recordings)
     bare = load_deck(deck, None, allow)
     if units is None:
         guess = guessed_units(assembly(bare.deck), deck.name)

@@ -275,6 +275,23 @@ def is_case(source: Path) -> bool:
     return source.is_dir() or source.suffix == ".toml"
 
 
+def refuse_exchanged(source: Path, recordings: Sequence[Path]) -> None:
+    """Refuse a recording in the place of the deck.
+
+    Raises
+    ------
+    FileError
+        If the first file has the ending of a recording, and another one has not.
+    """
+    from ..io.tables.read_tables import ENDINGS
+
+    deck = next((p for p in recordings if p.suffix.lower() not in ENDINGS), None)
+    if deck is not None and source.is_file() and source.suffix.lower() in ENDINGS:
+        raise FileError(
+            f"{source} is a recording by its name: the deck comes first, as in {deck} {source}"
+        )
+
+
 def similar_names(source: Path) -> str:
     """List names similar to a missing one, else files and cases with the same ending."""
     if not source.parent.is_dir():

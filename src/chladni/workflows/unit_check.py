@@ -50,12 +50,12 @@ def _refuse_by_mass(case: Case) -> None:
             f"{mass * UNITS[fits[0]].mass / case.units.mass:.4g} kg"
         )
     elif 1 / FAR <= 1e3 * mass / weighed <= FAR:
-        advice = f"[test] mass is in kg: write {weighed / 1e3:.4g} if {weighed:.4g} g were weighed"
+        advice = f"the mass is in kg: write {weighed / 1e3:.4g} if {weighed:.4g} g were weighed"
     else:
-        advice = "its weight is right in no unit system; check its densities and [test] mass"
+        advice = "its weight is right in no unit system; check its densities and the mass"
     raise FileError(
-        f"{case.path}: {case.deck.path.name} read in {case.units.name} weighs {mass:.4g} kg, the "
-        f"article {weighed:.4g} kg: {advice}"
+        f"{case.path}: the deck read in {case.units.name} weighs {mass:.4g} kg, the article "
+        f"{weighed:.4g} kg: {advice}"
     )
 
 

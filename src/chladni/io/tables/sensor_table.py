@@ -151,6 +151,7 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
         position_sd=sd,
         gain=gain,
         use=use == "yes",
+        source=where,
     )
 
 
