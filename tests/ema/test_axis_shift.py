@@ -48,6 +48,20 @@ def test_foam_below_the_band_is_no_shift():
     assert (findings, check.passed) == ([], True)
 
 
+@pytest.mark.parametrize("cords", [[5.5], [2.4, 5.5], [7.0]])
+def test_a_mode_on_cords_that_was_not_identified_is_no_shift(cords):
+    """It lies below the band, and its pull on the first lines is that of an axis that is off."""
+    shapes = np.random.default_rng(0).normal(size=(3, len(cords))) * np.sqrt(3)
+    swing = modal_sum(2j * np.pi * F, cords, shapes, shapes[:1], damping=0.02)
+    frf = plate_like()
+    frf = noisy(replace(frf, values=frf.values + swing), 0.004, seed=3, stated=False)
+    frf = frf.sel(band=(10.0, 190.0))
+    modes = identify(frf)
+    modes = replace(modes, poles=modes.poles[modes.frequency > 10.0])
+    findings, check = axis_check(frf, modes)
+    assert (findings, check.passed) == ([], True)
+
+
 def test_modes_that_do_not_fit_decide_nothing():
     frf = recorded(2.0)
     findings, check = axis_check(frf, replace(identify(frf), chi=100.0))

@@ -22,6 +22,7 @@ from .pole_selection import Rule
 SURE = 5.0  # standard deviations of a shift that is named, and root of the fall of χ²
 POOR = 3.0  # times the noise: an identification that leaves more does not hold the axis
 REACH = 0.9  # of the lowest line: the greatest shift that is tried
+BELOW = 0.3, 0.6, 0.85  # of the lowest line: where a mode below the band is begun
 TRIALS, STEPS = 37, 10  # shifts, and steps of a fit
 DAMPED, RELAXED = 0.1, 0.99  # largest damping ratio of a mode, and of foam below the modes
 LINES, CHANNELS = 500, 16  # to compare on: they show a shift of a few lines as well as all
@@ -38,8 +39,8 @@ def axis_shift(
     Poles move with the axis, and residues are fitted again. This profile is smooth, and its fall
     is at most that of a whole fit, which is made at its lowest value. Poles below half of the
     lowest line may stand for a shift, so each shift is tried with them and without, at the price of
-    a pole. A structure on foam or rubber has poles that relax, which a shift would imitate; so they
-    compete with it.
+    a pole. A structure on foam or rubber has poles that relax, and one on cords has modes below the
+    band, whose pull a shift would imitate; so they compete with it.
     """
     keep = np.flatnonzero(kept_lines(frf, found.band, use))
     keep = keep[:: max(1, len(keep) // LINES)]
@@ -71,9 +72,10 @@ def axis_shift(
         return None
     best = float(trials[k] + np.clip(-slope / rise, -1, 1) * h)
     noise = max(1.0, whole[1][1] ** 2)
+    cords = [np.append(sets[-1], 2j * np.pi * lowest * x) for x in BELOW]
     zero = min(
         fitted(0.0, each, steps, most)[0]
-        for each in sets
+        for each in (*sets, *cords)
         for steps, most in ((STEPS, DAMPED), (3 * STEPS, RELAXED))
     )
     gain = (zero - fitted(best, p, STEPS)[0]) / noise
