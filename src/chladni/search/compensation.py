@@ -28,7 +28,7 @@ def compensating(
     fit: Fit, agreement: Agreement | None, mass: MassComparison | None,
     weighed: MassMeasurement | None, spot: ResidualLocalisation | None, responses: bool,
 ) -> tuple[str, ...]:  # fmt: skip
-    """What a calibration stands for, and the reasons why; empty where it does not compensate.
+    """The effects that a calibration stands for, and why; empty where it does not compensate.
 
     Parameters
     ----------
