@@ -117,7 +117,10 @@ class ModelError(ChladniError, ValueError):
 
 
 class AccuracyError(ChladniError, ArithmeticError):
-    """A computed result failed the check its own theory provides."""
+    """A computed result failed the check its own theory provides; each argument is one reason."""
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.args))
 
 
 class Interrupted(KeyboardInterrupt):

@@ -166,7 +166,7 @@ def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
     agreement = replace(AGREES, held_out=Scores(1.0, held))
     mass, spot = MassComparison(1.4, model), SimpleNamespace(parts=("top",))
     plate = calibrated_plate(reduced, x)
-    *reasons, stands = compensating(plate, agreement, mass, SCALES, spot, True)
+    stands, *reasons = compensating(plate, agreement, mass, SCALES, spot, True)
     assert len(reasons) == 1
     assert said in reasons[0]
     assert f"plate {100 * np.expm1(x):.1f} % stiffer" in stands
@@ -177,7 +177,7 @@ def test_each_sign_of_compensation_is_enough(reduced, x, held, model, said):
     ("x", "said"), [(np.log(3.198), "stiffer by a factor of 3.2"), (-7.0, "softer by a factor of")]
 )
 def test_a_stiffness_beyond_a_doubling_is_a_factor(reduced, x, said):
-    *_, stands = compensating(calibrated_plate(reduced, x), AGREES, None, SCALES, None, True)
+    stands, *_ = compensating(calibrated_plate(reduced, x), AGREES, None, SCALES, None, True)
     assert f"plate {said}" in stands
 
 
@@ -186,7 +186,7 @@ def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
     mass = MassComparison(1.4, 1.5)
     for x, sd in ((0.0, 0.01), (-0.05, 0.1)):  # what lies within one sd of it is no change
         plate = calibrated_plate(reduced, x, sd)
-        first, last = compensating(plate, AGREES, mass, SCALES, None, True)
+        last, first = compensating(plate, AGREES, mass, SCALES, None, True)
         assert "weighs 1.5 kg" in first
         assert "the deck keeps its values" in last
 
@@ -194,7 +194,7 @@ def test_a_deck_that_keeps_its_values_beside_the_scales_is_not_trusted(reduced):
 def test_advice_on_level_and_places_goes_to_data_that_have_them(reduced):
     worse = replace(AGREES, held_out=Scores(1.0, 1.5))
     plate = calibrated_plate(reduced, 0.05)
-    ways = [compensating(plate, worse, None, None, None, given)[0] for given in (True, False)]
+    ways = [compensating(plate, worse, None, None, None, given)[1] for given in (True, False)]
     assert all("try chladni diagnose" in said for said in ways)
     assert ["position_sd" in said for said in ways] == [True, False]
 

@@ -89,8 +89,8 @@ def test_a_diagnosis_compares_its_name_with_what_calibrate_answers(diagnosed, ca
 def test_json_of_a_calibration_is_the_result_of_its_function(calibrated, folder, tmp_path):
     """E, rho and t stand for a mass here and foretell worse, so that the exit code is 3."""
     found = written("calibrate", "diagnosis.json", folder, tmp_path / "out", code=3)
-    assert "predicts the held-out data worse" in calibrated.distrust[0]
-    assert any("the calibration is compensating" in said for said in calibrated.distrust)
+    assert "the calibration is compensating" in calibrated.distrust[0]
+    assert any("predicts the held-out data worse" in said for said in calibrated.distrust)
     files = found.pop("files")
     assert (files["deck"], files["calibration"]) == ("calibrated.bdf", "calibration.json")
     due = plain(to_json(calibrated))

@@ -10,6 +10,7 @@ from tests.builders.cases import changed_case
 from tests.builders.commands import ran
 
 import chladni
+from chladni.cli import app
 from chladni.errors import AccuracyError, FileError
 from chladni.io.nastran import write_assembly
 from chladni.reduced.accuracy import Accuracy
@@ -78,6 +79,13 @@ def test_a_result_that_is_trusted_hands_itself_out(diagnosed):
     assert diagnosed.trusted() is diagnosed
     with pytest.raises(AccuracyError, match="too narrow"):
         replace(diagnosed, distrust=("the basis is too narrow",)).trusted()
+
+
+def test_each_reason_for_doubt_is_a_line(diagnosed, capsys):
+    doubted = replace(diagnosed, distrust=("the basis is too narrow", "t ended\nfar off"))
+    assert app._run(lambda: doubted.trusted() and 0) == 3
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["chladni: the basis is too narrow", "chladni: t ended far off"]
 
 
 def test_frfs_beside_the_poles_that_are_compared_are_screened_alone(case, tmp_path):

@@ -314,7 +314,8 @@ def _ending() -> Iterator[list[int]]:
 
 
 def _said(error: object, code: int) -> int:
-    say(f"chladni: {' '.join(str(error).split())}", error=True)
+    for reason in error.args if isinstance(error, AccuracyError) else (error,):
+        say(f"chladni: {' '.join(str(reason).split())}", error=True)
     return code
 
 

@@ -28,7 +28,7 @@ def compensating(
     fit: Fit, agreement: Agreement | None, mass: MassComparison | None,
     weighed: MassMeasurement | None, spot: ResidualLocalisation | None, responses: bool,
 ) -> tuple[str, ...]:  # fmt: skip
-    """Reasons why a calibration compensates, and what it stands for; empty where it does not.
+    """The effects that a calibration stands for, and why; empty where it does not compensate.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def compensating(
         *implausible_values(fit),
     )  # fmt: skip
     place = "" if spot is None or not spot.parts else f"on {', '.join(spot.parts[:2])}"
-    return (*reasons, _stands_for(fit, place)) if reasons else ()
+    return (_stands_for(fit, place), *reasons) if reasons else ()
 
 
 def _leaves_the_scales(

@@ -150,7 +150,7 @@ class DiagnosisResult(Result):
             If there is a reason not to trust it.
         """
         if self.distrust:
-            raise AccuracyError("; ".join(self.distrust))
+            raise AccuracyError(*self.distrust)
         return self
 
 

@@ -141,7 +141,7 @@ class Identification(Result):
             If there is a reason not to trust it.
         """
         if self.distrust:
-            raise AccuracyError("; ".join(self.distrust))
+            raise AccuracyError(*self.distrust)
         return self
 
 
