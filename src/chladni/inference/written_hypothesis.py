@@ -22,14 +22,14 @@ def as_written(
 
     The fit begins at the found or at the given values, where its residual is smaller.
 
-    Every deck is a fit of its own, so that the decks of one diagnosis are nested: the given deck,
-    the calibrated deck and the deck with the effects. Each is judged as its file stands. Mesh
+    Every deck is a fit of its own. The decks of one diagnosis are nested: the given deck, the
+    calibrated deck and the deck with the effects. Each is judged as its file stands. Mesh
     error, folds and scatter are no numbers of a deck. Joints whose change exceeds their usual
     scatter are calibrated, too: without them a deck whose adhesive is six times too soft stays 4 %
     off in frequency.
 
-    A named effect that no card can hold acts in the data: it stays in the fit, so that the numbers
-    of the deck do not compensate for it.
+    A named effect that no card can hold acts in the data. It stays in the fit: otherwise the
+    numbers of the deck would compensate for it.
 
     The learned error of the model stays in the likelihood. Otherwise the parameters would
     compensate for mesh and joints. On a coarse plate with a concealed crack E went to 264 GPa for

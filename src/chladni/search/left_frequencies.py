@@ -61,7 +61,8 @@ def folds(f: np.ndarray, test: np.ndarray, model: Modelled) -> tuple[float, floa
     """κ of the folds where the deviations are in proportion to theirs, and the share it removes.
 
     A fold is in series with the sheet. If it is κ times as stiff as in the deck, (f / f_test)² =
-    C (1 + s (1/κ - 1)). s is the share of bending at folds in the strain energy, C common to all.
+    C (1 + s (1/κ - 1)). Here s is the share of bending at folds in the strain energy. All modes
+    have the same C.
     """
     from scipy.stats import f as fisher
 

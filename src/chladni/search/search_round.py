@@ -355,7 +355,7 @@ def _of_the_same_lump(
 ) -> list[HypothesisFit]:
     """Families that are not tied with the leading mass, begun at its place with its mass.
 
-    A point mass at the edge of a tailgate (tuning 561) had converged 16 mm from its place with a
+    On a tailgate (tuning 561) a point mass at the edge had converged 16 mm from its place with a
     gain of 113, and a resonator led with 222. Begun at the resonator's place, the mass gains 226.
     """
     lead = hypotheses[0] if hypotheses else None
