@@ -6,7 +6,8 @@ from numpy.testing import assert_allclose
 
 from chladni.fem.assemble import structure
 from chladni.fem.measured_dofs import MeasuredDofs
-from chladni_specimens.plates import plate
+from chladni.geometry.facets import tangents
+from chladni_specimens.plates import plate, solid_plate
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -71,3 +72,20 @@ def test_channels_of_one_place_are_of_one_sensor(built):
     assert found.channels.tolist() == [2, 1, 2, 1, 1]
     none = dofs(built, np.zeros((0, 3)))  # where only poles were given
     assert (none.device.tolist(), none.channels.tolist()) == ([], [])
+
+
+@pytest.mark.parametrize("on_grids", [True, False])
+@pytest.mark.parametrize("made", [plate(0.4, 0.3, 8, 6, 2e-3), solid_plate(0.4, 0.3, 2e-3, 8, 6)])
+def test_places_move_in_a_rigid_rotation_alike_on_sheets_and_solids(made, on_grids):
+    """u = ω × x, so a place that moves by dx changes n · u by (ω × dx) · n; at edges as well."""
+    rng, by = np.random.default_rng(3), np.array([1e-3, 2e-3, 5e-4, 0.0])
+    top = np.flatnonzero(made.points[:, 2] == made.points[:, 2].max())
+    at = top[[0, 20, 41, 30]]
+    points = made.points[at] * (1.0 if on_grids else np.array([0.97, 0.98, 1.0]))
+    grids = made.ids[at] if on_grids else np.zeros(4, int)
+    built, omega, normal = structure(made), rng.normal(size=3), np.tile(UP, (4, 1))
+    sensors = dofs(made, points, grids)
+    motion = np.hstack([np.cross(omega, made.points), np.tile(omega, (len(made.points), 1))])
+    q = built.T.T @ motion.ravel()
+    for rows, along in zip(sensors.moved(built, by), tangents(normal), strict=True):
+        assert_allclose(rows @ q, by * (np.cross(omega, along)[:, 2]), atol=1e-12)

@@ -26,16 +26,15 @@ def size_of(made: Assembly) -> float:
 def scaled(made: Assembly, nodes: Mapping[int, np.ndarray]) -> tuple[str, dict[int, np.ndarray]]:
     """Unit in which nodes lie on the deck, and the nodes in metres.
 
-    Metres unless another unit is far better: at the grids, else the largest on the shells.
+    Metres unless another unit is far better: at the grids, else the largest on its surface.
     """
     if len(nodes) < ENOUGH:
         return "m", dict(nodes)
     places, size = np.array(list(nodes.values())), size_of(made)
     off = {unit: _off(made, places * factor, size) for unit, factor in SCALES.items()}
     unit = min(off, key=lambda unit: off[unit])
-    if off[unit] >= OFF and len(made.shells):  # no grid is near in a coarse mesh
-        shells = ShellSurface.whole(made)
-        on = {u: _off_shells(shells, places * SCALES[u], size) for u in off if off[u] < np.inf}
+    if off[unit] >= OFF and len((surface := ShellSurface.whole(made)).nodes):  # coarse meshes
+        on = {u: _off_surface(surface, places * SCALES[u], size) for u in off if off[u] < np.inf}
         off["m"] = min(off["m"], on.get("m", np.inf))
         unit = max((u for u in on if on[u] < OFF), key=lambda u: SCALES[u], default="m")
     elif off[unit] >= OFF:
@@ -52,9 +51,9 @@ def _off(made: Assembly, places: np.ndarray, size: float) -> float:
     return float(np.median(away)) / size
 
 
-def _off_shells(shells: ShellSurface, places: np.ndarray, size: float) -> float:
-    """Median distance from the shells over the structure's size."""
-    return float(np.median(shells.closest_points(places[:_LOOKED]).distance)) / size
+def _off_surface(surface: ShellSurface, places: np.ndarray, size: float) -> float:
+    """Median distance from the surface over the structure's size."""
+    return float(np.median(surface.closest_points(places[:_LOOKED]).distance)) / size
 
 
 def _dot(places: np.ndarray, size: float) -> bool:

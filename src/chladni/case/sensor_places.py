@@ -134,13 +134,14 @@ def _off_said(made: Assembly, role: Role, given: list[np.ndarray]) -> list[str]:
     """A sentence where places were moved to get onto the structure."""
     if not given:
         return []
-    if len(made.shells):
-        off = float(ShellSurface.whole(made).closest_points(np.array(given)).distance.max())
+    surface = ShellSurface.whole(made)
+    if len(surface.nodes):
+        off = float(surface.closest_points(np.array(given)).distance.max())
     else:
         off = max(float(np.linalg.norm(made.points - x, axis=1).min()) for x in given)
     if off <= 1e-6 * float(np.linalg.norm(np.ptp(made.points, axis=0))):
         return []
-    what = "nearest points of the shells" if len(made.shells) else "nearest grids"
+    what = "nearest points of its surface" if len(surface.nodes) else "nearest grids"
     return [f"places of {role}s are up to {1e3 * off:.3g} mm from the mesh: the {what} are used"]
 
 
@@ -246,15 +247,15 @@ def _base(made: Assembly, sensor: Sensor, where: str) -> np.ndarray:
 
 
 def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, np.ndarray]:
-    """A place on the nearest shell, or where there are no shells at the nearest grid."""
-    place = np.asarray(sensor.place)
+    """A place on the nearest shell or face of a solid; of beams alone, at the nearest grid."""
+    place, surface = np.asarray(sensor.place), ShellSurface.whole(made)
     size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
-    if len(made.shells) == 0:
+    if not len(surface.nodes):
         row = int(np.linalg.norm(made.points - place, axis=1).argmin())
         away, normal = float(np.linalg.norm(made.points[row] - place)), None
         grid = int(made.ids[row])
     else:
-        found = ShellSurface.whole(made).closest_points(place)
+        found = surface.closest_points(place)
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
     if away > _FAR * size:
         raise LabelError(
@@ -265,7 +266,7 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
     vector = sensor.direction if sensor.direction is not None else normal
     if vector is None:
         raise LabelError(
-            f"{where}: it has no shell and so no normal; give +X, +Y, +Z or nx, ny, nz"
+            f"{where}: it is on no shell or solid and has no normal; give +X, +Y, +Z or nx, ny, nz"
         )
     return grid, place if grid == 0 else made.points[row], vector
 

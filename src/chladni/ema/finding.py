@@ -38,6 +38,9 @@ class Finding:
     # name and arguments of the map of the FRFs (:mod:`.frf_maps`) that undoes it exactly; none
     # where no map does, or the cause is not beyond doubt
     mend: tuple[str, ...] = ()
+    # Q that it leaves and the average over outputs in it, where physics may leave less; such a
+    # finding is a warning until a diagnosis compares both
+    left: tuple[float, Literal["median", "mean"]] | None = None
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from ..geometry.nearest import ClosestPoints, ShellSurface
 from ..model.assembly import Assembly
 from .assemble import Structure
 
+ON_SURFACE = 0.1  # of a step, along the surface, at least: a shorter one is along its normal
+
 
 def rows_at(
     structure: Structure, closest: ClosestPoints, directions: np.ndarray, turning: bool = False
@@ -43,6 +45,22 @@ def rows_of(
         shells = ShellSurface.whole(structure.assembly)
         out[off] = rows_at(structure, shells.closest_points(points[off]), directions[off], turning)
     return sp.csr_array(out)
+
+
+def change_of(
+    structure: Structure, points: np.ndarray, step: np.ndarray, directions: np.ndarray
+) -> sp.csr_array:
+    """Change of the motion along directions where places (k, 3) move by a step (k, 3): (k, n).
+
+    It is the mean slope over the surface on both sides; a step off the surface changes nothing.
+    """
+    surface, k = ShellSurface.whole(structure.assembly), len(points)
+    ends = surface.closest_points(np.concatenate([points + step, points - step]))
+    moved = np.linalg.norm(ends.place[:k] - ends.place[k:], axis=1)
+    size = np.linalg.norm(step, axis=1)
+    share = np.where(moved > ON_SURFACE * size, size / np.maximum(moved, 1e-30), 0.0)
+    rows = rows_at(structure, ends, np.tile(directions, (2, 1)))
+    return sp.csr_array(sp.diags_array(share) @ (rows[:k] - rows[k:]))
 
 
 Share = tuple[tuple[int, float], ...]  # (grid id, weight) of one place, the weights add up to 1

@@ -10,7 +10,7 @@ from ..model.assembly import Assembly
 from ..results import ShownBriefly
 from .assemble import Structure
 from .base_motion import base_motion
-from .locate import Share, rows_of, shares_of
+from .locate import Share, change_of, rows_of, shares_of
 
 _ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
 
@@ -84,6 +84,24 @@ class MeasuredDofs(ShownBriefly):
                 built, self.grids[real], self.points[real], self.directions[real], turning
             )
         return sp.csr_array(found)
+
+    def moved(self, built: Structure, by: np.ndarray) -> tuple[sp.csr_array, sp.csr_array]:
+        """Change of the motion of each dof where its place moves by (k,) [m] along u, and along v.
+
+        On sheets and beams it follows from rotations, w(x + dx) = w + (θ × dx) · n. Grids of solids
+        have none: there it is the slope of the motion over the faces about the place.
+        """
+        u, v = self.across()
+        out = []
+        for along, about, sign in ((u, v, -1.0), (v, u, 1.0)):
+            rows = about.rows(built, turning=True)
+            rows = (sp.diags_array(sign * by) @ rows).tolil()
+            stiff = np.flatnonzero((np.diff(rows.tocsr().indptr) == 0) & ~self.base & (by > 0))
+            if len(stiff):
+                step = by[stiff, None] * along.directions[stiff]
+                rows[stiff] = change_of(built, self.points[stiff], step, self.directions[stiff])
+            out.append(sp.csr_array(rows))
+        return out[0], out[1]
 
     def across(self) -> tuple["MeasuredDofs", "MeasuredDofs"]:
         """Copies with the two directions u, v normal to n, u x v = n."""

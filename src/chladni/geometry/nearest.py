@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
 from .facets import tangents, unit
+from .solid_faces import skin
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -61,8 +62,10 @@ class ShellSurface:
 
     @classmethod
     def whole(cls, assembly: Assembly) -> Self:
-        """All shells of an assembly."""
-        return cls.over("the structure", assembly.points, assembly.shells.nodes)
+        """All shells of an assembly, and the outer faces of its solids."""
+        faces = [skin(s.nodes, s.part)[0] for s in assembly.solids]
+        nodes = np.concatenate([assembly.shells.nodes, *faces])
+        return cls.over("the structure", assembly.points, nodes)
 
     @classmethod
     def of(cls, assembly: Assembly, sheet: ShellChoice) -> Self:

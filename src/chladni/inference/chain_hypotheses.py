@@ -9,7 +9,8 @@ Q = median over channels of mean over lines |log10(H_model / g H_test)|²,
 
 phase wrapped, g the median level, least over a common factor of the model's frequencies. Physics
 that the model lacks hardly changes under any of them; the one error that there is takes most of Q.
-No hypothesis is proposed that leaves more. Where none takes it and the responses are unlike the
+No hypothesis is proposed that leaves more. Where Q as declared is small, a place or labels chosen
+among hundreds are a warning, and a diagnosis compares them with the physics that it finds. Where none takes it and the responses are unlike the
 model's, that is said instead.
 """
 
@@ -78,7 +79,7 @@ def chain_faults(
     answers = without_modes(frf, lines) > FLAT
     answers &= min(_beyond_power(H, seen.weights @ seen.f) for H in seen.answers()) > FLAT
     named = [best] if explains(best.Q, best.Q / best.share) and answers else late
-    findings = [_applicable(h, tried).finding for h in sorted(named, key=lambda h: h.share)[:1]]
+    findings = [_doubted(_applicable(h, tried)) for h in sorted(named, key=lambda h: h.share)[:1]]
     if not findings and answers and declared > EXPLAINED * CHANCE:
         stiffness = min(map(seen.score, seen.answers(shifts=STIFFNESS)))
         findings = [_nothing_fits(declared, best)] if stiffness > EXPLAINED * CHANCE else []
@@ -91,6 +92,19 @@ def _applicable(best: Hypothesis, tried: Sequence[Hypothesis]) -> Hypothesis:
     if best.Q < BEYOND_DOUBT * min(others, default=np.inf):
         return best
     return replace(best, finding=replace(best.finding, mend=()))
+
+
+def _doubted(named: Hypothesis) -> Finding:
+    """The finding; a warning where the responses as declared are like those of the model.
+
+    Among so many places and labels one always leaves less of a small Q than those declared. Physics
+    that the model lacks may leave less still, and only a diagnosis tries it. An error that a map of
+    the numbers undoes was not chosen among many.
+    """
+    found, unlike = named.finding, named.Q / named.share > EXPLAINED * CHANCE
+    if unlike or found.mend or found.kind == "delay":
+        return found
+    return replace(found, severity="warning", left=(named.Q, named.over))
 
 
 def _nothing_fits(declared: float, best: Hypothesis) -> Finding:

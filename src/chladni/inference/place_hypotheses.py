@@ -75,7 +75,7 @@ def _exchanged(
     )
     mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
     found = Finding("swapped channels", text, "fault", names, mend, mend=("exchanged", *names))
-    return [Hypothesis(Q, Q / declared, found)]
+    return [Hypothesis(Q, Q / declared, found, "mean")]
 
 
 def _drives(model: Modelled, way: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -158,7 +158,7 @@ def _two_forces(
     )
     mend = "give the outputs of each force a recording, or an input, of their own"
     found = Finding("two forces mixed", text, "fault", labels, mend, float(grid))
-    yield Hypothesis(best, best / declared, found)
+    yield Hypothesis(best, best / declared, found, "mean")
 
 
 def mirrored(

@@ -7,7 +7,8 @@ the place, and u, v normal to the direction n = u x v:
 d(ln H) = e + (θ_u H_u + θ_v H_v + x_u ∂H/∂u + x_v ∂H/∂v) / H.
 
 H_u is the response along u.  The slopes of the sheet ∂H/∂u = -φ_v, ∂H/∂v = φ_u follow from its
-rotations (w(x + dx) = w + θ × dx · n). V Vᵀ is the covariance of the errors of the outputs and of
+rotations (w(x + dx) = w + θ × dx · n); solids have no rotations, and the slopes are those of their
+faces. V Vᵀ is the covariance of the errors of the outputs and of
 the gains of the gauges. It is whitened out of the residuals before anything is fitted
 (C = I + V Vᵀ). Tilt and place of a gauge act on all channels: they are unknowns of every fit
 (:class:`..effects.channels.GaugeErrors`).
@@ -56,11 +57,8 @@ class Side:
 def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy) -> Side:
     """Errors of all outputs, or of all inputs; a place's own sd, if any, replaces the usual one."""
     u, v = dofs.across()
-    place, turn = sp.diags_array(np.where(dofs.sd > 0, dofs.sd, known.position)), known.direction
-    rows = (
-        turn * u.rows(built), turn * v.rows(built),
-        place @ v.rows(built, turning=True), place @ u.rows(built, turning=True),
-    )  # fmt: skip
+    place, turn = np.where(dofs.sd > 0, dofs.sd, known.position), known.direction
+    rows = (turn * u.rows(built), turn * v.rows(built), *dofs.moved(built, place))
     still = np.zeros((len(dofs.labels), len(inputs.labels)))
     with_base = np.stack(
         [turn * u.moved_with_base(inputs), turn * v.moved_with_base(inputs), still, still]

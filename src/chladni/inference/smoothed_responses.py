@@ -6,6 +6,7 @@ so that damping hardly matters and no mode need be identified.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -28,6 +29,9 @@ EXPLAINED = 1 / 2  # of Q as declared, and of ``CHANCE``: what an error that is 
 CHANCE = (np.pi / LN10) ** 2 / 3  # Q of responses of one size whose phases have nothing in common
 
 
+Average = Literal["median", "mean"]
+
+
 @dataclass(frozen=True)
 class Hypothesis:
     """One way of reading a recording: its Q, its share of Q as declared, and what it would mean."""
@@ -35,6 +39,7 @@ class Hypothesis:
     Q: float
     share: float
     finding: Finding
+    over: Average = "median"  # of the outputs, in Q
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +93,12 @@ class Smoothed:
         Q, level = min(scored)
         return Q, float(10 ** (self.level - level))
 
-    def score(self, H: np.ndarray, inputs: slice = slice(None)) -> float:
+    def score(
+        self, H: np.ndarray, inputs: slice = slice(None), over: Average = "median"
+    ) -> float:
         """Q of responses (n_s, n_out, n_in)."""
-        Q = np.median(mean_squares(level_free(H) - self.log_test[:, :, inputs]))
+        average = np.median if over == "median" else np.mean
+        Q = average(mean_squares(level_free(H) - self.log_test[:, :, inputs]))
         return float(np.maximum(Q, TINY))
 
 

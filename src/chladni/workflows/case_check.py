@@ -59,7 +59,7 @@ class CheckedDof:
 
     label: str
     role: str
-    place: str  # "grid 412", "on a shell", "the supports"
+    place: str  # "grid 412", "on the surface", "the supports"
     point_m: tuple[float, float, float]
     direction: tuple[float, float, float]
     off_mesh_m: float
@@ -216,15 +216,16 @@ def _several(at: MeasuredDofs, what: str) -> str:
 def _dofs(case: Case, at: MeasuredDofs, role: str) -> list[CheckedDof]:
     off = np.zeros(len(at.labels))
     free = np.flatnonzero((at.grids <= 0) & ~at.base)
-    if len(free) and len(case.assembly.shells):
-        off[free] = ShellSurface.whole(case.assembly).closest_points(at.points[free]).distance
+    surface = ShellSurface.whole(case.assembly)
+    if len(free) and len(surface.nodes):
+        off[free] = surface.closest_points(at.points[free]).distance
     rows = zip(
         at.labels, at.grids.tolist(), at.points.tolist(), at.directions.tolist(), at.base.tolist(),
         off.tolist(), at.mass.tolist(), strict=True,
     )  # fmt: skip
     return [
         CheckedDof(
-            label, role, "the supports" if base else f"grid {grid}" if grid else "on a shell",
+            label, role, "the supports" if base else f"grid {grid}" if grid else "on the surface",
             tuple(point), tuple(axis), away, mass,
         )
         for label, grid, point, axis, base, away, mass in rows

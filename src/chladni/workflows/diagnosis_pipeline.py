@@ -45,7 +45,7 @@ from .diagnosis_result import DiagnosisResult
 from .mended_case import mending, with_undone
 from .over_levels import over_levels
 from .ready_case import ready
-from .screening_of_case import instead_of_effects, unlike
+from .screening_of_case import instead_of_effects, settled, unlike
 from .sign_of_gain import with_sign_of_gain
 
 
@@ -157,6 +157,10 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     progress("scores", 0.95)
     result = result_of(question, prepared, found, stages)
     stages, result = on_preferred_mesh(case, question, prepared, found, stages, result, mended)
+    seen = known.screening
+    if diagnosing and seen is not None:
+        fit = (found.found or found.null).fit
+        seen = settled(case, seen, prepared.above, stages.final.model, fit)
     result = over_levels(question, prepared, stages, result, diagnosing)
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
@@ -187,7 +191,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
         if cause and result.adequate is not None:
             there = LeftPlace(f"the joints along the folds, because the deviations show {cause}")
             result = replace(result, adequate=replace(result.adequate, where=(there,)))
-    seen, distrust = known.screening, (*far_off(result), *distrust)
+    distrust = (*far_off(result), *distrust)
     if diagnosing:
         doubts = (*instead_of_effects(result.verdict, seen), *unlike(result, seen))
         distrust = (*distrust, *doubts)

@@ -182,9 +182,10 @@ def _by_place(
 ) -> MatchedDof:
     away = np.linalg.norm(made.points - place, axis=1)
     near = int(away.argmin())
-    if away[near] <= SAME_PLACE * size or not len(made.shells):
+    surface = ShellSurface.whole(made)
+    if away[near] <= SAME_PLACE * size or not len(surface.nodes):
         matched_by: MatchedBy = "place" if away[near] <= SAME_PLACE * size else "nearest"
         grid = int(made.ids[near])
         return MatchedDof(label, role, matched_by, grid, distance=float(away[near]), axis=axis)
-    off = float(ShellSurface.whole(made).closest_points(place).distance[0])
+    off = float(surface.closest_points(place).distance[0])
     return MatchedDof(label, role, "nearest", None, place, off, axis)

@@ -1,9 +1,12 @@
 """The compared recording of a case, screened alone and against the model, before any fit."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..case import Case
 from ..dynamics.frf import FRF
+from ..effects.channels import GaugeErrors
 from ..effects.estimate import Estimate, Location
 from ..ema.finding import Check, Finding, Screening, Severity
 from ..ema.identification import Identified, identify
@@ -13,8 +16,10 @@ from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..inference.chain_hypotheses import NOTHING_FITS, explains
 from ..inference.channel_screening import against_model, shapes_against_model
+from ..inference.map_fit import Fit
 from ..inference.pole_data import Poles
 from ..inference.result import NamedEffect
+from ..inference.sensor_errors import gauge_errors
 from ..inference.smoothed_responses import smoothed
 from ..model.point_masses import with_mass_pairs
 from ..search.question import Prepared
@@ -127,6 +132,57 @@ def screened_unprepared(case: Case) -> Screening | None:
         found = None
     high = case.band[1] if case.band else float(frf.frequency[-1])
     return screened_by_model(case, found, modelled(case.tested(case.assembly), REACH * high))
+
+
+def settled(
+    case: Case, screening: Screening, above: float, after: Modelled, fit: Fit
+) -> Screening:
+    """The screening without interpretations that leave more of Q than a diagnosis does.
+
+    Parameters
+    ----------
+    above : frequency from which on responses are compared with the model [Hz]
+    after : the deck with all that was found
+    fit : of it, with the usual errors of the place and direction of each force
+
+    Raises
+    ------
+    RecordingAtFault
+        If an interpretation of the recording leaves less.
+    """
+    doubted = [f for f in screening.findings if f.left is not None]
+    if not doubted:
+        return screening
+    frf = case.frfs[0]
+    lines = case.lines(frf.frequency) & (frf.frequency > above)
+    seen = smoothed(frf, lines, after, case.outputs, case.inputs)
+    if seen is None:
+        return screening
+    seen = replace(seen, drive=seen.drive + _gauges(case, after, fit))
+    kept = []
+    for f in screening.findings:
+        if f.left is None:
+            kept.append(f)
+            continue
+        left, over = f.left
+        Q = min(seen.score(H, over=over) for H in seen.answers())
+        if left < Q:
+            text = f"{f.text.rstrip('.')}; the best deck without this error leaves {Q:.2g}."
+            kept.append(replace(f, severity="fault", text=text))
+    checked = replace(screening, findings=tuple(kept))
+    if checked.faults and unmendable(checked):
+        raise RecordingAtFault(checked)
+    return checked
+
+
+def _gauges(case: Case, after: Modelled, fit: Fit) -> np.ndarray:
+    """Change of the loads of the inputs (n_in, r) by the fitted tilts and places of their gauges."""
+    change = np.zeros((len(case.inputs.labels), len(after.modes)))
+    fitted = [fit.of(e) for e in fit.effects if isinstance(e, GaugeErrors)]
+    made = gauge_errors(case.outputs, case.inputs, after.structure, case.setup.accuracy)
+    for j, e, x in zip(np.flatnonzero(~case.inputs.base), made, fitted, strict=False):
+        change[j] = sum(v * (row @ after.modes.shapes)[0] for v, row in zip(x, e.rows, strict=True))
+    return change
 
 
 def unmendable(screening: Screening) -> bool:
