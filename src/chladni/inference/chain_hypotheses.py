@@ -10,8 +10,8 @@ Q = median over channels of mean over lines |log10(H_model / g H_test)|²,
 phase wrapped, g the median level, least over a common factor of the model's frequencies. Physics
 that the model lacks hardly changes under any of them; the one error that there is takes most of Q.
 No hypothesis is proposed that leaves more. Where Q as declared is small, a place or labels chosen
-among hundreds are a warning, and a diagnosis compares them with the physics that it finds. Where none takes it and the responses are unlike the
-model's, that is said instead.
+among hundreds are a warning, and a diagnosis compares them with the physics that it finds. Where
+none takes it and the responses are unlike the model's, that is said instead.
 """
 
 from collections.abc import Iterator, Sequence

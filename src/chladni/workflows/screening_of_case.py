@@ -176,7 +176,7 @@ def settled(
 
 
 def _gauges(case: Case, after: Modelled, fit: Fit) -> np.ndarray:
-    """Change of the loads of the inputs (n_in, r) by the fitted tilts and places of their gauges."""
+    """Change of the loads of the inputs (n_in, r) by the fitted errors of their gauges."""
     change = np.zeros((len(case.inputs.labels), len(after.modes)))
     fitted = [fit.of(e) for e in fit.effects if isinstance(e, GaugeErrors)]
     made = gauge_errors(case.outputs, case.inputs, after.structure, case.setup.accuracy)
