@@ -93,9 +93,7 @@ class Smoothed:
         Q, level = min(scored)
         return Q, float(10 ** (self.level - level))
 
-    def score(
-        self, H: np.ndarray, inputs: slice = slice(None), over: Average = "median"
-    ) -> float:
+    def score(self, H: np.ndarray, inputs: slice = slice(None), over: Average = "median") -> float:
         """Q of responses (n_s, n_out, n_in)."""
         average = np.median if over == "median" else np.mean
         Q = average(mean_squares(level_free(H) - self.log_test[:, :, inputs]))

@@ -134,9 +134,7 @@ def screened_unprepared(case: Case) -> Screening | None:
     return screened_by_model(case, found, modelled(case.tested(case.assembly), REACH * high))
 
 
-def settled(
-    case: Case, screening: Screening, above: float, after: Modelled, fit: Fit
-) -> Screening:
+def settled(case: Case, screening: Screening, above: float, after: Modelled, fit: Fit) -> Screening:
     """The screening without interpretations that leave more of Q than a diagnosis does.
 
     Parameters
@@ -214,8 +212,10 @@ def instead_of_effects(verdict: str, screening: Screening | None) -> tuple[str, 
 
 def at_fault(case: Case, screening: Screening, diagnosing: bool) -> DiagnosisResult:
     """Return the result for a recording that must be corrected first, without any fit."""
+    tried = any(f.left is not None for f in screening.faults)
     note = (
-        "Nothing was fitted: an effect found in a faulty recording may be the fault itself. "
+        ("No effect that was tried explains as much" if tried else "Nothing was fitted")
+        + ": an effect found in a faulty recording may be the fault itself. "
         "Correct the recording or measure again, and repeat the diagnosis."
     )
     command = "diagnose" if diagnosing else "calibrate"
