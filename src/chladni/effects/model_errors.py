@@ -23,6 +23,7 @@ from ..geometry.folds import share_at_folds
 from ..geometry.footprints import on_smaller_shells, on_whole_shells, regions_of_joints
 from ..geometry.refine import refined
 from ..model.assembly import Assembly
+from .beam_theory import as_deep_beams, theory_prior
 from .calibration_parameters import LogField
 from .effect import Effect, ModalFactor, Parameter, ShapeChange, Term, Traits
 from .element_groups import ElementGroups
@@ -131,6 +132,14 @@ class JointFootprint(MeshError):
     claim = "a joint acts over the width of one shell of the mesh, not over its real width"
 
 
+@dataclass(frozen=True, eq=False)
+class BeamTheory(MeshError):
+    """Relative change of modal stiffness: x times that of shear and rotary inertia of beams."""
+
+    name = "beam-theory"
+    claim = "bars of the deck lack rotary inertia, and their shear flexibility is rough"
+
+
 Places = Callable[[Structure], sp.csr_array]  # rows of the measured dofs, on any mesh
 
 
@@ -142,7 +151,8 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
 
     The list holds the error of the elements. Joints on whole shells add the error of their
     footprints: one common to all, and one for each region, because two meshers attach one joint to
-    different shells. Fasteners from grid to grid add one common to all of them.
+    different shells. Fasteners from grid to grid add one common to all of them. Beams of frames and
+    stringers add the error of their theory.
 
     The refined modes Ψ at the old points are paired with the modes Φ. B = ΦᵀMΨ is made orthogonal,
     softest modes first, and Λ^½ e^L Λ^½ = B Λ_ref Bᵀ. B is square, so that x = 1 gives the refined
@@ -186,6 +196,9 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
         file = of_file.error(MeshError, prior, order)
         errors = [replace(errors[0], file=file)]
         errors.append((of_file - of_shells).error(JointFootprint, FOOTPRINT))
+    if len(member_beams(built.assembly)):
+        deep, _ = change(as_deep_beams(whole), begun)
+        errors.append((deep - of_shells).error(BeamTheory, theory_prior(built.assembly)))
     smaller = on_smaller_shells(built.assembly, fine)
     moved = [k for k, (new, old) in enumerate(zip(smaller, fine.rigid, strict=True)) if new != old]
 

@@ -14,6 +14,7 @@ from ..effects.channels import channel_gain
 from ..effects.effect import Effect
 from ..effects.joint_stiffness import joint_nuisances
 from ..effects.registry import catalogue
+from ..effects.unknown_cords import unknown_cords
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
@@ -114,7 +115,8 @@ def _by_responses(
     progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
-    above = suspended_below(question, nominal, strong_modes(found).frequency, fit_max)
+    slow = strong_modes(found).frequency
+    above = suspended_below(question, nominal, slow, fit_max)
     question = replace(question, exclude=(*question.exclude, (0.0, above)))
     lines, low = [f[f > above] for f in lines], max(low, above)
     refuse_silent(nominal, question.outputs, question.inputs)
@@ -142,6 +144,8 @@ def _by_responses(
         )  # fmt: skip
         data.append(read.rebased(reduced.model))
     nuisance = [*nuisances(reduced, nominal, mesh), *gauge_errors(*test)]
+    both = np.concatenate([question.outputs.directions, question.inputs.directions])
+    nuisance += unknown_cords(built, slow[slow < above], both)
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
     problem = updating_problem(question, reduced, data[0], nuisance, f_max)
