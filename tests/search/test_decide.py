@@ -1,5 +1,7 @@
 """What follows from rows of numbers: names, ties, doubts and refusals, each at its limit."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from numpy.testing import assert_allclose
 from chladni.search.decide import decide, tied
 from chladni.search.decision_in_words import BEYOND, Reason
 from chladni.search.decision_rules import RULES, TIED, fits, gain_due, odds_of_something_else
-from chladni.search.hypotheses import ALONE
+from chladni.search.hypotheses import ALONE, Explanation
 from chladni.search.search_round import simplest_first
 from chladni.search.several import AlternativeRow
 
@@ -407,3 +409,26 @@ def test_ties_hold_the_leader_first():
     best = row("crack", 0.0)
     assert tied(best, [best, row("point-mass", 1.0)]) == ("crack", "point-mass")
     assert decide(table()).verdict == LITTLE
+
+
+@pytest.mark.parametrize(
+    ("given_mesh", "halved", "worse"),
+    [
+        ((0.9, 0.9), (1.1, 0.9), False),  # it is written on the mesh on which it is better
+        ((1.1, 0.9), (0.9, 0.9), False),
+        ((1.1, 0.9), (0.9, 1.1), True),
+        ((1.1, 0.9), None, True),
+    ],
+)
+def test_a_deck_is_worse_if_it_is_on_every_mesh_on_which_it_may_be_written(
+    given_mesh, halved, worse
+):
+    """An effect may be smaller than the error of the deck's mesh, or of what the other one adds."""
+    effect = SimpleNamespace(traits=SimpleNamespace(writable=True))
+    fit = SimpleNamespace(physics=True, effects=(effect,))
+    case = SimpleNamespace(found=SimpleNamespace(plain="calibrated"))
+    one = Explanation(case, fit)
+    vars(one).update(written="written", halved=("calibrated, finer", "finer") if halved else ())
+    scores = {"written": with_Q(*given_mesh), "finer": with_Q(*(halved or (9.0, 9.0)))}
+    one._scores = lambda decks: scores[decks[-1]]
+    assert one.worse == worse

@@ -242,6 +242,7 @@ def diagnosed(
         case = opened(source, recordings, words)
         found = workflow(case, progress=within(job.progress, 0.0, 0.85))
         stage = within(job.progress, 0.85, 1.0)
+        case = found.origin  # without channels that say nothing of the model
         found = write_diagnosis(job.folder, case, found, command_line(), stage, job.place, pictures)
         say_sections(sentence(found), sections(found, {}, (), (), ""))
         for note in found.notes:

@@ -110,26 +110,35 @@ class Explanation:
     def Q(self) -> tuple[tuple[float, float], ...]:
         """Q of the calibrated deck and of its own, on the fitted and on the choosing data.
 
-        Both have the mesh that the data prefer: an effect may be smaller than the error of a mesh.
+        Both have the mesh on which they are written: that of the deck, unless its own is worse
+        there and the data prefer the mesh that is twice as fine. An effect may be smaller than the
+        error of a mesh.
         """
-        prepared, found = self.case.prepared, self.case.found
-        stages = [(deck, deck.fit.state) for deck in self.halved or (found.plain, self.written)]
+        given = self._scores((self.case.found.plain, self.written))
+        return self._scores(self.halved) if self._is_worse(given) and self.halved else given
+
+    def _scores(self, decks: tuple[HypothesisFit, ...]) -> tuple[tuple[float, float], ...]:
+        prepared = self.case.prepared
+        stages = [(deck, deck.fit.state) for deck in decks]
         return tuple(
             (a, b) for a, b in scores_of(prepared, self.fit, stages, prepared.held.choosing)
         )
+
+    def _is_worse(self, Q: tuple[tuple[float, float], ...]) -> bool:
+        """A fault of a few channels is compared on the held-out data of these channels."""
+        compared = Q if self.fit.physics else Q[1:]
+        return any(with_it > calibrated for calibrated, with_it in compared)
 
     @property
     def worse(self) -> bool:
         """True if the deck with an effect has a larger Q than the calibrated deck.
 
         Physics must not worsen the fitted data either, and physics that no card holds has no deck
-        to compare. A fault of a few channels is compared on the held-out data of these channels.
+        to compare.
         """
-        physics = self.fit.physics
-        if physics and not any(e.traits.writable for e in self.fit.effects):
+        if self.fit.physics and not any(e.traits.writable for e in self.fit.effects):
             return False
-        compared = self.Q if physics else self.Q[1:]
-        return any(with_it > calibrated for calibrated, with_it in compared)
+        return self._is_worse(self.Q)
 
     @cached_property
     def refined(self) -> "Explanation":

@@ -17,6 +17,7 @@ from ..progress import Progress, silent
 from ..search.calibration import CalibrationSettings
 from .diagnosis_result import DiagnosisResult
 from .given_case import Source, given_case
+from .silent_channels import without_silent
 from .states import diagnose_states
 
 
@@ -45,7 +46,7 @@ def calibrate(
     """
     if sample:
         sampler_package()  # a missing one is named before any work
-    case = given_case(source, recording, words)
+    case = without_silent(given_case(source, recording, words))
     found = diagnose_states(case, False, progress, CalibrationSettings(sample=sample))
     return replace(found, notes=(*found.notes, *proposed(case)), origin=case)
 

@@ -32,6 +32,7 @@ from .output_only import with_natural_frequencies
 from .ready_case import ready, refuse_without_effects
 from .screening_of_case import POUND, RecordingAtFault, in_pounds
 from .sign_of_gain import with_sign_of_gain
+from .silent_channels import without_silent
 from .states import each_state
 from .unit_check import FAR, refuse_other_units
 from .unit_guess import SIZE, guessed_units
@@ -347,7 +348,8 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
 def _screened(state: Case, diagnosing: bool, progress: Progress) -> tuple[str, Screening | None]:
     """A mass that deck and scales do not allow, and the findings on the recording."""
     try:
-        _, prepared, screening = ready(with_sign_of_gain(state), diagnosing, progress, fitted=False)
+        state = without_silent(with_sign_of_gain(state))
+        _, prepared, screening = ready(state, diagnosing, progress, fitted=False)
     except RecordingAtFault as fault:
         return "", fault.screening
     return off_the_scales(prepared.problem), screening

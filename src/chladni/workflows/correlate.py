@@ -36,6 +36,7 @@ from .output_only import with_natural_frequencies
 from .question_of_case import nothing_measured, question_of
 from .screening_of_case import screened_by_model
 from .sign_of_gain import with_sign_of_gain
+from .silent_channels import without_silent
 from .unit_check import refuse_other_units
 
 BANDS = 6
@@ -106,7 +107,7 @@ def correlate(
     FileError
         If the deck's unit system cannot be right, or there is no recording to compare with.
     """
-    case = given_case(source, recording, words)
+    case = without_silent(given_case(source, recording, words))
     refuse_other_units(case)
     with one_blas_thread():
         found = _correlated(with_natural_frequencies(case), progress)

@@ -10,6 +10,7 @@ from ..case.make_case import CaseWords, Measured
 from ..progress import Progress, silent
 from .diagnosis_result import DiagnosisResult
 from .given_case import Source, given_case
+from .silent_channels import without_silent
 from .states import diagnose_states
 
 
@@ -54,6 +55,6 @@ def diagnose(
         print(found.summary())
         found.save("runs/first")
     """
-    case = given_case(source, recording, words)
+    case = without_silent(given_case(source, recording, words))
     found = diagnose_states(case, True, progress, earlier=earlier)
     return replace(found, origin=case)
