@@ -135,8 +135,8 @@ class Reanalysis:
         """Residuals (n, n_places) with the dynamic stiffness D (n_f,) and ``added`` kg of mass."""
         share = D / (1 + D * self.G_bb)
         change = self.G_ob[..., None] * (share[:, :, None, None] * self.G_bi[:, :, None, :])
-        r = whitened(self.data, self.base.state, self.H[None] - change)
-        return self.base.with_mass(r, added)
+        delta = self.data.deviation(self.base.state, self.H[None] - change)
+        return self.base.with_mass(self.data.stacked(delta / self.data.std()), added)
 
 
 def reanalysis(
@@ -161,17 +161,6 @@ def reanalysis(
         G_bi,
         (phi_b**2) @ d.T + residual_flexibility[:, None],
     )
-
-
-def whitened(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
-    """Whitened residuals of many responses (m, n_f, n_out, n_in) as columns (n, m)."""
-    from ..ema.correlation import log10, wrapped
-
-    H = data.s[:, None, None] ** data.power * H + data.direct
-    delta = log10(H / data.values)
-    if state.offset is not None:
-        delta = wrapped(delta + state.offset[:, None])
-    return data.stacked(delta / data.std())
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,15 +24,13 @@ from ..effects.effect import Parameter
 from ..ema.setup import SensorAccuracy
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
-from ..reduced.reduced_model import Reduced, State
-from .discrepancy import Lines
+from ..reduced.reduced_model import Reduced
 
 WAYS = ("tilt about u", "tilt about v", "place along u", "place along v")
-LN10 = np.log(10.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class SensorErrors:
     """Errors of measured dofs.
 
     Attributes
@@ -53,7 +51,9 @@ class Side:
         return replace(self, modal=np.stack([model.rows(rows) for rows in self.rows]))
 
 
-def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy) -> Side:
+def sensor_errors(
+    dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
+) -> SensorErrors:
     """Errors of all outputs, or of all inputs; a place's own sd, if any, replaces the usual one."""
     u, v = dofs.across()
     place, turn = sp.diags_array(np.where(dofs.sd > 0, dofs.sd, known.position)), known.direction
@@ -65,26 +65,8 @@ def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: Sens
     with_base = np.stack(
         [turn * u.moved_with_base(inputs), turn * v.moved_with_base(inputs), still, still]
     )
-    return Side(known.gain, tuple(map(sp.csr_array, rows)), with_base, np.zeros((len(WAYS), 0, 0)))
-
-
-@dataclass(frozen=True, eq=False)
-class SensorErrors:
-    """Errors of all sensors, and the relative standard deviation of the gain of a force gauge."""
-
-    outputs: Side
-    gain: float
-
-    def rebased(self, model: Reduced) -> Self:
-        """The errors with their rows in the basis of this model."""
-        return replace(self, outputs=self.outputs.rebased(model))
-
-
-def sensor_errors(
-    outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
-) -> SensorErrors:
-    """Expected errors of sensors of this accuracy, and of the gains of force gauges."""
-    return SensorErrors(side(outputs, inputs, built, known), known.gain)
+    modal = np.zeros((len(WAYS), 0, 0))
+    return SensorErrors(known.gain, tuple(map(sp.csr_array, rows)), with_base, modal)
 
 
 def gauge_errors(
@@ -93,35 +75,9 @@ def gauge_errors(
     """Tilt and place of every force gauge; a moving base has none."""
     n, found = len(outputs.labels), list[GaugeErrors]()
     unknown = tuple(Parameter(way, "-", 0.0, 1.0, kind="linear", step=0.5) for way in WAYS)
-    rows = side(inputs, inputs, built, known).rows
+    rows = sensor_errors(inputs, inputs, built, known).rows
     for k in np.flatnonzero(~inputs.base).tolist():
         at = np.eye(n + len(inputs.labels))[:, [n + k]]
         own = tuple(sp.csr_array(row[[k]]) for row in rows)
         found.append(GaugeErrors(unknown, f"gauge {inputs.labels[k]}", rows=own, shapes=at))
     return found
-
-
-def columns(
-    errors: SensorErrors, data: Lines, state: State, scale: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Columns d ln H / scale per sd: of each output (5, *H), of the gain of each input (k, *H)."""
-    outputs = _of_outputs(errors.outputs, data, state, data.model(state), scale)
-    return outputs, errors.gain / scale * np.eye(scale.shape[-1])[:, None, None]
-
-
-def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
-    """Expected |d ln H|² from the sensor errors (n_f, n_out, n_in)."""
-    both = columns(errors, data, state, np.ones(data.values.shape))
-    return np.asarray(sum((np.abs(z) ** 2).sum(axis=0) for z in both))
-
-
-def _of_outputs(
-    errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
-) -> np.ndarray:
-    """Change of the deviation of each output by one sd of each of its errors (5, *H)."""
-    _, phi_i, d = data.modal(state)
-    out = [errors.gain / scale]
-    for modal, with_base in zip(errors.modal, errors.with_base, strict=True):
-        G = state.between(data.s, d, modal @ state.phi, phi_i)
-        out.append((data.s[:, None, None] ** data.power * G + with_base) / (H * scale))
-    return np.stack(out)
