@@ -1,9 +1,10 @@
 """The compared recording of a case, screened alone and against the model, before any fit."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..case import Case
-from ..dynamics.frf import FRF
 from ..effects.estimate import Estimate, Location
 from ..ema.finding import Check, Finding, Screening, Severity
 from ..ema.identification import Identified, identify
@@ -15,7 +16,7 @@ from ..inference.chain_hypotheses import NOTHING_FITS, explains
 from ..inference.channel_screening import against_model, shapes_against_model
 from ..inference.pole_data import Poles
 from ..inference.result import NamedEffect
-from ..inference.smoothed_responses import smoothed
+from ..inference.smoothed_responses import Reading
 from ..model.point_masses import with_mass_pairs
 from ..search.question import Prepared
 from .case_model import REACH
@@ -52,24 +53,23 @@ def screened_by_model(
     lines = (case.lines(frf.frequency) if use is None else use) & (frf.frequency > above)
     places = dict(zip(case.outputs.labels, case.outputs.points, strict=True))
     alone = screened(case.recordings[0], found, case.recordings[1:], places, use, alone=False)
-    if masses := _masses(case, frf, lines, model):
+    reading = Reading(frf, lines, model, case.outputs, case.inputs)
+    if masses := _masses(case, reading):
         return alone.with_more(masses, [Check("given masses", "check them", False)])
-    return against_model(
-        alone, frf, lines, found, model, case.outputs, case.inputs, case.gain_known
-    )
+    return against_model(alone, reading, found, case.gain_known)
 
 
-def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Finding]:
+def _masses(case: Case, reading: Reading) -> list[Finding]:
     """Report sensors in grams and a weighing in pounds, if the responses show it."""
     deck = float(mass_properties(case.assembly)[0])
     sensor_masses = sum(m for _, m in case.sensor_masses)
     found, weighed = [], case.setup.mass
-    seen = smoothed(frf, lines, model, case.outputs, case.inputs)
-    Q, level = (np.nan, np.nan) if seen is None else seen.as_declared()
+    seen, model = reading.smoothed(), reading.model
+    Q, level = (np.nan, np.nan) if seen is None else seen.as_declared
     if sensor_masses > HEAVY * deck:
         light = modelled(with_mass_pairs(case.assembly, case.sensor_masses, 1e-3), model.band)
-        other = smoothed(frf, lines, light, case.outputs, case.inputs)
-        less = np.nan if other is None else other.as_declared()[0]
+        other = replace(reading, model=light).smoothed()
+        less = np.nan if other is None else other.as_declared[0]
         grams = explains(less, Q)
         said = f"the sensors weigh {sensor_masses:.3g} kg in all, the structure {deck:.3g} kg"
         if grams:
