@@ -56,16 +56,10 @@ LEARNED = FormPrior(0.0016, 1.0, 0.0002, 20)  # of 42 tuning articles without an
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """The modes of a reference state in which the form of the model may change.
+    """The modes of a reference state in which the form of the model may change."""
 
-    Attributes
-    ----------
-    rows : (k, m)      of Φ⁻¹, the reference modes that take part
-    lam : (k,)         their ω² [rad²/s²]
-    """
-
-    rows: np.ndarray
-    lam: np.ndarray
+    rows: np.ndarray  # (k, m) of Φ⁻¹, the reference modes that take part
+    lam: np.ndarray  # (k,) their ω² [rad²/s²]
 
     @property
     def pairs(self) -> np.ndarray:
@@ -82,20 +76,12 @@ def form(state: State, f_max: float) -> Form:
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """Covariance C = I + δ² U diag(s) Uᵀ of whitened residuals.
+    """Covariance C = I + δ² U diag(s) Uᵀ of whitened residuals."""
 
-    Attributes
-    ----------
-    U : (n, k)       orthonormal
-    s : (k,)         variance along each column for δ = 1
-    delta : float    standard deviation of the diagonal of G
-    prior : FormPrior   of δ
-    """
-
-    U: np.ndarray
-    s: np.ndarray
-    delta: float = MEDIAN
-    prior: FormPrior = FORMULATIONS
+    U: np.ndarray  # (n, k), orthonormal
+    s: np.ndarray  # (k,) variance along each column for δ = 1
+    delta: float = MEDIAN  # standard deviation of the diagonal of G
+    prior: FormPrior = FORMULATIONS  # of δ
 
     def with_delta(self, delta: float) -> Self:
         """A copy with the error scaled to ``delta``."""

@@ -27,16 +27,10 @@ SETTLED = 0.01  # of the entropy: no further measurement is chosen below it
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Predicted(ShownBriefly):
-    """Data of a measurement as each hypothesis predicts them, in units of the noise.
+    """Data of a measurement as each hypothesis predicts them, in units of the noise."""
 
-    Attributes
-    ----------
-    mean : (m, n) μ_j
-    factors : (n, k_j) F_j of each hypothesis
-    """
-
-    mean: np.ndarray
-    factors: tuple[np.ndarray, ...]
+    mean: np.ndarray  # (m, n) μ_j
+    factors: tuple[np.ndarray, ...]  # (n, k_j) F_j of each hypothesis
 
     def __add__(self, other: "Predicted") -> "Predicted":
         """Both measurements, of independent noise."""
@@ -76,14 +70,9 @@ def nothing(like: Predicted) -> Predicted:
 
 @dataclass(frozen=True, eq=False)
 class Rivals:
-    """Hypotheses of which one is true.
+    """Hypotheses of which one is true."""
 
-    Attributes
-    ----------
-    probability : (m,) p_j
-    """
-
-    probability: np.ndarray
+    probability: np.ndarray  # (m,) p_j
 
     @property
     def entropy(self) -> float:
@@ -121,17 +110,11 @@ class Rivals:
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """Outcomes that are expected of a measurement.
+    """Outcomes that are expected of a measurement."""
 
-    Attributes
-    ----------
-    information : [nat]
-    probability : (m,) of each hypothesis before it
-    posterior : (m, m, n) of draw n under the true hypothesis (first): that of each (second)
-    """
-
-    information: float
-    probability: np.ndarray
+    information: float  # [nat]
+    probability: np.ndarray  # (m,) of each hypothesis before it
+    # (m, m, n) of draw n under the true hypothesis (first): that of each (second)
     posterior: np.ndarray
 
     def settled(self, odds: float) -> float:
@@ -148,18 +131,11 @@ class Forecast:
 
 @dataclass(frozen=True, eq=False)
 class OpenQuantity:
-    """A quantity x = x_0 + a z + rest of one explanation, z ~ N(0, I) as its data left it.
+    """A quantity x = x_0 + a z + rest of one explanation, z ~ N(0, I) as its data left it."""
 
-    Attributes
-    ----------
-    name : in words
-    along : (k,) a
-    rest : variance that no measurement sees
-    """
-
-    name: str
-    along: np.ndarray
-    rest: float
+    name: str  # in words
+    along: np.ndarray  # (k,) a
+    rest: float  # variance that no measurement sees
 
     def variance(self, seen: Predicted) -> float:
         """Var x after data of factor F: rest + a (I + FᵀF)⁻¹ aᵀ."""

@@ -121,28 +121,21 @@ class HypothesisFit:
 
 @dataclass(frozen=True, eq=False)
 class UpdatingProblem:
-    """Data and model of a diagnosis.
-
-    Attributes
-    ----------
-    base : calibration parameters and nuisances, free in every fit
-    nuisance : the nuisances alone
-    damping, coupling : of the identified modes, if responses are compared
-    found : effects found earlier and now in the base, each with its parameters
-    families : of effects that are tried
-    """
+    """Data and model of a diagnosis."""
 
     reduced: ReducedProblem
     data: Responses | Poles
     mass_measurement: MassMeasurement | None
-    base: tuple[Effect, ...]
-    nuisance: tuple[Effect, ...]
+    base: tuple[Effect, ...]  # calibration parameters and nuisances, free in every fit
+    nuisance: tuple[Effect, ...]  # the nuisances alone
     setup: Setup
     labels: tuple[str, ...] = ()
+    # damping, coupling: of the identified modes, if responses are compared
     damping: ModalDamping | None = None
     coupling: ModeCoupling | None = None
+    # effects found earlier and now in the base, each with its parameters
     found: tuple[tuple[Effect, np.ndarray], ...] = ()
-    families: tuple[Family, ...] = field(default_factory=catalogue)
+    families: tuple[Family, ...] = field(default_factory=catalogue)  # of effects that are tried
 
     @property
     def where(self) -> EffectContext:

@@ -22,20 +22,15 @@ Posterior = dict[SharedKey, tuple[float, float]]  # mean and standard deviation
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """All states at their most probable x.
+    """All states at their most probable x."""
 
-    Attributes
-    ----------
-    x, covariance : (n,), (n, n)   of every unknown
-    where : for each state, positions of its parameters in x
-    shared : {(effect, text, number): position in x} of parameters that the states share
-    fits : the states one by one, with their part of x and of the covariance
-    """
-
+    # x, covariance: (n,), (n, n) of every unknown
     x: np.ndarray
     covariance: np.ndarray
-    where: tuple[np.ndarray, ...]
+    where: tuple[np.ndarray, ...]  # for each state, positions of its parameters in x
+    # {(effect, text, number): position in x} of parameters that the states share
     shared: dict[SharedKey, int]
+    # the states one by one, with their part of x and of the covariance
     fits: tuple[HypothesisFit, ...]
 
     def posterior(self) -> Posterior:

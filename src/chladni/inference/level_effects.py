@@ -66,21 +66,14 @@ def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
 
 @dataclass(frozen=True)
 class LinearJoint:
-    """K and GE, common to all springs and bushes, that reproduce a mode at one level.
+    """K and GE, common to all springs and bushes, that reproduce a mode at one level."""
 
-    Attributes
-    ----------
-    mode_hz, level : frequency at the lowest level [Hz], and the level [N] or [m/s²]
-    stiffness : factor on K of the deck, which is that of the level that was fitted
-    loss : GE of the joints; other losses stay in the damping of the mode
-    share : share of the mode's strain energy in springs and bushes
-    """
-
+    # mode_hz, level: frequency at the lowest level [Hz], and the level [N] or [m/s²]
     mode_hz: float
     level: float
-    stiffness: float
-    loss: float
-    share: float
+    stiffness: float  # factor on K of the deck, which is that of the level that was fitted
+    loss: float  # GE of the joints; other losses stay in the damping of the mode
+    share: float  # share of the mode's strain energy in springs and bushes
 
 
 def linear_joints(

@@ -48,37 +48,27 @@ def rms_over_lines(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Damping-equalised FRFs.
+    """Damping-equalised FRFs."""
 
-    Attributes
-    ----------
-    values : (n_f, n_out, n_in) complex    H_X(s)
-    s : (n_f,) complex                     [rad/s]
-    outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
-    direct : (n_out, n_in)                 rigid motion with a moving base, 0 for forces
-    use : (n_f, n_out) bool                lines and channels the fit may see
-    sigma_model : float                    sd of log10 H that neither noise nor δ explains
-    noise : (n_f, n_out, n_in)             sd of log10 H of independent samples, spread included
-    spread : (n_f, n_out, n_in)            sd of log10 H between repeats or articles
-    level : (n_out, n_in)                  rms of |H_X| over fitted lines; None: over all lines
-    """
-
-    values: np.ndarray
-    s: np.ndarray
+    values: np.ndarray  # (n_f, n_out, n_in) H_X(s), complex
+    s: np.ndarray  # (n_f,) [rad/s], complex
+    # outputs, inputs: sparse rows (n_out, n), (n_in, n) of the structure
     outputs: object
     inputs: object
-    use: np.ndarray
+    use: np.ndarray  # (n_f, n_out) bool, lines and channels the fit may see
     quantity: str = "accelerance"
-    sigma_model: float = 0.003
+    sigma_model: float = 0.003  # sd of log10 H that neither noise nor δ explains
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    # (n_f, n_out, n_in) sd of log10 H of independent samples, spread included
     noise: np.ndarray | None = None
-    spread: np.ndarray | None = None
+    spread: np.ndarray | None = None  # (n_f, n_out, n_in) sd of log10 H between repeats or articles
+    # (n_out, n_in) rms of |H_X| over fitted lines; None: over all lines
     level: np.ndarray | None = None
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
     about: State | None = None  # from which the errors of form spread
-    direct: np.ndarray | float = 0.0
+    direct: np.ndarray | float = 0.0  # (n_out, n_in) rigid motion with a moving base, 0 for forces
     sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
     known: Whitening | None = None  # of what those errors do to the lines and channels in use
 

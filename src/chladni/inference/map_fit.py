@@ -41,26 +41,15 @@ class MassMeasurement:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Effects at their most probable x.
+    """Effects at their most probable x."""
 
-    Attributes
-    ----------
-    effects : tuple of Effect      in the order of x
-    x : (n_p,)                     most probable parameters
-    covariance : (n_p, n_p)        of x, Laplace's
-    misfit : float                 |r|² of the data alone
-    neg2_log_evidence : float      -2 ln evidence up to a constant common to all fits of the data
-    state : State                  the reduced model there
-    data : Data                    what was fitted
-    """
-
-    effects: tuple[Effect, ...]
-    x: np.ndarray
-    covariance: np.ndarray
-    misfit: float
-    neg2_log_evidence: float
-    state: State
-    data: Data
+    effects: tuple[Effect, ...]  # in the order of x
+    x: np.ndarray  # (n_p,) most probable parameters
+    covariance: np.ndarray  # (n_p, n_p) of x, Laplace's
+    misfit: float  # |r|² of the data alone
+    neg2_log_evidence: float  # -2 ln evidence up to a constant common to all fits of the data
+    state: State  # the reduced model there
+    data: Data  # what was fitted
     status: Status
 
     def of(self, effect: Effect) -> np.ndarray:

@@ -30,33 +30,22 @@ SCALE_SD = 0.35  # of its logarithm: these are the ends of its 95 % interval
 
 @dataclass(frozen=True, eq=False)
 class Poles:
-    """Natural frequencies, each with the standard deviation of its logarithm.
+    """Natural frequencies, each with the standard deviation of its logarithm."""
 
-    Attributes
-    ----------
-    frequency : (n,) Hz       increasing
-    sd : (n,)                 of ln f, from the identification
-    use : (n,) bool           poles the fit may see
-    strength : (n,)           peak height relative to the highest
-    band : (low, high) Hz     in which the test would have shown a mode
-    scale : float             irreducible spread of ln f; learned with every hypothesis
-    spurious : (n,) or float  chance of each pole to belong to no mode of the structure
-    outputs, inputs           rows at the likely places of sensors and shakers, or None
-    shapes : ShapeData        of every pole at the first of the outputs, or None
-    """
-
-    frequency: np.ndarray
-    sd: np.ndarray
-    use: np.ndarray
-    strength: np.ndarray
-    band: tuple[float, float]
-    scale: float = SCALE
+    frequency: np.ndarray  # (n,) [Hz], increasing
+    sd: np.ndarray  # (n,) of ln f, from the identification
+    use: np.ndarray  # (n,) bool, poles the fit may see
+    strength: np.ndarray  # (n,) peak height relative to the highest
+    band: tuple[float, float]  # (low, high) [Hz] in which the test would have shown a mode
+    scale: float = SCALE  # irreducible spread of ln f; learned with every hypothesis
+    # outputs, inputs: rows at the likely places of sensors and shakers, or None
     outputs: object = None
     inputs: object = None
+    # (n,) chance of each pole to belong to no mode of the structure
     spurious: np.ndarray | float = SPURIOUS
     a: np.ndarray | None = None
     b: np.ndarray | None = None
-    shapes: ShapeData | None = None
+    shapes: ShapeData | None = None  # of every pole at the first of the outputs, or None
 
     @property
     def compared(self) -> Literal["frequencies", "modes"]:

@@ -28,17 +28,11 @@ Proposal = Callable[[np.ndarray, np.random.RandomState], tuple[np.ndarray, np.nd
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Draws of all walkers after the burn-in.
+    """Draws of all walkers after the burn-in."""
 
-    Attributes
-    ----------
-    x : (steps, walkers, n)
-    autocorrelation_time : (n,)   steps between independent draws of each unknown
-    steps, discarded : of each walker, and the first of them that are left out
-    """
-
-    x: np.ndarray
-    autocorrelation_time: np.ndarray
+    x: np.ndarray  # (steps, walkers, n)
+    autocorrelation_time: np.ndarray  # (n,) steps between independent draws of each unknown
+    # steps, discarded: of each walker, and the first of them that are left out
     steps: int
     discarded: int
 

@@ -115,21 +115,15 @@ def oscillator_scores(
 
 @dataclass(frozen=True, eq=False)
 class Reanalysis:
-    """Responses of a state with a dynamic stiffness added at one of many places.
-
-    Attributes
-    ----------
-    H : (n_f, n_out, n_in)                     receptances of the state
-    G_ob, G_bi : (n_places, n_f, n_out or n_in)  from the places to outputs, from inputs to them
-    G_bb : (n_places, n_f)                     of the places themselves
-    """
+    """Responses of a state with a dynamic stiffness added at one of many places."""
 
     base: Baseline
     data: Responses
-    H: np.ndarray
+    H: np.ndarray  # (n_f, n_out, n_in) receptances of the state
+    # G_ob, G_bi: (n_places, n_f, n_out or n_in) from the places to outputs, from inputs to them
     G_ob: np.ndarray
     G_bi: np.ndarray
-    G_bb: np.ndarray
+    G_bb: np.ndarray  # (n_places, n_f) of the places themselves
 
     def residuals(self, D: np.ndarray, added: float) -> np.ndarray:
         """Residuals (n, n_places) with the dynamic stiffness D (n_f,) and ``added`` kg of mass."""

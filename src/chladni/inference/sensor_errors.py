@@ -31,20 +31,13 @@ WAYS = ("tilt about u", "tilt about v", "place along u", "place along v")
 
 @dataclass(frozen=True, eq=False)
 class SensorErrors:
-    """Errors of measured dofs.
+    """Errors of measured dofs."""
 
-    Attributes
-    ----------
-    gain : relative standard deviation
-    rows : four (k, n)     motions added by tilts and wrong places, times standard deviations
-    with_base : (4, k, n_in) rigid-body share of these motions under a moving base
-    modal : (4, k, r)      the rows in a basis
-    """
-
-    gain: float
+    gain: float  # relative standard deviation
+    # four (k, n), motions added by tilts and wrong places, times standard deviations
     rows: tuple[sp.csr_array, ...]
-    with_base: np.ndarray
-    modal: np.ndarray
+    with_base: np.ndarray  # (4, k, n_in) rigid-body share of these motions under a moving base
+    modal: np.ndarray  # (4, k, r) the rows in a basis
 
     def rebased(self, model: Reduced) -> Self:
         """The rows in the basis of this model."""

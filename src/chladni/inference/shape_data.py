@@ -23,16 +23,10 @@ UNIT = 1e-300  # least norm of a shape
 
 @dataclass(frozen=True, eq=False)
 class ShapeData:
-    """Measured shapes at the sensors.
+    """Measured shapes at the sensors."""
 
-    Attributes
-    ----------
-    values : (n, n_out)     real, of unit norm
-    variance : (n, n_out)   of each entry, without errors of the model's form: D
-    """
-
-    values: np.ndarray
-    variance: np.ndarray
+    values: np.ndarray  # (n, n_out) real, of unit norm
+    variance: np.ndarray  # (n, n_out) of each entry, without errors of the model's form: D
 
     def mac(self, phi: np.ndarray) -> np.ndarray:
         """MAC of each shape with a column of φ (n_out, n) at its place (n,)."""

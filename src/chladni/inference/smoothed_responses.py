@@ -79,26 +79,17 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A recording on a few wide lines, and the model that is to answer likewise.
-
-    Attributes
-    ----------
-    f : (n_f,)                      lines on which the model is evaluated [Hz]
-    weights : (n_s, n_f)            of the smoothing
-    log_test : (n_s, n_out, n_in)   log10 of the smoothed recording, less its level
-    level : median of log10 |H|
-    phi_o, drive : (n_out, r), (n_in, r)   shapes at outputs, loads of the inputs
-    omega : (r,)                    [rad/s], 0 of rigid motions
-    """
+    """A recording on a few wide lines, and the model that is to answer likewise."""
 
     reading: Reading
-    f: np.ndarray
-    weights: np.ndarray
-    log_test: np.ndarray
-    level: float
+    f: np.ndarray  # (n_f,) lines on which the model is evaluated [Hz]
+    weights: np.ndarray  # (n_s, n_f) of the smoothing
+    log_test: np.ndarray  # (n_s, n_out, n_in) log10 of the smoothed recording, less its level
+    level: float  # median of log10 |H|
+    # phi_o, drive: (n_out, r), (n_in, r) shapes at outputs, loads of the inputs
     phi_o: np.ndarray
     drive: np.ndarray
-    omega: np.ndarray
+    omega: np.ndarray  # (r,) [rad/s], 0 of rigid motions
 
     def answers(
         self,

@@ -12,20 +12,12 @@ import scipy.sparse as sp
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """C^-½ of C = I + V Vᵀ.
+    """C^-½ of C = I + V Vᵀ."""
 
-    Attributes
-    ----------
-    own : (n, k) sparse, orthonormal    columns that live on one output each
-    own_less : (k,)                     1 - 1/√(1 + s)
-    common : (n, m) orthonormal
-    common_less : (m,)
-    """
-
-    own: sp.csc_array
-    own_less: np.ndarray
-    common: np.ndarray
-    common_less: np.ndarray
+    own: sp.csc_array  # (n, k) columns that live on one output each, orthonormal
+    own_less: np.ndarray  # (k,) 1 - 1/√(1 + s)
+    common: np.ndarray  # (n, m), orthonormal
+    common_less: np.ndarray  # (m,)
 
     def whitened(self, r: np.ndarray) -> np.ndarray:
         """Residuals or columns of slopes (n, ...)."""

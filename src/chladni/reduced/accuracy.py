@@ -30,18 +30,11 @@ RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as 
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """Frequencies of the reduced model and their estimated errors.
+    """Frequencies of the reduced model and their estimated errors."""
 
-    Attributes
-    ----------
-    frequency : (k,) Hz    flexible modes up to the highest frequency of interest
-    error : (k,)           estimated relative error of each, f / f_true - 1 >= 0
-    missing : (n, k)       the part of each mode that the basis lacks
-    """
-
-    frequency: np.ndarray
-    error: np.ndarray
-    missing: np.ndarray
+    frequency: np.ndarray  # (k,) [Hz] of flexible modes up to the highest frequency of interest
+    error: np.ndarray  # (k,) estimated relative error of each, f / f_true - 1 >= 0
+    missing: np.ndarray  # (n, k) the part of each mode that the basis lacks
 
     @property
     def worst(self) -> float:

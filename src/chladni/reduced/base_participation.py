@@ -18,18 +18,11 @@ from ..fem.base_motion import BaseMotion
 
 @dataclass(frozen=True, eq=False)
 class BaseParticipation:
-    """Participation l of the nominal model, by groups of shells.
-
-    Attributes
-    ----------
-    motion : BaseMotion
-    groups : (g, r, k)    Φᵀ Tᵀ M_g R b [√kg]
-    rest : (r, k)         share of the mass that is in no group
-    """
+    """Participation l of the nominal model, by groups of shells."""
 
     motion: BaseMotion
-    groups: np.ndarray
-    rest: np.ndarray
+    groups: np.ndarray  # (g, r, k) Φᵀ Tᵀ M_g R b [√kg]
+    rest: np.ndarray  # (r, k) share of the mass that is in no group
 
     def extended_to(self, built: Structure) -> Self:
         """The participation on a structure with further dofs, which the basis does not move yet."""

@@ -54,20 +54,15 @@ def applied(part: MatrixTerm, u: np.ndarray, frame: UnrisenModes, M: sp.csr_arra
 
 @dataclass(frozen=True, eq=False)
 class Dissipated:
-    """Dissipation of effects in the modes of a state.
+    """Dissipation of effects in the modes of a state."""
 
-    Attributes
-    ----------
-    ratio, slopes : (m,), (n_p, m)           ζ that effects add to each mode, ∂ζ/∂x
-    coupling, dcoupling : (m, m), (n_p, m, m)   N off its diagonal, ∂N/∂x with the modes held
-    omega : (m,) [rad/s]    of the modes; infinite for rigid ones, which are not coupled
-    """
-
+    # ratio, slopes: (m,), (n_p, m) ζ that effects add to each mode, ∂ζ/∂x
     ratio: np.ndarray
     slopes: np.ndarray
+    # coupling, dcoupling: (m, m), (n_p, m, m) N off its diagonal, ∂N/∂x with the modes held
     coupling: np.ndarray
     dcoupling: np.ndarray
-    omega: np.ndarray
+    omega: np.ndarray  # (m,) [rad/s] of the modes; infinite for rigid ones, which are not coupled
 
     @property
     def held(self) -> "Dissipated":
@@ -202,22 +197,16 @@ class _RisenSlopes:
     """∂(c G A G - c A)/∂x = c (H + Hᵀ) + own - plain in modes; the last two by own parameters.
 
     H = G A ∂G: its low modes change their factor, the high ones have one factor for all.
-
-    Attributes
-    ----------
-    at : own parameters
-    GA : (m, m)
-    low : (k,)              modes below the upper end of the band
-    rows, columns : (n_p, k, m), (n_p, m, k)   ∂G of low modes by all, and of high modes by low ones
-    own, plain : (n_own, m, m)
     """
 
-    at: slice
+    at: slice  # own parameters
     c: float
-    GA: np.ndarray
-    low: np.ndarray
+    GA: np.ndarray  # (m, m)
+    low: np.ndarray  # (k,) modes below the upper end of the band
+    # rows, columns: (n_p, k, m), (n_p, m, k) ∂G of low modes by all, and of high modes by low ones
     rows: np.ndarray
     columns: np.ndarray
+    # own, plain: (n_own, m, m)
     own: np.ndarray
     plain: np.ndarray
 
@@ -266,17 +255,11 @@ def _divided(g: np.ndarray, lam: np.ndarray, rise: Rise) -> np.ndarray:
 
 
 class _Mixing(NamedTuple):
-    """How the modes that a test sees follow the parameters.
+    """How the modes that a test sees follow the parameters."""
 
-    Attributes
-    ----------
-    seen : (k,)                 positions of these modes
-    turned : (n_p, m, k)        ∂φ/∂x in modes, without the change of length
-    growth, scaled : (n_p, k)   ∂λ and φᵀ∂Mφ
-    """
-
-    seen: np.ndarray
-    turned: np.ndarray
+    seen: np.ndarray  # (k,) positions of these modes
+    turned: np.ndarray  # (n_p, m, k) ∂φ/∂x in modes, without the change of length
+    # growth, scaled: (n_p, k) ∂λ and φᵀ∂Mφ
     growth: np.ndarray
     scaled: np.ndarray
 

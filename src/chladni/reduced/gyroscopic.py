@@ -31,17 +31,11 @@ def skew(h: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Spin:
-    """All spinning parts of a state.
+    """All spinning parts of a state."""
 
-    Attributes
-    ----------
-    rows : β (k, m)       rotations over the modes
-    matrix : S (k, k)     skew
-    slopes : L (j, m) and R (j, m) with ∂(βᵀSβ)/∂x = LᵀR, by position of the parameter
-    """
-
-    rows: np.ndarray
-    matrix: np.ndarray
+    rows: np.ndarray  # β (k, m), rotations over the modes
+    matrix: np.ndarray  # S (k, k), skew
+    # L (j, m) and R (j, m) with ∂(βᵀSβ)/∂x = LᵀR, by position of the parameter
     slopes: Mapping[int, tuple[np.ndarray, np.ndarray]]
 
     def of_last(self, first: int) -> Self:

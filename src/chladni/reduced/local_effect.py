@@ -106,18 +106,12 @@ class LocalEffect:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rows B (k, n) on which some parts act: operators, and rows of points.
-
-    Attributes
-    ----------
-    at : positions of each part among the rows
-    dense : each operator on its own rows
-    in_basis, flexibility : B Φ (k, r), and R (k, k)
-    """
+    """Rows B (k, n) on which some parts act: operators, and rows of points."""
 
     parts: list[sp.csr_array]
-    at: list[np.ndarray]
-    dense: list[np.ndarray]
+    at: list[np.ndarray]  # positions of each part among the rows
+    dense: list[np.ndarray]  # each operator on its own rows
+    # in_basis, flexibility: B Φ (k, r), R (k, k)
     in_basis: np.ndarray
     flexibility: np.ndarray
 

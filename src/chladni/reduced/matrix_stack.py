@@ -15,13 +15,9 @@ COLUMNS = 64  # of a block
 
 @dataclass(frozen=True, eq=False)
 class MatrixStack:
-    """Matrices (g, r, r), symmetric.
+    """Matrices (g, r, r), symmetric."""
 
-    Attributes
-    ----------
-    blocks : (g, end, k) each   columns of the upper triangle, which end with the k of the diagonal
-    """
-
+    # (g, end, k) each, columns of the upper triangle, which end with the k of the diagonal
     blocks: tuple[np.ndarray, ...]
 
     @property

@@ -20,18 +20,11 @@ CLOSE = 1e-9  # distance of two logarithms within which a divided difference is 
 
 @dataclass(frozen=True, eq=False)
 class ModalFactors:
-    """All factors on one set of modes.
+    """All factors on one set of modes."""
 
-    Attributes
-    ----------
-    rows : (k, n)          ΦᵀM
-    W : (k, k)
-    slopes : ∂W/∂x (k, k), by the position of the parameter
-    """
-
-    rows: sp.csr_array
-    W: np.ndarray
-    slopes: dict[int, np.ndarray]
+    rows: sp.csr_array  # (k, n) ΦᵀM
+    W: np.ndarray  # (k, k)
+    slopes: dict[int, np.ndarray]  # ∂W/∂x (k, k), by the position of the parameter
 
     def multiply(
         self, U: np.ndarray, V: np.ndarray, K: np.ndarray, dK: MatrixSlopes

@@ -43,29 +43,21 @@ from .state import State as State
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """Projected operators over one basis.
+    """Projected operators over one basis."""
 
-    Attributes
-    ----------
-    groups : of the structure's shells and beams
-    vectors : Φ (n, r)        M-orthonormal; dofs of released clamps follow those of the deck
-    linear, cubic : {component: (g, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
-    mass : (g, r)             these three are stacks of r by r matrices, one for each group
-    K0, M0 : (r, r)           share of everything outside the groups
-    weight0 : float           mass outside the groups [kg]
-    base : participation of the basis in base motion, or None where forces drive the structure
-    following : (n, clamps)   response of the structure to unit motions of released clamps
-    """
-
-    groups: ElementGroups
-    vectors: Basis
+    groups: ElementGroups  # of the structure's shells and beams
+    vectors: Basis  # Φ (n, r), M-orthonormal; dofs of released clamps follow those of the deck
+    # linear, cubic: by component, "" alone, or one entry for each of Q11 Q22 Q12 Q66
     linear: Mapping[str, MatrixStack]
     cubic: Mapping[str, MatrixStack]
-    mass: MatrixStack
+    mass: MatrixStack  # these three are stacks of r by r matrices, one for each group
+    # K0, M0: (r, r), share of everything outside the groups
     K0: np.ndarray
     M0: np.ndarray
-    weight0: float
+    weight0: float  # mass outside the groups [kg]
+    # participation of the basis in base motion, or None where forces drive the structure
     base: BaseParticipation | None = None
+    # (n, clamps) response of the structure to unit motions of released clamps
     following: np.ndarray | None = None
     axis: np.ndarray | None = None  # (3,) axis 1 of the components; None: that of the deck
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)

@@ -28,26 +28,17 @@ REACH = 2.5  # the basis holds modes up to this many times the highest frequency
 
 @dataclass(frozen=True, eq=False)
 class ReducedProblem:
-    """One structure, its reduced model, and the candidate places of effects.
-
-    Attributes
-    ----------
-    frequency : (r,) Hz      of the nominal model's modes, rigid ones included
-    f_max : highest frequency of interest [Hz]
-    candidates : ElementGrids  a sample of all of ``grids``
-    flexibility : (k,)       static response at each candidate beyond the basis [m/N]
-    hertz : shift of the static responses
-    """
+    """One structure, its reduced model, and the candidate places of effects."""
 
     structure: Structure
     groups: ElementGroups
     model: Reduced
-    frequency: np.ndarray
+    frequency: np.ndarray  # (r,) [Hz] of the nominal model's modes, rigid ones included
     factor: Factor
-    hertz: float
+    hertz: float  # shift of the static responses
     grids: ElementGrids
-    candidates: ElementGrids
-    f_max: float
+    candidates: ElementGrids  # a sample of all of ``grids``
+    f_max: float  # highest frequency of interest [Hz]
 
     def flexibility(self, where: ElementGrids) -> np.ndarray:
         """b (K + σM)⁻¹ bᵀ less the share within the basis (k,) [m/N]."""
