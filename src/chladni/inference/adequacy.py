@@ -149,14 +149,10 @@ def adequacy(
     seen, square = model.statistics(r, r0)
     rng = np.random.default_rng(20250103)
     sd = np.array([p.sd for p in unknowns(fit.effects)])
-    own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
-    p, least, better = ranked(seen, np.array(own), TWO_SIDED)
+    own = np.array([_drawn(model, sd, len(r0), rng) for _ in range(draws)])
+    p, least, better = ranked(seen, own, TWO_SIDED)
     where, worst = _where(data, square, labels)
-    ranges = np.quantile(own, (0.5, 0.005, 0.995), axis=0).T
-    rows = tuple(
-        FitStatistic(name, float(value), *map(float, row))
-        for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
-    )
+    rows = tuple(map(FitStatistic.of, STATISTICS, seen, own.T))
     usual = rows[least].median
     what = NAMES[least].format(
         seen[least], usual, seen[least] / usual, 100 * seen[least], 100 * usual

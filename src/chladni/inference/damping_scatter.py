@@ -53,9 +53,7 @@ class ModalDamping(IdentifiedDamping):
         own = _statistics(np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(self.ratio))))
         seen = _statistics(np.log(self.ratio)[None])[0]
         p = (1 + (own >= seen).sum(axis=0)) / (1 + DRAWS)
-        median, low, high = np.quantile(own[:, 0], (0.5, 0.005, 0.995))
-        row = FitStatistic("uneven damping", float(seen[0]), float(median), float(low), float(high))
-        return float(p.min()), row
+        return float(p.min()), FitStatistic.of("uneven damping", seen[0], own[:, 0])
 
     def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
         """P-value that damping follows a share (n,) of the modes by scatter alone; its statistic.

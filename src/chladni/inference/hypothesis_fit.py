@@ -124,7 +124,7 @@ class UpdatingProblem:
     """Data and model of a diagnosis."""
 
     reduced: ReducedProblem
-    data: Responses | Poles
+    data: Data
     mass_measurement: MassMeasurement | None
     base: tuple[Effect, ...]  # calibration parameters and nuisances, free in every fit
     nuisance: tuple[Effect, ...]  # the nuisances alone
@@ -350,10 +350,9 @@ def over_scales(data: Poles, state: State, r0: np.ndarray, J0: np.ndarray) -> fl
     for scale in SCALES:
         given = replace(data, scale=scale)
         r, J = given.scaled(state, True)
-        A, g = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0
-        cost = r @ r + r0 @ r0 - g @ np.linalg.solve(A, g)
         widths = 2 * np.log(given.std()[data.use]).sum()
-        every.append(cost + np.linalg.slogdet(A)[1] + widths + _scale_prior(scale))
+        S = LinearModel(None, J, J0).neg2_log_evidence(r, r0)
+        every.append(S + widths + _scale_prior(scale))
     step = np.log(SCALES[1] / SCALES[0]) / (SCALE_SD * np.sqrt(np.pi))
     return float(-2 * (logsumexp(-np.array(every) / 2) + np.log(step)))
 

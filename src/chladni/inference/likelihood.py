@@ -2,11 +2,12 @@
 
 :class:`Responses` are the complex log10 deviation of the damping-equalised FRF on s = ω (ζ + i).
 This is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides. The same
-interface serves natural frequencies alone (:class:`.pole_data.Poles`).
+interface serves natural frequencies alone (:class:`.pole_data.Poles`): residuals of a state, their
+slopes, and ``error``, the covariance of errors of form that is still in them.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal, Protocol, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -16,29 +17,13 @@ from ..reduced.matrix_slopes import spanned
 from ..reduced.matrix_stack import EVERY
 from ..reduced.reduced_model import Reduced, State
 from .discrepancy import MEDIAN, Discrepancy, Form, discrepancy, form
+from .pole_data import Poles
 from .sensor_errors import SensorErrors
 from .whitening import Whitening, whitening
 
 LN10 = np.log(10.0)
 USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
 WRAPS = 0.4  # relative deviation of H from which its phase may wrap
-
-
-class Data(Protocol):
-    """Residuals of a state; their covariance is one without an error of form."""
-
-    @property
-    def error(self) -> Discrepancy | None:
-        """Covariance of the model's errors of form, or None."""
-
-    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """r (n,) over the spread of each sample and ∂r/∂x (n, n_p); ``error`` is still in them."""
-
-    def scaled_slopes(self, state: State) -> np.ndarray:
-        """The slopes ∂r/∂x of :meth:`scaled` alone."""
-
-    def rebased(self, model: Reduced) -> Self:
-        """Return the data with rows in another basis."""
 
 
 def rms_over_lines(values: np.ndarray) -> np.ndarray:
@@ -311,3 +296,6 @@ class Responses:
         if not use.any():
             return float("nan")
         return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
+
+
+Data = Responses | Poles

@@ -1,6 +1,9 @@
 """The parts of a diagnosis as types: one a key of ``diagnosis.json`` (SI)."""
 
 from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
 
 from ..effects.estimate import Estimate, Location
 
@@ -171,6 +174,11 @@ class FitStatistic:
     median: float
     low: float
     high: float
+
+    @classmethod
+    def of(cls, name: str, value: float, draws: np.ndarray) -> Self:
+        """The statistic among its draws (n,)."""
+        return cls(name, float(value), *map(float, np.quantile(draws, (0.5, 0.005, 0.995))))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ flexibility beyond the basis.  Calibration parameters, scatter and the errors of
 are marginalised: C = I + W Wᵀ with W the slopes times the prior standard deviations (Woodbury).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,11 +83,11 @@ def point_scores(
     strengths : [kg] or [N/m]
     residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
     """
-    at = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
+    residuals = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
     out = np.empty((len(places), len(strengths)))
     for k, c in enumerate(strengths):
         D, added = (c * data.s**2, c) if matrix == "M" else (c + 0 * data.s, 0.0)
-        out[:, k] = base.score(at.residuals(D, added))
+        out[:, k] = base.score(residuals(D, added))
     return out
 
 
@@ -104,57 +104,40 @@ def oscillator_scores(
     hertz : (k,)                    frequencies of the mass on its spring, with a fixed base
     residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
     """
-    at = reanalysis(base, model, data, places, residual_flexibility, True)
+    residuals = reanalysis(base, model, data, places, residual_flexibility, True)
     amount, score = np.empty((2, len(places), len(hertz)))
     for k, omega2 in enumerate((2 * np.pi * hertz) ** 2):
         D = mass * data.s**2 * omega2 / (omega2 + data.s**2)
-        secant = at.residuals(D, mass) - base.residual[:, None]
+        secant = residuals(D, mass) - base.residual[:, None]
         amount[:, k], score[:, k] = direction_scores(base, secant)
     return mass * amount, score
-
-
-@dataclass(frozen=True, eq=False)
-class Reanalysis:
-    """Responses of a state with a dynamic stiffness added at one of many places."""
-
-    base: Baseline
-    data: Responses
-    H: np.ndarray  # (n_f, n_out, n_in) receptances of the state
-    # G_ob, G_bi: (n_places, n_f, n_out or n_in) from the places to outputs, from inputs to them
-    G_ob: np.ndarray
-    G_bi: np.ndarray
-    G_bb: np.ndarray  # (n_places, n_f) of the places themselves
-
-    def residuals(self, D: np.ndarray, added: float) -> np.ndarray:
-        """Residuals (n, n_places) with the dynamic stiffness D (n_f,) and ``added`` kg of mass."""
-        share = D / (1 + D * self.G_bb)
-        change = self.G_ob[..., None] * (share[:, :, None, None] * self.G_bi[:, :, None, :])
-        delta = self.data.deviation(self.base.state, self.H[None] - change)
-        return self.base.with_mass(self.data.stacked(delta / self.data.std()), added)
 
 
 def reanalysis(
     base: Baseline, model: Reduced, data: Responses, places: ElementGrids,
     residual_flexibility: np.ndarray, massive: bool,
-) -> Reanalysis:  # fmt: skip
-    """Receptances between the places, the outputs and the inputs.
+) -> Callable[[np.ndarray, float], np.ndarray]:  # fmt: skip
+    """Residuals (n, n_places) with a dynamic stiffness D (n_f,) and so much mass [kg] at a place.
 
     A ``massive`` addition is also loaded by base motion; a spring only by the structure's motion.
     """
     phi_o, phi_i, d = data.modal(base.state)
     phi_b = model.rows(places.rows) @ base.state.phi
+    H = data.receptance(base.state, phi_o, phi_i, d)
+    G_ob = base.state.between(data.s, d, phi_o, phi_b).transpose(2, 0, 1)
     G_bi = base.state.between(data.s, d, phi_b, phi_i).transpose(1, 0, 2)
+    G_bb = (phi_b**2) @ d.T + residual_flexibility[:, None]
     if massive and model.base is not None:
         moved_with_base = model.base.motion.moved_with_base(places.rows)
         G_bi = G_bi + moved_with_base[:, None] / (data.s**2)[:, None]
-    return Reanalysis(
-        base,
-        data,
-        data.receptance(base.state, phi_o, phi_i, d),
-        base.state.between(data.s, d, phi_o, phi_b).transpose(2, 0, 1),
-        G_bi,
-        (phi_b**2) @ d.T + residual_flexibility[:, None],
-    )
+
+    def residuals(D: np.ndarray, added: float) -> np.ndarray:
+        share = D / (1 + D * G_bb)
+        change = G_ob[..., None] * (share[:, :, None, None] * G_bi[:, :, None, :])
+        delta = data.deviation(base.state, H[None] - change)
+        return base.with_mass(data.stacked(delta / data.std()), added)
+
+    return residuals
 
 
 @dataclass(frozen=True, eq=False)
