@@ -20,14 +20,14 @@ from typing import Any, Self
 import numpy as np
 from scipy.special import chdtrc, ndtr
 
-from ..reduced.reduced_model import State, evaluate
+from ..reduced.reduced_model import State
 from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
 from .discrepancy import LEARNED, RIGID, Discrepancy
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Responses
 from .linear_model import LinearModel
-from .map_fit import MassMeasurement, prior_residuals, unknowns
+from .map_fit import MassMeasurement, posterior, unknowns
 from .pole_data import SCALE, SCALE_SD, Poles
 from .result import FitStatistic
 
@@ -142,14 +142,12 @@ def adequacy(
         return of_poles(data, fit.state)
     if not isinstance(data, Responses) or data.error is None:
         return None
-    state = evaluate(hypothesis.model, fit.effects, fit.x)
-    r, J = data.scaled(state, True)
-    r0, J0 = prior_residuals(fit.effects, mass_measurement, fit.x, state)
-    model = _Linear(data.error, J, J0, data.use, data.values.shape[2])
-    seen, square = model.statistics(r, r0)
+    _, at = posterior(hypothesis.model, fit.effects, data, mass_measurement, fit.x).sloped()
+    model = _Linear(data.error, at.model.J, at.model.J0, data.use, data.values.shape[2])
+    seen, square = model.statistics(at.r, at.r0)
     rng = np.random.default_rng(20250103)
     sd = np.array([p.sd for p in unknowns(fit.effects)])
-    own = np.array([_drawn(model, sd, len(r0), rng) for _ in range(draws)])
+    own = np.array([_drawn(model, sd, len(at.r0), rng) for _ in range(draws)])
     p, least, better = ranked(seen, own, TWO_SIDED)
     where, worst = _where(data, square, labels)
     rows = tuple(map(FitStatistic.of, STATISTICS, seen, own.T))
@@ -163,7 +161,14 @@ def adequacy(
         test = _evenly_damped(test, damping.above(_first(data, fit.state)))
     if coupling is None:
         return test
-    test = _coupled_by_damping(test, coupling)
+    p, row, what, modes = coupling.tested()
+    test = test.or_less_likely(
+        p,
+        row,
+        what=f"{what}: a part rotates or is driven by itself, or channels are delayed",
+        where="near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz",
+        modes_hz=modes,
+    )
     return test if test.passes else replace(test, step=coupling.step)
 
 
@@ -180,14 +185,6 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
         return test
     what, where, modes = damping.said()
     return test.or_less_likely(*damping.tested(), what=what, where=where, modes_hz=modes)
-
-
-def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
-    """The test, or that of complex modes where it is the less likely of the two."""
-    p, row, what, modes = coupling.tested()
-    what += ": a part rotates or is driven by itself, or channels are delayed"
-    where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
-    return test.or_less_likely(p, row, what=what, where=where, modes_hz=modes)
 
 
 def of_poles(data: Poles, state: State) -> FitTest:

@@ -121,17 +121,12 @@ def identifiability(problem: UpdatingProblem) -> Identifiability:
     ``DECADES`` are also looked at along their range: those that the data know anywhere are free.
     """
     mean, effects = problem.mean(), [e for e in problem.base if e.kind == "calibration"]
-    at = _positions(effects)
+    at = [np.arange(own.start, own.stop) for _, own in slices(effects)]
     nominal = information(problem, mean)
-    frozen = nominal.frozen(at)
     curves = dict(_curves(problem, mean))
-    frozen = [k for k in frozen if not _known_somewhere(curves, at[k])]
+    frozen = [k for k in nominal.frozen(at) if not _known_somewhere(curves, at[k])]
     settled = set(frozen) - set(nominal.frozen(at, True)) if not nominal.weighed else set()
     return _in_words(effects, at, nominal, frozen, settled, curves)
-
-
-def _positions(effects: Sequence[Effect]) -> list[np.ndarray]:
-    return [np.arange(s.start, s.stop) for _, s in slices(effects)]
 
 
 Curves = dict[int, tuple[ValueAndSpread, ...]]
@@ -199,7 +194,9 @@ def _in_words(
         )
         for k in range(len(names))
     )  # fmt: skip
-    C = _correlation(np.linalg.inv(F + np.eye(len(F))))
+    C = np.linalg.inv(F + np.eye(len(F)))
+    sd = np.sqrt(np.diag(C))
+    C /= np.outer(sd, sd)
     return Identifiability(
         rows, tuple(map(tuple, C.tolist())), collinearity(F), tuple(_directions(F, names, prior)),
         told.weighed,
@@ -239,11 +236,6 @@ def _alone(F: np.ndarray) -> list[float | None]:
         if not np.any(V[n, null] ** 2 > 1e-6):
             out[k] = float(np.sqrt((V[n, ~null] ** 2 / w[~null]).sum()) / scale[k])
     return out
-
-
-def _correlation(C: np.ndarray) -> np.ndarray:
-    sd = np.sqrt(np.diag(C))
-    return np.asarray(C / np.outer(sd, sd))
 
 
 def collinearity(F: np.ndarray) -> float | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.effect import Effect, of_test
+from ..effects.effect import Effect, Parameter, of_test
 from ..reduced.reduced_model import State
 from .hypothesis_fit import HypothesisFit
 from .linear_model import Squares
@@ -50,9 +50,8 @@ def joint_fit(
     states : one fit each; the first that has a shared parameter sets its prior
     masses : weighed mass of each state
     """
-    where, shared, first = _positions(states)
-    n = 1 + max(int(at.max(initial=-1)) for at in where)
-    start, priors = np.zeros(n), [p for p, _ in sorted(first, key=lambda pair: pair[1])]
+    where, shared, priors = _positions(states)
+    start = np.zeros(len(priors))
     for fit, at in zip(reversed(states), reversed(where), strict=True):
         start[at] = fit.fit.x
     mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
@@ -79,19 +78,18 @@ def joint_fit(
     limit = np.array([p.step for p in priors])
     x, squares, found, _ = descend(objective, start, limit, max_steps, tol)
     covariance = np.linalg.inv(squares.information)
-    fits = tuple(
-        _of_state(one, x[at], covariance[np.ix_(at, at)], state)
-        for one, at, state in zip(states, where, found, strict=True)
-    )
-    return JointFit(x, covariance, tuple(where), shared, fits)
+    fits = []
+    for one, at, state in zip(states, where, found, strict=True):
+        own = replace(one.fit, x=x[at], covariance=covariance[np.ix_(at, at)], state=state)
+        fits.append(replace(one, fit=own.kept()))
+    return JointFit(x, covariance, tuple(where), shared, tuple(fits))
 
 
 def _positions(
     states: Sequence[HypothesisFit],
-) -> tuple[list[np.ndarray], dict[SharedKey, int], list]:
-    """Positions of every state's and of the shared parameters, and (prior, position) of all."""
-    shared: dict[SharedKey, int] = {}
-    where, first, n = [], [], 0
+) -> tuple[list[np.ndarray], dict[SharedKey, int], list[Parameter]]:
+    """Positions of every state's and of the shared parameters, and the priors of all."""
+    shared, where, priors = dict[SharedKey, int](), [], list[Parameter]()
     for one in states:
         at = []
         for effect in one.fit.effects:
@@ -100,25 +98,18 @@ def _positions(
                 key = (effect.name, effect.text, k)
                 known = shared.get(key) if common else None
                 if known is None:
-                    known, n = n, n + 1
-                    first.append((p, known))
+                    known = len(priors)
+                    priors.append(p)
                     if common:
                         shared[key] = known
                 at.append(known)
         where.append(np.array(at, dtype=int))
-    return where, shared, first
+    return where, shared, priors
 
 
 def of_the_object(effect: Effect) -> bool:
     """True where an effect belongs to the object in all its states, not to one test of it."""
     return effect.kind in ("calibration", "nuisance") and not of_test(effect)
-
-
-def _of_state(
-    one: HypothesisFit, x: np.ndarray, covariance: np.ndarray, state: State
-) -> HypothesisFit:
-    fit = replace(one.fit, x=x, covariance=covariance, state=state).kept()
-    return replace(one, fit=fit)
 
 
 def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:

@@ -40,6 +40,22 @@ class MassMeasurement:
 
 
 @dataclass(frozen=True, eq=False)
+class LinearPosterior:
+    """A state with its slopes, and residuals of the data (n,) and of all other knowledge (m,)."""
+
+    state: State
+    model: LinearModel
+    r: np.ndarray
+    r0: np.ndarray
+
+    def under(self, error: Discrepancy) -> "Point":
+        """The posterior at the same x with errors of form of another size."""
+        linear = replace(self.model, error=error, within=self.model)
+        squares, there = linear.squares(self.r, self.r0), replace(self, model=linear)
+        return Point(squares.cost, lambda: (squares, there))
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Effects at their most probable x."""
 
@@ -51,6 +67,7 @@ class Fit:
     state: State  # the reduced model there
     data: Data  # what was fitted
     status: Status
+    linear: LinearPosterior | None = None
 
     def of(self, effect: Effect) -> np.ndarray:
         """The part of x that belongs to one effect."""
@@ -67,7 +84,7 @@ class Fit:
 
     def kept(self) -> Self:
         """The fit without ∂K and ∂M of its state, so that a search can keep many fits."""
-        return replace(self, state=self.state.without_slopes())
+        return replace(self, state=self.state.without_slopes(), linear=None)
 
     def sd(self, effect: Effect) -> np.ndarray:
         """Standard deviations of an effect's parameters."""
@@ -129,22 +146,6 @@ def constants(effects: Sequence[Effect]) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearPosterior:
-    """A state with its slopes, and residuals of the data (n,) and of all other knowledge (m,)."""
-
-    state: State
-    model: LinearModel
-    r: np.ndarray
-    r0: np.ndarray
-
-    def under(self, error: Discrepancy) -> "Point":
-        """The posterior at the same x with errors of form of another size."""
-        linear = replace(self.model, error=error, within=self.model)
-        squares, there = linear.squares(self.r, self.r0), replace(self, model=linear)
-        return Point(squares.cost, lambda: (squares, there))
-
-
-@dataclass(frozen=True, eq=False)
 class Point:
     """A sum of squares at one x; ``sloped`` computes its slopes, and a second value of any kind."""
 
@@ -190,6 +191,7 @@ def fit(
     *,
     max_steps: int = 30,
     tol: float = 0.05,
+    begun: Point | None = None,
 ) -> Fit:
     """Most probable x from one start, and the evidence there.
 
@@ -197,16 +199,8 @@ def fit(
     ----------
     start : (n_p,)      initial x
     tol : float        stop when a step improves -2 ln posterior by less
+    begun : at the start, where it is known
     """
-    return linearised_fit(model, effects, data, mass_measurement, start, max_steps, tol)[0]
-
-
-def linearised_fit(
-    model: Reduced, effects: Sequence[Effect], data: Data,
-    mass_measurement: MassMeasurement | None, start: np.ndarray, max_steps: int, tol: float = 0.05,
-    begun: Point | None = None,
-) -> tuple[Fit, LinearPosterior]:  # fmt: skip
-    """Fit as :func:`fit`, and keep the linear model at the end; ``begun`` is at the start."""
     limit = np.array([p.step for p in unknowns(effects)])
 
     def objective(x: np.ndarray) -> Point:
@@ -214,10 +208,9 @@ def linearised_fit(
 
     x, found, there, status = descend(objective, start, limit, max_steps, tol, begun)
     A = found.information
-    S = found.cost + np.linalg.slogdet(A)[1] + constants(effects)
+    S = float(found.cost + np.linalg.slogdet(A)[1] + constants(effects))
     misfit = found.cost - float(there.r0 @ there.r0)
-    done = tuple(effects), x, np.linalg.inv(A), misfit, float(S), there.state, data, status
-    return Fit(*done), there
+    return Fit(tuple(effects), x, np.linalg.inv(A), misfit, S, there.state, data, status, there)
 
 
 Objective = Callable[[np.ndarray], Point]
