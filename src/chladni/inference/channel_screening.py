@@ -125,11 +125,9 @@ def _by_modes(
 def shapes_against_model(
     name: str, psi: np.ndarray, frequency: np.ndarray, model: Modelled, outputs: MeasuredDofs
 ) -> Screening:
-    """Screening of every channel of a modal model; its faults are mended in the table of sensors.
+    """Screening of every channel of a modal model by its real shapes ψ (n_out, r).
 
-    Parameters
-    ----------
-    psi : (n_out, r)   real shapes
+    Its faults are mended in the table of sensors.
     """
     near = _elastic(model, min(REACH * float(frequency.max()), model.band))
     every = np.arange(len(psi))

@@ -20,11 +20,8 @@ def held_out_evidence(
 ) -> float:  # fmt: skip
     """Gain of a hypothesis over the null in 2 ln predictive density; 0 if nothing is held out.
 
-    Parameters
-    ----------
-    unseen : samples held out, in the shape of ``problem.data.use``
-    null : without the effects that are tested
-    about : the model whose state errors of form spread from; that of ``null`` unless it is given
+    Errors of form spread from the state of the model ``about``, which is that of the null unless it
+    is given. ``unseen`` has the shape of ``problem.data.use``.
     """
     if not unseen.any():
         return 0.0

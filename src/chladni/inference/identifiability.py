@@ -61,9 +61,7 @@ class Information:
     def frozen(self, at: Sequence[np.ndarray], weighed: bool | None = None) -> list[int]:
         """Positions in ``at`` of effects that the data do not know, in the order of freezing.
 
-        Parameters
-        ----------
-        at : positions of the parameters of each effect; an effect is frozen as a whole
+        ``at`` are the positions of the parameters of each effect, which is frozen as a whole.
         """
         kept, out = list(range(len(at))), []
         while kept:
@@ -167,9 +165,7 @@ def _in_words(
 ) -> Identifiability:  # fmt: skip
     """The table of all parameters, with the reason of each that is frozen.
 
-    Parameters
-    ----------
-    settled : effects among the frozen ones that a weighing would settle
+    A weighing would settle the effects ``settled`` among these.
     """
     names = parameter_names(effects)
     every, plausible = unknowns(effects), [r for e in effects for r in _plausible(e)]

@@ -16,6 +16,8 @@ from .hypothesis_fit import HypothesisFit
 from .linear_model import Squares
 from .map_fit import MassMeasurement, Point, descend, posterior
 
+MAX_STEPS = 30
+
 SharedKey = tuple[str, str, int]  # an effect's name, where it acts, number of the parameter
 Posterior = dict[SharedKey, tuple[float, float]]  # mean and standard deviation
 
@@ -40,15 +42,11 @@ class JointFit:
 
 
 def joint_fit(
-    states: Sequence[HypothesisFit], masses: Sequence[MassMeasurement | None],
-    *, max_steps: int = 30, tol: float = 0.05,
-) -> JointFit:  # fmt: skip
+    states: Sequence[HypothesisFit], masses: Sequence[MassMeasurement | None], tol: float = 0.05
+) -> JointFit:
     """Fit all states at once, starting from the fit of each.
 
-    Parameters
-    ----------
-    states : one fit each; the first that has a shared parameter sets its prior
-    masses : weighed mass of each state
+    The first state that has a shared parameter sets its prior.
     """
     where, shared, priors = _positions(states)
     start = np.zeros(len(priors))
@@ -76,7 +74,7 @@ def joint_fit(
         return Point(total, sloped)
 
     limit = np.array([p.step for p in priors])
-    x, squares, found, _ = descend(objective, start, limit, max_steps, tol)
+    x, squares, found, _ = descend(objective, start, limit, MAX_STEPS, tol)
     covariance = np.linalg.inv(squares.information)
     fits = []
     for one, at, state in zip(states, where, found, strict=True):

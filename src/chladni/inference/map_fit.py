@@ -159,14 +159,7 @@ def posterior(
 ) -> Point:  # fmt: skip
     """-2 ln posterior at x up to a constant, and the :class:`LinearPosterior` when it is needed.
 
-    Parameters
-    ----------
-    priors : False leaves the priors of x out
-
-    Raises
-    ------
-    ModelError
-        If x is no structure.
+    Without ``priors`` those of x are left out. A :class:`ModelError` says that x is no structure.
     """
     state = evaluate(model, effects, x)
     r = data.scaled(state, False)[0]
@@ -193,13 +186,10 @@ def fit(
     tol: float = 0.05,
     begun: Point | None = None,
 ) -> Fit:
-    """Most probable x from one start, and the evidence there.
+    """Most probable x from one start (n_p,), and the evidence there.
 
-    Parameters
-    ----------
-    start : (n_p,)      initial x
-    tol : float        stop when a step improves -2 ln posterior by less
-    begun : at the start, where it is known
+    A step that improves -2 ln posterior by less than ``tol`` is the last one; ``begun`` is the
+    posterior at the start, where it is known.
     """
     limit = np.array([p.step for p in unknowns(effects)])
 
@@ -223,11 +213,8 @@ def descend(
 ) -> tuple[np.ndarray, Squares, Any, Status]:  # fmt: skip
     """Levenberg-Marquardt: final x, its squares, second value of the objective, status.
 
-    Parameters
-    ----------
-    limit : (n_p,)     longest step
-    tol : stop when a step improves the sum of squares by less, or a further one by far less
-    begun : at the start, where it is known
+    Steps are no longer than ``limit`` (n_p,). The last one improves the sum of squares by less than
+    ``tol``, or a further one would by far less.
     """
     x, damping = start.copy(), 1e-2
     found, here = (begun or objective(x)).sloped()

@@ -83,11 +83,8 @@ def own_optimum(
     """Optimise an effect from a start, with the base linear about the best of some states.
 
     The evidence is that of responses linear in the base.  A strong effect spoils the base of a fit
-    without it; that of the deck is then the nearer.
-
-    Parameters
-    ----------
-    local : adds the effect to a state of the base; without it ``model`` must represent the effect
+    without it; that of the deck is then the nearer. Without ``local``, which adds the effect to a
+    state of the base, ``model`` must represent the effect.
     """
     effects = [*base, effect]
 

@@ -53,13 +53,7 @@ class Chains:
 
 
 def sampler_package() -> ModuleType:
-    """The sampler.
-
-    Raises
-    ------
-    FileError
-        If it is not installed.
-    """
+    """The sampler; a :class:`FileError` says that it is not installed."""
     return optional_package("emcee", "'chladni[posterior]'")
 
 
@@ -74,11 +68,6 @@ def sampled(
     log_density : x (n,) -> ln p up to a constant; -inf where there is no structure
     mean, covariance : (n,), (n, n)   of the Gaussian that scales the steps
     most : steps of a walker at most
-
-    Raises
-    ------
-    FileError
-        If the sampler is not installed.
     """
     emcee = sampler_package()
     root = np.linalg.cholesky((covariance + covariance.T) / 2)

@@ -78,10 +78,7 @@ def point_scores(
 ) -> np.ndarray:  # fmt: skip
     """Score of one mass or spring of each strength at each place (n_places, n_strengths).
 
-    Parameters
-    ----------
-    strengths : [kg] or [N/m]
-    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
+    Strengths are in kg or N/m, the flexibility (n_places,) of places beyond the basis in m/N.
     """
     residuals = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
     out = np.empty((len(places), len(strengths)))
@@ -97,12 +94,8 @@ def oscillator_scores(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Best mass on a spring at each place, and the score with it (n_places, n_hertz).
 
-    The responses are taken as linear in the mass along the secant from none to ``mass`` [kg].
-
-    Parameters
-    ----------
-    hertz : (k,)                    frequencies of the mass on its spring, with a fixed base
-    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
+    The responses are taken as linear in the mass along the secant from none to ``mass`` [kg]. The
+    frequencies ``hertz`` are those of the mass on its spring with a fixed base.
     """
     residuals = reanalysis(base, model, data, places, residual_flexibility, True)
     amount, score = np.empty((2, len(places), len(hertz)))
@@ -205,9 +198,7 @@ def spin_scores(
     The responses are linear in it about none, its prior is N(0, sd²) along each axis:
     dH = -s G_oβ S G_βi with S = -[h]×.
 
-    Parameters
-    ----------
-    rows : (3k, n)  rotations of each place about the axes of the basic frame
+    ``rows`` (3k, n) are the rotations of each place about the axes of the basic frame.
     """
     (phi_o, phi_i, d), state, s = data.modal(base.state), base.state, data.s
     per_line = -sd * s ** (1 + data.power)

@@ -70,12 +70,9 @@ class ShapeData:
     ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
         """Whitened misfit of some pairs (k, n_out), its slopes (n_p, k, n_out), ln det C/D.
 
-        The sum of squares and the last value is that of :meth:`costs`. The covariance counts as
-        constant in the slopes: what its change does has mean zero.
-
-        Parameters
-        ----------
-        slopes : (n_p, n_out, k)    ∂φ of the partners at the sensors
+        The sum of squares and the last value is that of :meth:`costs`. ``slopes`` (n_p, n_out, k)
+        are ∂φ of the partners at the sensors. The covariance counts as constant in the slopes: what
+        its change does has mean zero.
         """
         shape = len(test), self.values.shape[1]
         out, J, wide, c = np.zeros(shape), np.zeros((len(slopes), *shape)), 0.0, mixing(lam)
@@ -113,11 +110,7 @@ def shape_slopes(state: State, at: np.ndarray, modes: np.ndarray) -> np.ndarray:
     """∂φ/∂x of some modes where they are measured, but for their norm (n_p, n_out, k).
 
     ∂φ_i = Σ_j φ_j φ_jᵀ(∂K - λ_i ∂M)φ_i / (λ_i - λ_j), exact in the basis (Fox and Kapoor 1968,
-    AIAA J. 6, 2426-2429).
-
-    Parameters
-    ----------
-    at : (n_out, m)   all modes of the state there
+    AIAA J. 6, 2426-2429). All modes of the state are ``at`` (n_out, m) there.
     """
     assert state.dK is not None
     assert state.dM is not None

@@ -52,13 +52,7 @@ class LocalEffect:
         return local if local._seated(operators, points).count <= MOST_ROWS else None
 
     def added(self, state: State, x: np.ndarray, y: np.ndarray) -> State:
-        """The state of the base at x with the effect at y; without slopes.
-
-        Raises
-        ------
-        ModelError
-            If it is no structure.
-        """
+        """The state of the base at x with the effect at y, if it is a structure; without slopes."""
         operators, points = self._operators(x, y), of(PointTerm, self.effect.terms(y))
         rows, weight = self._seated([A for _, A, _ in operators], points), self.effect.weight(y)
         K, M = np.zeros((2, rows.count, rows.count))

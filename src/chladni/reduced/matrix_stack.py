@@ -30,11 +30,9 @@ class MatrixStack:
         return MatrixStack((*self.blocks, border))
 
     def divided(self, parent: np.ndarray, pieces: np.ndarray, of: np.ndarray) -> "MatrixStack":
-        """Matrices of other groups: the p-th is that of ``parent[p]``, pieces have their own.
+        """Matrices of other groups: the p-th is that of ``parent[p]``, pieces (k,) have their own.
 
-        Parameters
-        ----------
-        pieces : positions (k,) of the groups with matrices ``of`` (k, r, r)
+        The latter are ``of`` (k, r, r).
         """
         out = []
         for at, block in self._placed():

@@ -31,9 +31,7 @@ class ModalFactors:
     ) -> MatrixSlopes:
         """Make GᵀKG of K (m, m) in place; return its slopes from ∂K.
 
-        Parameters
-        ----------
-        U, V : (r, k), (k, r)   the modes over a basis, and its coordinates in them
+        U (r, k) are the modes over a basis, V (k, r) its coordinates in them.
         """
         a, b = _touched(U.T), _touched(V)  # the modes are among the vectors of most bases
         U, WV = U[a], self.W @ V[:, b]

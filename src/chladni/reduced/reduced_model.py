@@ -285,10 +285,7 @@ def evaluate(
 ) -> State:
     """Eigenvalues, modes and exact derivatives of the model with these effects at x.
 
-    Raises
-    ------
-    ModelError
-        If the stiffness lost its positive (semi-)definiteness: an effect is wrong.
+    A :class:`ModelError` says that stiffness or mass lost its positive (semi-)definiteness.
     """
     n_p = count(effects)
     acting = acting_at(effects, x)

@@ -36,10 +36,8 @@ class RunningSums:
     ) -> Self:  # fmt: skip
         """Start with K, M of these fields, and their slopes of all groups of shells and beams.
 
-        Parameters
-        ----------
-        stiffness : stacks that grow with t, and with t³
-        n_own : degrees of freedom that effects add
+        The first stacks of stiffness grow with t and the second with t³; effects add ``n_own``
+        degrees of freedom.
         """
         dK, dM = (MatrixSlopes(slopes["t"].shape[1]) for _ in "KM")
         for stacks, power in zip(stiffness, (1, 3), strict=True):
