@@ -112,14 +112,14 @@ def _along_lines(z: np.ndarray) -> np.ndarray:
     return out
 
 
-STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
+TIMES = "is {:.1f} times as large as a right model leaves"
+STATISTICS = {  # and a sentence on the one that is least likely
+    "error of form": "the form error must be {1:.1f} %; right models have {2:.1f} %",
+    "misfit": f"the residual {TIMES}",
+    "worst line": f"the residual of one spectral line {TIMES}",
+    "worst channel": f"the residual of one channel {TIMES}",
+}
 TWO_SIDED = (0, 1)  # a fit better than those of right models has overstated errors
-NAMES = (
-    "the form error must be {3:.1f} %; right models have {4:.1f} %",
-    "the residual is {2:.1f} times as large as a right model leaves",
-    "the residual of one spectral line is {2:.1f} times as large as a right model leaves",
-    "the residual of one channel is {2:.1f} times as large as a right model leaves",
-)
 
 
 def adequacy(
@@ -151,10 +151,8 @@ def adequacy(
     p, least, better = ranked(seen, own, TWO_SIDED)
     where, worst = _where(data, square, labels)
     rows = tuple(map(FitStatistic.of, STATISTICS, seen, own.T))
-    usual = rows[least].median
-    what = NAMES[least].format(
-        seen[least], usual, seen[least] / usual, 100 * seen[least], 100 * usual
-    )
+    value, usual = seen[least], rows[least].median
+    what = STATISTICS[rows[least].name].format(value / usual, 100 * value, 100 * usual)
     near = _modes_near(worst, fit.state)
     test = FitTest(better or p >= LEAST_P, p, what, where, rows, near, better)
     if damping is not None:

@@ -103,7 +103,7 @@ class Rivals:
             for mean, F in zip(seen.mean, seen.factors, strict=True)
         ])  # fmt: skip
         posterior = self.posterior(seen, each).reshape(len(p), len(p), draws).swapaxes(0, 1)
-        own = posterior[np.arange(len(p)), np.arange(len(p))]  # (m, draws): of the true one
+        own = np.einsum("jjn->jn", posterior)  # (m, draws): of the true one
         gain = np.log(np.maximum(own, 1e-300)) - np.log(p)[:, None]
         return Forecast(float(p @ gain.mean(axis=1)), p, posterior)
 
@@ -119,13 +119,13 @@ class Forecast:
 
     def settled(self, odds: float) -> float:
         """Probability that the true hypothesis gets these odds against all others together."""
-        own = self.posterior[np.arange(len(self.probability)), np.arange(len(self.probability))]
+        own = np.einsum("jjn->jn", self.posterior)
         return float(self.probability @ (own >= odds / (1 + odds)).mean(axis=1))
 
     def misled(self, odds: float) -> float:
         """Probability that a wrong hypothesis gets these odds."""
         wrong = self.posterior >= odds / (1 + odds)
-        wrong[np.arange(len(self.probability)), np.arange(len(self.probability))] = False
+        np.einsum("jjn->jn", wrong)[:] = False
         return float(self.probability @ wrong.any(axis=1).mean(axis=1))
 
 

@@ -311,7 +311,7 @@ def _fit_poles(
         best, scale = None, 0.0
         for _ in range(6):
             before, state = scale, evaluate(model, effects, x, False)
-            scale = _likely_scale(replace(data, scale=SCALES[0]), state)
+            scale = min(SCALES, key=lambda s: neg2_log_mixture(replace(data, scale=s), state))
             if scale == before:
                 break
             now = at_scale(scale, x)
@@ -348,11 +348,6 @@ def over_scales(data: Poles, state: State, r0: np.ndarray, J0: np.ndarray) -> fl
         every.append(S + widths + _scale_prior(scale))
     step = np.log(SCALES[1] / SCALES[0]) / (SCALE_SD * np.sqrt(np.pi))
     return float(-2 * (logsumexp(-np.array(every) / 2) + np.log(step)))
-
-
-def _likely_scale(data: Poles, state: State) -> float:
-    """The scale at which the pairing as a whole is most probable."""
-    return float(min(SCALES, key=lambda scale: neg2_log_mixture(replace(data, scale=scale), state)))
 
 
 def neg2_log_mixture(data: Poles, state: State) -> float:

@@ -256,7 +256,7 @@ class Responses:
         left, right = phi_o * d[:, None], phi_i * d[:, None]  # φ_o D, φ_i D (n_f, ., r)
         if state.spin is not None:
             left = state.spin.passed(s, d, phi_o)
-            right = state.spin.passed(s, d, phi_i, transposed=True)
+            right = state.spin.reverse.passed(s, d, phi_i)
         q = state.vectors @ right.transpose(1, 2, 0)  # (n_in, m, n_f)
         span, parts = spanned(np.concatenate([*q, *(q * s**2)], axis=1))
         of_K, of_M = np.split(parts.reshape(len(span.T), 2, len(q), -1), 2, axis=1)

@@ -14,6 +14,7 @@ from ..effects.effect import MatrixTerm, PointTerm
 from ..effects.element_groups import ElementGroups
 from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
+from .field_factors import Fields, mass_log
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,17 +45,17 @@ def participation(shells: ElementGroups, basis: Basis, motion: BaseMotion) -> Ba
 class Participating:
     """Running sums l(x) (r, k) and ∂l/∂x (n_p, r, k) over the effects of a state."""
 
-    def __init__(
-        self, base: BaseParticipation, weight: np.ndarray, slopes: np.ndarray, n_own: int
-    ) -> None:
-        """Start with the shells: mass factors of the groups (g,) and their gradients (g, n_p).
+    def __init__(self, base: BaseParticipation, logs: Fields, slopes: Fields, n_own: int) -> None:
+        """Start with the shells and their log fields.
 
         ``n_own`` degrees of freedom that effects add follow the coordinates of the basis.
         """
         self.motion, self.n_own = base.motion, n_own
-        value = base.rest + np.einsum("g,grk->rk", weight, base.groups)
+        w = np.exp(mass_log(logs))
+        value = base.rest + np.einsum("g,grk->rk", w, base.groups)
         self.value = np.pad(value, ((0, n_own), (0, 0)))
-        slope = np.einsum("gp,grk->prk", slopes, base.groups, optimize=True)
+        slope = w[:, None] * mass_log(slopes)
+        slope = np.einsum("gp,grk->prk", slope, base.groups, optimize=True)
         self.slope = np.pad(slope, ((0, 0), (0, n_own), (0, 0)))
 
     def add_points(

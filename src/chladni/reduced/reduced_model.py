@@ -295,10 +295,12 @@ def evaluate(
     sums = RunningSums.of_fields(
         *model.with_fields(logs), (model.linear, model.cubic), model.mass, logs, slopes, n_own
     )
-    weight, dweight = _weight(model, logs, slopes)
-    offset: np.ndarray | None = None
-    doffset: np.ndarray | None = None
-    base, rising = _participating(model, logs, slopes, n_own), Rising()
+    w = model.groups.weight * np.exp(mass_log(logs))
+    weight, dweight = float(model.weight0 + w.sum()), np.asarray(w @ mass_log(slopes))
+    offset, doffset = None, None
+    rising, base = Rising(), None
+    if model.base is not None:
+        base = Participating(model.base, logs, slopes, n_own)
     for share in multiplied(acting, model.groups, logs, slopes, split):
         part = share.term
         A = with_own(model.operator(part.operator, part.matrix == "K"), n_own)
@@ -370,20 +372,3 @@ def _spin(model: Reduced, acting: Acting, phi: np.ndarray) -> Spin | None:
         for term in of(SpinTerm, terms)
     ]  # fmt: skip
     return spin(parts) if parts else None
-
-
-def _participating(
-    model: Reduced, logs: Fields, slopes: Fields, n_own: int
-) -> Participating | None:
-    """Base participation of the shells with these fields; None where the base does not move."""
-    if model.base is None:
-        return None
-    w = np.exp(mass_log(logs))
-    return Participating(model.base, w, w[:, None] * mass_log(slopes), n_own)
-
-
-def _weight(
-    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray]
-) -> tuple[float, np.ndarray]:
-    w = model.groups.weight * np.exp(mass_log(logs))
-    return float(model.weight0 + w.sum()), np.asarray(w @ mass_log(slopes))
