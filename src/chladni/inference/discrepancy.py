@@ -97,10 +97,6 @@ class Discrepancy:
         less = 1 - np.sqrt(1 - self.share())
         return r - (self.U * less) @ (self.U.T @ r)
 
-    def log_det(self) -> float:
-        """Ln det C."""
-        return float(np.log1p(self.delta**2 * self.s).sum())
-
 
 def discrepancy(W: np.ndarray) -> Discrepancy:
     """C of errors that spread over the whitened residual along the columns of W (n, k) for δ = 1.

@@ -22,12 +22,6 @@ class Squares:
     gradient: np.ndarray  # (n_p,) Jᵀr
     information: np.ndarray  # (n_p, n_p) JᵀJ
 
-    @classmethod
-    def of(cls, r: np.ndarray, J: np.ndarray) -> Self:
-        """Squares of residuals (n,) and slopes (n, n_p); J without columns where none are known."""
-        gradient = J.T @ r if J.shape[1] else np.zeros(0)
-        return cls(float(r @ r), gradient, J.T @ J)
-
     @property
     def further(self) -> float:
         """Improvement of the cost by the best step, if residuals are linear."""

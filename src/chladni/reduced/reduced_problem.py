@@ -59,10 +59,6 @@ class ReducedProblem:
             K += stack.weighted(np.ones(stack.shape[0]))
         return np.linalg.inv(K)
 
-    def with_attachments(self, rows: sp.csr_array) -> Reduced:
-        """The reduced model over a basis with the static responses to loads on these rows."""
-        return self.model.extended(attachments(self.factor, rows))
-
     def model_for(self, effect: Effect, x: np.ndarray) -> Reduced:
         """The reduced model over a basis that can represent an effect near x, split as needed."""
         model, rows = self.model, effect.basis_rows(x, self.shapes)
