@@ -61,6 +61,8 @@ class FitTest:
 
     def or_less_likely(self, p: float, *rows: FitStatistic, **said: Any) -> Self:
         """The test with further statistics; ``said`` of another one if that is the less likely."""
+        if modes := said.get("modes_hz"):
+            said["where"] = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
         test = replace(self, statistics=(*self.statistics, *rows))
         if p >= min(self.against, LEAST_P):
             return test
@@ -164,7 +166,6 @@ def adequacy(
         p,
         row,
         what=f"{what}: a part rotates or is driven by itself, or channels are delayed",
-        where="near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz",
         modes_hz=modes,
     )
     return test if test.passes else replace(test, step=coupling.step)
@@ -181,8 +182,8 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
     """The test, or that of the damping where it is the less likely of the two."""
     if len(damping.ratio) < FEWEST:
         return test
-    what, where, modes = damping.said()
-    return test.or_less_likely(*damping.tested(), what=what, where=where, modes_hz=modes)
+    what, modes = damping.said()
+    return test.or_less_likely(*damping.tested(), what=what, modes_hz=modes)
 
 
 def of_poles(data: Poles, state: State) -> FitTest:

@@ -1,9 +1,8 @@
 """Errors of a whole recording, each tried against the responses of the model.
 
-Both sides are smoothed along frequency by the same Gaussian weights. A peak is then as high as the
-area below it, so that damping hardly matters, and no mode need be identified. A hypothesis changes
-how the numbers are read: another quantity, another unit of frequency, the other sign of time, other
-labels, another place of the force. It is scored by
+Both sides are smoothed along frequency (:mod:`.smoothed_responses`). A hypothesis changes how the
+numbers are read: another quantity, another unit of frequency, the other sign of time, other labels,
+another place of the force. It is scored by
 
 Q = median over channels of mean over lines |log10(H_model / g H_test)|²,
 

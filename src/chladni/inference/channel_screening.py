@@ -107,8 +107,7 @@ def _by_modes(
     labels = found.outputs
     phi_o = outputs.rows(built) @ near.shapes
     phi_i = inputs.rows(built) @ near.shapes
-    omega_r = 2 * np.pi * near.frequency
-    before = _agreeing(before, labels, phi_o, phi_i, omega_r, 2 * np.pi * found.band[1])
+    before = _agreeing(before, found, phi_o, phi_i, near.frequency)
     if inputs.base.any() or not strong.order or not len(near.frequency):
         why = "the base moves" if inputs.base.any() else "no mode is above the noise"
         return before.with_more([], [Check("channels against the model", why, None)])
@@ -165,33 +164,30 @@ _UNUSABLE = ("dead channel", "duplicated channels")
 
 
 def _agreeing(
-    before: Screening, labels: tuple[str, ...], phi: np.ndarray, drive: np.ndarray,
-    omega_r: np.ndarray, top: float,
-) -> Screening:  # fmt: skip
+    before: Screening, found: Identified, phi: np.ndarray, drive: np.ndarray, f: np.ndarray
+) -> Screening:
     """Equal channels are no matter where the model's are equal as well, and a fault where not.
 
-    Parameters
-    ----------
-    phi, drive : (n, m), (n_in, m)   shapes at the outputs and at the inputs
-    omega_r, top : (m,), end of the band [rad/s]
+    The model has modes f (m,) [Hz], of shapes φ (n, m) at the outputs and (n_in, m) at the inputs.
     """
+    labels, omega_r, top = found.outputs, 2 * np.pi * f, 2 * np.pi * found.band[1]
     out = []
     s = 1j * np.linspace(0.1, 1.0, EQUAL_LINES) * top
     h = s[:, None] ** 2 / (s[:, None] ** 2 + 2 * EQUAL_DAMPING * omega_r * s[:, None] + omega_r**2)
     H = np.einsum("nm,fm,im->fni", phi, h, drive)
-    for f in before.findings:
-        if f.kind != "equal channels":
-            out.append(f)
+    for one in before.findings:
+        if one.kind != "equal channels":
+            out.append(one)
             continue
-        a, b = (H[:, labels.index(c)] for c in f.channels)
+        a, b = (H[:, labels.index(c)] for c in one.channels)
         apart = float(np.linalg.norm(a - b) / np.maximum(np.linalg.norm([a, b]), 1e-300))
-        if apart > UNLIKE and f.value < UNLIKE * apart:
+        if apart > UNLIKE and one.value < UNLIKE * apart:
             text = (
-                f"outputs {' and '.join(f.channels)} are equal within their noise, but differ by "
+                f"outputs {' and '.join(one.channels)} are equal within their noise, but differ by "
                 f"{100 * apart:.0f} % in the model: one sensor has two labels."
             )
-            mend = left_out(f.channels[1])
-            out.append(Finding("duplicated channels", text, "fault", f.channels, mend, f.value))
+            mend = left_out(one.channels[1])
+            out.append(Finding("duplicated channels", text, "fault", one.channels, mend, one.value))
     return replace(before, findings=tuple(out))
 
 

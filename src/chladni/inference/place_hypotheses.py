@@ -35,17 +35,16 @@ def relabelled(seen: Smoothed) -> list[Hypothesis]:
 
     labels, (declared, _) = seen.reading.outputs.labels, seen.as_declared
     itself = np.arange(len(labels))
-    best: tuple[float, np.ndarray, np.ndarray] = (np.inf, itself, np.zeros((0, 0)))
-    for H in seen.answers():
+
+    def exchanged(H: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         log_H = level_free(H)
         apart = np.stack(
             [mean_squares(log_H - seen.log_test[:, [k]]).mean(axis=1) for k in range(len(labels))]
         )  # (output as labelled, place in the model)
         _, place = linear_sum_assignment(apart)
-        Q = float(np.median(apart[np.arange(len(labels)), place]))
-        if Q < best[0]:
-            best = (Q, place, apart)
-    Q, place, apart = best
+        return float(np.median(apart[itself, place])), place, apart
+
+    Q, place, apart = min(map(exchanged, seen.answers()), key=lambda found: found[0])
     moved = np.flatnonzero(place != itself)
     if len(moved) == 2:
         return _exchanged(apart[itself, itself], apart[itself, place], moved, labels)
@@ -164,7 +163,7 @@ def mirrored(seen: Smoothed) -> list[Hypothesis]:
     reading, (declared, _) = seen.reading, seen.as_declared
     points = reading.model.structure.assembly.points
     centres = (points.min(axis=0) + points.max(axis=0)) / 2, np.zeros(3)
-    best: tuple[float, int, str] | None = None
+    found = list[tuple[float, int, str]]()
     for signs, middle in product(product((1, -1), repeat=3), centres):
         turn = np.array(signs)
         outputs, inputs = (
@@ -176,10 +175,10 @@ def mirrored(seen: Smoothed) -> list[Hypothesis]:
             continue
         Q = round(min(map(read.score, read.answers())), 4)
         axes = " and ".join(axis for axis, sign in zip("XYZ", signs, strict=True) if sign < 0)
-        best = min(best or (np.inf, 0, ""), (Q, len(axes), axes))
-    if best is None:
+        found.append((Q, len(axes), axes))
+    if not found:
         return []
-    Q, _, axes = best
+    Q, _, axes = min(found)
     text = (
         f"deck and sensors are mirrored against each other along {axes}: with sensors and force at "
         f"the mirror images of their places {against(Q, declared)}"

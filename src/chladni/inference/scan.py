@@ -25,15 +25,13 @@ from .map_fit import MassMeasurement, unknowns
 class Baseline:
     """A state of the base effects, linearised to score small changes.
 
-    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|².  ``slopes`` (n, n_p) are those of the
-    residual.  Both include the row of the weighing.
+    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|², with the row of the weighing.
     """
 
     effects: tuple[Effect, ...]
     x: np.ndarray
     state: State
     residual: np.ndarray
-    slopes: np.ndarray
     Z: np.ndarray
     mass_measurement: MassMeasurement | None
 
@@ -69,7 +67,7 @@ def baseline(
     W = np.concatenate([J * np.array([p.sd for p in unknowns(effects)]), shapes], axis=1)
     L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
     Z = np.linalg.solve(L, W.T)
-    return Baseline(tuple(effects), x, state, r, J, Z, mass_measurement)
+    return Baseline(tuple(effects), x, state, r, Z, mass_measurement)
 
 
 def point_scores(
