@@ -297,9 +297,12 @@ ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settl
 
 
 def _fit_poles(
-    model: Reduced, effects: Sequence[Effect], data: Poles,
-    mass_measurement: MassMeasurement | None, x: np.ndarray,
-) -> Fit:  # fmt: skip
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Poles,
+    mass_measurement: MassMeasurement | None,
+    x: np.ndarray,
+) -> Fit:
     """Alternate the fit with the most probable scale of the irreducible spread."""
 
     def at_scale(scale: float, x: np.ndarray, max_steps: int = 30) -> Fit:

@@ -130,12 +130,12 @@ class Rising:
         """The modes with the rise, from those without it; φ⁻ᵀ is M φ."""
         parts = [_RisenPart(part, at, phi.T @ A @ phi, lam) for part, A, at in self.parts]
         risen, V = np.linalg.eigh(np.diag(lam) + sum(one.stiffness - one.plain for one in parts))
-        modes, slopes = phi @ V, []
+        modes, slopes, mixing = phi @ V, [], tuple[np.ndarray, ...]()
         if gradient:
             slopes = [one.slopes(phi, dK, dM) for one in parts]
             more = [(dK.count - 1, each.over_basis(M @ phi)) for each in slopes]
             dK = replace(dK, parts=[*dK.parts, *more])
-        mixing = _mixing(risen, modes, dK, dM, parts) if gradient else ()
+            mixing = _mixing(risen, modes, dK, dM, max(one.rise.band[1] for one in parts))
         lost = _dissipated(parts, slopes, (lam, phi), risen, V, mixing)
         return Risen(risen, modes, dK, dM, lost)
 
@@ -245,16 +245,15 @@ def _divided(g: np.ndarray, lam: np.ndarray, rise: Rise) -> np.ndarray:
 
 
 def _mixing(
-    lam: np.ndarray, phi: np.ndarray, dK: MatrixSlopes, dM: MatrixSlopes,
-    parts: Sequence[_RisenPart],
-) -> tuple[np.ndarray, ...]:  # fmt: skip
+    lam: np.ndarray, phi: np.ndarray, dK: MatrixSlopes, dM: MatrixSlopes, top: float
+) -> tuple[np.ndarray, ...]:
     """How the modes that a test sees follow the parameters.
 
-    Returned are their positions (k,), ∂φ/∂x in modes without the change of length (n_p, m, k), ∂λ
-    and φᵀ∂Mφ (n_p, k). Modes nearer than ``APART`` do not mix: any mixture of them is a mode.
+    They lie below ``VISIBLE`` times the ``top`` of the band [Hz]. Returned are their positions
+    (k,), ∂φ/∂x in modes without the change of length (n_p, m, k), ∂λ and φᵀ∂Mφ (n_p, k). Modes
+    nearer than ``APART`` do not mix: any mixture of them is a mode.
     """
-    highest = 2 * np.pi * VISIBLE * max(one.rise.band[1] for one in parts)
-    seen = np.flatnonzero(lam <= highest**2)
+    seen = np.flatnonzero(lam <= (2 * np.pi * VISIBLE * top) ** 2)
     gap = lam[seen] - lam[:, None]
     inverse = gap / (gap**2 + (APART * np.maximum(np.abs(lam[seen]), RIGID * lam[-1])) ** 2)
     K, M = (each.between(phi, phi[:, seen]) for each in (dK, dM))
