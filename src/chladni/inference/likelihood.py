@@ -1,8 +1,8 @@
 """Compare a recording with a state of the reduced model: whitened residuals and their slopes.
 
 :class:`Responses` are the complex log10 deviation of the damping-equalised FRF on s = ω (ζ + i).
-This is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides. The same
-interface serves natural frequencies alone (:class:`.pole_data.Poles`): residuals of a state, their
+This is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides. Natural
+frequencies alone (:class:`.pole_data.Poles`) have the same interface: residuals of a state, their
 slopes, and ``error``, the covariance of errors of form that is still in them.
 """
 

@@ -27,9 +27,9 @@ def as_written(
     are no numbers of a deck. Joints whose change exceeds their usual scatter are calibrated, too:
     without them a deck whose adhesive is six times too soft stays 4 % off in frequency.
 
-    A named effect that no card can hold and the learned error of the model stay in the fit:
-    otherwise the numbers of the deck would compensate for them. On a coarse plate with a concealed
-    crack E went to 264 GPa for 210 without that error, and to 212 with it.
+    A named effect that no card can hold stays in the fit, and so does the learned error of the
+    model. Otherwise the numbers of the deck would compensate for them. On a coarse plate with a
+    concealed crack E went to 264 GPa for 210 without that error, and to 212 with it.
     """
     found = hypothesis.fit
     named = hypothesis.effects
