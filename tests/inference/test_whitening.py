@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.inference.whitening import whitening
+from chladni.inference.sensor_errors import whitening
 
 LINES, OUTPUTS, INPUTS = 12, 3, 2
 

@@ -18,8 +18,7 @@ from ..reduced.matrix_stack import EVERY
 from ..reduced.reduced_model import Reduced, State
 from .discrepancy import MEDIAN, Discrepancy, Form, discrepancy, form
 from .pole_data import Poles
-from .sensor_errors import SensorErrors
-from .whitening import Whitening, whitening
+from .sensor_errors import SensorErrors, Whitening, whitening
 
 LN10 = np.log(10.0)
 USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted

@@ -29,7 +29,6 @@ from ..effects.element_groups import COMPONENTS, ElementGroups
 from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
-from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
 from .field_factors import Fields, log_fields, mass_log, multiplied, stiffness_log
 from .frequency_dependent_stiffness import Rising
@@ -37,7 +36,7 @@ from .gyroscopic import Spin, spin
 from .matrix_stack import MatrixStack, stacked
 from .modal_factors import modal_factors
 from .real_modes import real_modes
-from .running_sums import RunningSums
+from .running_sums import BaseParticipation, Participating, RunningSums, participation
 from .state import State as State
 
 
