@@ -25,7 +25,7 @@ from chladni.effects.calibration_parameters import (
     thickness_of,
     with_scaled,
 )
-from chladni.inference.adequacy import STATISTICS, adequacy
+from chladni.inference.adequacy import adequacy
 from chladni.inference.hypothesis_fit import HypothesisFit
 from chladni.io.tables.csv_table import csv_text
 from chladni.model.assembly import Assembly
@@ -143,7 +143,7 @@ def _answer(question: Question, truth: dict[str, Any], noise: str) -> Calibrated
     problem, null = without_effects(prepare(question).problem)
     fits = adequacy(null, problem.mass_measurement, problem.labels)
     p = float("nan") if fits is None else fits.p
-    left = [] if fits is None else [s for s in fits.statistics if s.name == STATISTICS[1]]
+    left = [] if fits is None else [s for s in fits.statistics if s.name == "misfit"]
     residual = float(np.sqrt(left[0].value / left[0].median)) if left else float("nan")
     names = truth["structure"], truth["mesh"], truth["seed"], noise
     return CalibratedArticle(*names, p, intervals(null, truth["scales"]), residual)

@@ -18,6 +18,7 @@ from chladni.ema.setup import Recording
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import Modelled, modelled
 from chladni.inference.channel_screening import against_model
+from chladni.inference.smoothed_responses import Reading
 from chladni_bench import MeasurementChain, recorded, scattered_parts
 from chladni_planning import even_lines
 
@@ -136,4 +137,4 @@ def screening_of(made: Sound, frf: FRF) -> Screening:
     outputs, inputs = measured_at(made.outputs), measured_at(made.bench.drive)
     places = dict(zip(outputs.labels, outputs.points, strict=True))
     alone = screened(Recording("recording", frf), found, (), places, use)
-    return against_model(alone, frf, use, found, made.model, outputs, inputs)
+    return against_model(alone, Reading(frf, use, made.model, outputs, inputs), found)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.dynamics.reduction import attachments
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.inference.likelihood import Responses
 from chladni.reduced.reduced_model import evaluate
@@ -39,3 +40,8 @@ def damped(reduced, responses):
     s = 2 * np.pi * np.linspace(25, TOP, 24) * (0.08 + 1j)
     empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
     return empty, [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho")]
+
+
+def with_attachments(reduced, rows):
+    """The reduced model over a basis with the static responses to loads on these rows."""
+    return reduced.model.extended(attachments(reduced.factor, rows))

@@ -131,7 +131,7 @@ def test_complex_modes_are_those_of_a_complex_stiffness(mastic):
     lam, N = state.lam[flexible], 0.02 * state.dissipated.coupling[flexible, flexible]
     omega = np.sqrt(lam)
     none = np.zeros((0, *N.shape))
-    lost = Dissipated(0 * lam, none[:, 0], N, none, omega)
+    lost = Dissipated(0 * lam, none[:, 0], N, none, omega, (lam, np.eye(len(lam))))
     rng = np.random.default_rng(1)
     phi_o, phi_i = rng.normal(size=(3, len(lam))), rng.normal(size=(1, len(lam)))
     s = 2 * np.pi * np.linspace(30, 250, 40) * (0.05 + 1j)

@@ -26,7 +26,8 @@ def test_squares_are_those_under_the_inverse_covariance(delta):
 
 def test_without_an_error_of_form_they_are_plain_sums():
     found = LinearModel(None, J, J0).squares(R, R0)
-    plain = Squares.of(np.append(R, R0), np.concatenate([J, J0]))
+    r, A = np.append(R, R0), np.concatenate([J, J0])
+    plain = Squares(r @ r, A.T @ r, A.T @ A)
     assert found.cost == pytest.approx(plain.cost)
     assert_allclose(found.gradient, plain.gradient)
     assert_allclose(found.information, plain.information)

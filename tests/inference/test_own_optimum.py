@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.recorded_plate import with_attachments
 from tests.inference.test_map_fit import EXACT, MEAN, Offsets, linear, model
 
 from chladni.effects.calibration_parameters import calibration_parameter
@@ -46,7 +47,7 @@ def test_a_strong_effect_is_sought_about_the_base_that_it_did_not_spoil(reduced,
     )
     base = [calibration_parameter(reduced.groups, q, [0]) for q in ("E", "rho")]
     effect, x = PointMass.near(where, 20), np.array([0.5, 0.0, 0.0])
-    model = reduced.with_attachments(effect.basis_rows(x, reduced.shapes))
+    model = with_attachments(reduced, effect.basis_rows(x, reduced.shapes))
     data = responses.rebased(model)
     data = replace(data, values=data.model(evaluate(model, [effect], x, False)))
     ways = []

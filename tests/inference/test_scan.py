@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
+from tests.builders.recorded_plate import with_attachments
 
 from chladni.effects.attachments import AtPoints
 from chladni.effects.calibration_parameters import calibration_parameter
@@ -106,7 +107,7 @@ def test_residual_flexibility_stands_for_the_attachment(reduced, responses, base
         for r in (rest, 0 * rest)
     )
     exact = np.array([
-        directly(base, reduced.with_attachments(places.rows[[k]]), responses, places, k, "K", 1e5)
+        directly(base, with_attachments(reduced, places.rows[[k]]), responses, places, k, "K", 1e5)
         for k in range(len(places))
     ])  # fmt: skip
     assert np.all(np.abs(with_it - exact) < 0.3 * np.abs(without - exact))
@@ -115,7 +116,7 @@ def test_residual_flexibility_stands_for_the_attachment(reduced, responses, base
 
 def test_a_place_already_in_the_basis_has_no_residual_flexibility(reduced):
     place = reduced.candidates.only(np.array([10]))
-    grown = replace(reduced, model=reduced.with_attachments(place.rows))
+    grown = replace(reduced, model=with_attachments(reduced, place.rows))
     assert grown.flexibility(place)[0] < 1e-6 * reduced.flexibility(place)[0]
 
 

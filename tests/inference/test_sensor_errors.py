@@ -10,7 +10,7 @@ from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.ema.setup import SensorAccuracy
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.inference.likelihood import Responses
-from chladni.inference.sensor_errors import gauge_errors, sensor_errors, variance
+from chladni.inference.sensor_errors import gauge_errors, sensor_errors
 from chladni.reduced.reduced_model import evaluate
 from chladni.reduced.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
@@ -78,7 +78,7 @@ def test_what_is_mixed_in_is_what_turned_and_moved_sensors_show(made, state, way
     modes = (state.lam > omega2[0]) & (state.lam < omega2[1])
     shapes = made.model.basis @ state.phi[:, modes]
     seen = (moved(side, way).rows(built) - side.rows(built)) @ shapes / SMALL
-    told = sensor_errors(side, INPUTS, built, USUAL).outputs.rows[way] @ shapes
+    told = sensor_errors(side, INPUTS, built, USUAL).rows[way] @ shapes
     sign = np.sign((seen * told).sum())
     assert np.linalg.norm(seen - sign * told) < near * np.linalg.norm(seen)
 
@@ -86,7 +86,7 @@ def test_what_is_mixed_in_is_what_turned_and_moved_sensors_show(made, state, way
 def spread(data, state):
     """Columns of one deviation of every error: sensors with a little of it in them (n, k)."""
     out = []
-    for name, modal in (("a", data.sensors.outputs.modal), ("b", ())):
+    for name, modal in (("a", data.sensors.modal), ("b", ())):
         rows = getattr(data, name)
         one = np.eye(len(rows))
         for k in range(len(rows)):
@@ -172,15 +172,15 @@ def test_a_wrong_sensor_costs_as_much_as_its_error_is_likely(made, state):
 
 def test_errors_of_an_uncertain_place_are_as_large_as_is_stated(made):
     built = made.groups.structure
-    stated = sensor_errors(replace(OUTPUTS, sd=np.full(3, 2 * PLACE)), INPUTS, built, USUAL).outputs
-    usual = sensor_errors(OUTPUTS, INPUTS, built, USUAL).outputs
+    stated = sensor_errors(replace(OUTPUTS, sd=np.full(3, 2 * PLACE)), INPUTS, built, USUAL)
+    usual = sensor_errors(OUTPUTS, INPUTS, built, USUAL)
     for way, factor in ((0, 1), (1, 1), (2, 2), (3, 2)):
         assert_allclose(stated.rows[way].toarray(), factor * usual.rows[way].toarray())
 
 
 def test_their_variance_is_the_sum_of_what_each_does(made, state):
     data = recorded(made, state, use=np.ones((len(S), 3), bool))
-    told = variance(data.sensors, data, state)
+    told = data.wrong(state)
     V = spread(data, state)
     seen = (V.reshape(2, *data.values.shape, -1) ** 2).sum(axis=(0, 4))
     assert_allclose(told, seen * (data.std() * np.log(10)) ** 2, rtol=0.01)

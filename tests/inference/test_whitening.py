@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.inference.whitening import whitening
+from chladni.inference.sensor_errors import whitening
 
 LINES, OUTPUTS, INPUTS = 12, 3, 2
 
@@ -21,6 +21,10 @@ class Plain:
     def stacked(self, z):
         picked = z[:, self.use].reshape(len(z), -1).T
         return np.concatenate([picked.real, picked.imag])
+
+    def whitened(self, own, common, r):
+        output = np.tile(np.repeat(np.nonzero(self.use)[1], INPUTS), 2)
+        return whitening(output, self.stacked(own), self.stacked(common)).whitened(r)
 
 
 def drawn(rng, count):
@@ -50,7 +54,7 @@ def test_whitened_errors_have_unit_covariance(made):
     data, own, common, sd = made
     V = dense(data, own / sd, common / sd)
     one = np.eye(len(V))
-    W = whitening(data, own / sd, common / sd).whitened(one)
+    W = data.whitened(own / sd, common / sd, one)
     assert_allclose(W @ (one + V @ V.T) @ W.T, one, atol=1e-8)
 
 
@@ -75,5 +79,5 @@ def test_rounding_is_no_error(case):
     own = np.concatenate([own * each for each in np.eye(INPUTS)])
     V = dense(data, own, common)
     one = np.eye(len(V))
-    W = whitening(data, own, common).whitened(one)
+    W = data.whitened(own, common, one)
     assert_allclose(W @ (one + V @ V.T) @ W.T, one, atol=1e-8)

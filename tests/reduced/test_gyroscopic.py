@@ -40,7 +40,7 @@ def test_responses_are_those_of_the_whole_dynamic_stiffness():
     assert np.abs(due / still - 1).max() > 0.1
     assert_allclose(still + part.seen(S, d, left, right), due, rtol=1e-10)
     assert_allclose(part.passed(S, d, left) @ right.T, due, rtol=1e-10)
-    back = part.passed(S, d, right, transposed=True) @ left.T
+    back = part.reverse.passed(S, d, right) @ left.T
     assert_allclose(back.swapaxes(1, 2), due, rtol=1e-10)
 
 
@@ -61,7 +61,7 @@ def test_slopes_are_those_of_differences(p):
     """By each component of h; the second one moves the place too."""
     lam, beta, moved, left, right, term = made()
     part, d = spin([(term, slice(0, 3), beta, moved)]), 1 / (lam + S[:, None] ** 2)
-    ends = part.passed(S, d, left), part.passed(S, d, right, transposed=True)
+    ends = part.passed(S, d, left), part.reverse.passed(S, d, right)
     found = dict(part.seen_slopes(S, *ends))[p]
     e = 1e-6
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
+from tests.builders.recorded_plate import with_attachments
 
 from chladni.effects.attachments import AtPoints
 from chladni.effects.calibration_parameters import calibration_parameter
@@ -70,7 +71,7 @@ def local_scores(base, reduced, data, effect):
 def over_a_basis(base, reduced, data, effect, at, wide=True):
     """Scores by evaluations, over a basis with the static responses of these dofs if ``wide``."""
     rows = sp.eye_array(len(reduced.structure.system.dofs), format="csr")[at]
-    model = reduced.with_attachments(sp.csr_array(rows)) if wide else reduced.model
+    model = with_attachments(reduced, sp.csr_array(rows)) if wide else reduced.model
     data, out = data.rebased(model), []
     for x in STARTS:
         state = evaluate(model, [*base.effects, effect], np.append(base.x, x), False)
@@ -96,7 +97,7 @@ def test_operators_of_stiffness_and_mass(reduced, responses, base):
 def test_points_and_a_basis_that_has_them_agree_to_rounding(reduced, responses, base):
     """Without flexibility beyond the basis nothing is left out."""
     place = reduced.candidates.only(np.array([31]))
-    grown = replace(reduced, model=reduced.with_attachments(place.rows))
+    grown = replace(reduced, model=with_attachments(reduced, place.rows))
     data = responses.rebased(grown.model)
     base = baseline(grown.model, base.effects, data, WEIGHED, base.x)
     effect = AtPoints((Parameter("K", "N/m", 0.0, 1.0, 2e3),), rows=place.rows)

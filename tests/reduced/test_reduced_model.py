@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
+from tests.builders.recorded_plate import with_attachments
 
 from chladni.model.ground_springs import with_springs
 from chladni.model.point_masses import with_masses
@@ -54,7 +55,7 @@ def test_groups_and_rest_sum_to_the_structure():
 
 def test_basis_is_orthonormal_before_and_after_it_grows(reduced):
     rows = reduced.grids.rows[[2, 11]]
-    for model in (reduced.model, reduced.with_attachments(rows)):
+    for model in (reduced.model, with_attachments(reduced, rows)):
         one = model.basis.T @ (reduced.structure.system.M @ model.basis)
         assert_allclose(one, np.eye(len(one)), atol=1e-8)
 

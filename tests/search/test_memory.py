@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from tests.builders.recorded_plate import with_attachments
 
 from chladni.effects.calibration_parameters import calibration_parameter
 from chladni.inference.hypothesis_fit import fitted
@@ -49,7 +50,7 @@ def test_a_grown_model_holds_its_new_vectors_alone(cells):
     reduced = reduced_problem(plate(0.4, 0.3, cells, cells, 1.5e-3), 250.0, groups=6)
     model, rows = reduced.model, reduced.grids.rows[[3, 20]]
     model.operator(reduced.structure.system.M)
-    grown = reduced.with_attachments(rows)
+    grown = with_attachments(reduced, rows)
     grown.operator(reduced.structure.system.M)
     (n, r), k = model.vectors.shape, grown.vectors.shape[1] - model.vectors.shape[1]
     assert k == 2

@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.testing import assert_allclose
+from tests.builders.recorded_plate import with_attachments
 from tests.builders.structures import held_along_x0
 
 from chladni.effects.attachments import AtPoints
@@ -106,7 +107,7 @@ def test_of_a_changed_structure(clamped, reduced, data):
     held = reduced.structure.rows(np.array([[23, 3]]))
     spring = AtPoints((Parameter("k", "N/m", 0.0, 1.0, stiff),), rows=held)
     rho = calibration_parameter(reduced.groups, "rho", [0])
-    model = reduced.with_attachments(sp.csr_array(sp.vstack([b, held])))
+    model = with_attachments(reduced, sp.csr_array(sp.vstack([b, held])))
     x = np.array([0.1, 0.0, 0.0])
     state = evaluate(model, [rho, spring, heavy], x, False)
     article = heavy.apply(rho.apply(clamped, x[:1]), x[2:])
@@ -189,7 +190,7 @@ def test_low_rank_reanalysis_is_the_evaluation(reduced, data, matrix):
 def test_a_wider_basis_is_loaded_as_the_whole_structure(reduced):
     """L over an extended basis is Phi' L of the structure."""
     place = reduced.candidates.only(np.array([30]))
-    model = reduced.with_attachments(place.rows)
+    model = with_attachments(reduced, place.rows)
     assert model.basis.shape[1] > reduced.model.basis.shape[1]
     total = model.base.rest + model.base.groups.sum(axis=0)
     assert_allclose(total, model.basis.T @ model.base.motion.force, atol=1e-12)

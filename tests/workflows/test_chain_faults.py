@@ -15,6 +15,7 @@ from chladni.dynamics.frf import FRF
 from chladni.ema.finding import Finding, Screening
 from chladni.fem.modelled import modelled
 from chladni.inference.chain_hypotheses import chain_faults, without_modes
+from chladni.inference.smoothed_responses import Reading
 from chladni.io.nastran import write_assembly
 from chladni.model.point_masses import with_masses
 from chladni.workflows.screening_of_case import RecordingAtFault, instead_of_effects, settled
@@ -92,7 +93,8 @@ SPOILT = {  # how, and what is said: kind, line that mends it
 
 def found_in(case, model):
     frf = case.frfs[0]
-    return chain_faults(frf, case.lines(frf.frequency), model, case.outputs, case.inputs)
+    lines = case.lines(frf.frequency)
+    return chain_faults(Reading(frf, lines, model, case.outputs, case.inputs))
 
 
 @pytest.mark.parametrize("spoilt", SPOILT)
@@ -152,7 +154,7 @@ def test_a_delay_is_not_taken_for_another_error(sound, model):
     late = Finding("delay", "late", "fault", (), "delay = 0.0015", 1.5e-3)
     spoilt = replace(frf, values=frf.values * turn)
     lines = sound.lines(frf.frequency)
-    findings, _ = chain_faults(spoilt, lines, model, sound.outputs, sound.inputs, [late])
+    findings, _ = chain_faults(Reading(spoilt, lines, model, sound.outputs, sound.inputs), [late])
     assert findings == [late]
 
 
@@ -162,7 +164,7 @@ def test_no_reading_is_proposed_that_leaves_more_than_half_of_q(sound, model):
     frf = replace(sound.frfs[0], values=values)
     words = (frf, sound.lines(frf.frequency), model, sound.outputs, sound.inputs)
     guess = Finding("wrong quantity", "a quarter turn", "fault", (), 'quantity = "receptance"')
-    (found,), check = chain_faults(*words, [guess])
+    (found,), check = chain_faults(Reading(*words), [guess])
     assert (found.kind, found.severity, found.mend) == ("nothing fits", "warning", ())
     assert check.passed is False
 

@@ -20,14 +20,14 @@ from typing import Any, Self
 import numpy as np
 from scipy.special import chdtrc, ndtr
 
-from ..reduced.reduced_model import State, evaluate
+from ..reduced.reduced_model import State
 from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
 from .discrepancy import LEARNED, RIGID, Discrepancy
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Responses
 from .linear_model import LinearModel
-from .map_fit import MassMeasurement, prior_residuals, unknowns
+from .map_fit import MassMeasurement, posterior, unknowns
 from .pole_data import SCALE, SCALE_SD, Poles
 from .result import FitStatistic
 
@@ -61,6 +61,8 @@ class FitTest:
 
     def or_less_likely(self, p: float, *rows: FitStatistic, **said: Any) -> Self:
         """The test with further statistics; ``said`` of another one if that is the less likely."""
+        if modes := said.get("modes_hz"):
+            said["where"] = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
         test = replace(self, statistics=(*self.statistics, *rows))
         if p >= min(self.against, LEAST_P):
             return test
@@ -112,14 +114,14 @@ def _along_lines(z: np.ndarray) -> np.ndarray:
     return out
 
 
-STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
+TIMES = "is {:.1f} times as large as a right model leaves"
+STATISTICS = {  # and a sentence on the one that is least likely
+    "error of form": "the form error must be {1:.1f} %; right models have {2:.1f} %",
+    "misfit": f"the residual {TIMES}",
+    "worst line": f"the residual of one spectral line {TIMES}",
+    "worst channel": f"the residual of one channel {TIMES}",
+}
 TWO_SIDED = (0, 1)  # a fit better than those of right models has overstated errors
-NAMES = (
-    "the form error must be {3:.1f} %; right models have {4:.1f} %",
-    "the residual is {2:.1f} times as large as a right model leaves",
-    "the residual of one spectral line is {2:.1f} times as large as a right model leaves",
-    "the residual of one channel is {2:.1f} times as large as a right model leaves",
-)
 
 
 def adequacy(
@@ -142,32 +144,30 @@ def adequacy(
         return of_poles(data, fit.state)
     if not isinstance(data, Responses) or data.error is None:
         return None
-    state = evaluate(hypothesis.model, fit.effects, fit.x)
-    r, J = data.scaled(state, True)
-    r0, J0 = prior_residuals(fit.effects, mass_measurement, fit.x, state)
-    model = _Linear(data.error, J, J0, data.use, data.values.shape[2])
-    seen, square = model.statistics(r, r0)
+    _, at = posterior(hypothesis.model, fit.effects, data, mass_measurement, fit.x).sloped()
+    model = _Linear(data.error, at.model.J, at.model.J0, data.use, data.values.shape[2])
+    seen, square = model.statistics(at.r, at.r0)
     rng = np.random.default_rng(20250103)
     sd = np.array([p.sd for p in unknowns(fit.effects)])
-    own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
-    p, least, better = ranked(seen, np.array(own), TWO_SIDED)
+    own = np.array([_drawn(model, sd, len(at.r0), rng) for _ in range(draws)])
+    p, least, better = ranked(seen, own, TWO_SIDED)
     where, worst = _where(data, square, labels)
-    ranges = np.quantile(own, (0.5, 0.005, 0.995), axis=0).T
-    rows = tuple(
-        FitStatistic(name, float(value), *map(float, row))
-        for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
-    )
-    usual = rows[least].median
-    what = NAMES[least].format(
-        seen[least], usual, seen[least] / usual, 100 * seen[least], 100 * usual
-    )
+    rows = tuple(map(FitStatistic.of, STATISTICS, seen, own.T))
+    value, usual = seen[least], rows[least].median
+    what = STATISTICS[rows[least].name].format(value / usual, 100 * value, 100 * usual)
     near = _modes_near(worst, fit.state)
     test = FitTest(better or p >= LEAST_P, p, what, where, rows, near, better)
     if damping is not None:
         test = _evenly_damped(test, damping.above(_first(data, fit.state)))
     if coupling is None:
         return test
-    test = _coupled_by_damping(test, coupling)
+    p, row, what, modes = coupling.tested()
+    test = test.or_less_likely(
+        p,
+        row,
+        what=f"{what}: a part rotates or is driven by itself, or channels are delayed",
+        modes_hz=modes,
+    )
     return test if test.passes else replace(test, step=coupling.step)
 
 
@@ -182,16 +182,8 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
     """The test, or that of the damping where it is the less likely of the two."""
     if len(damping.ratio) < FEWEST:
         return test
-    what, where, modes = damping.said()
-    return test.or_less_likely(*damping.tested(), what=what, where=where, modes_hz=modes)
-
-
-def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
-    """The test, or that of complex modes where it is the less likely of the two."""
-    p, row, what, modes = coupling.tested()
-    what += ": a part rotates or is driven by itself, or channels are delayed"
-    where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
-    return test.or_less_likely(p, row, what=what, where=where, modes_hz=modes)
+    what, modes = damping.said()
+    return test.or_less_likely(*damping.tested(), what=what, modes_hz=modes)
 
 
 def of_poles(data: Poles, state: State) -> FitTest:

@@ -22,54 +22,38 @@ class ValueAndSpread:
 
 @dataclass(frozen=True)
 class ParameterKnowledge:
-    """Information of the data on one parameter, before any fit.
-
-    Attributes
-    ----------
-    value, unit : of the deck
-    prior_sd : of ln value
-    sd_single : from the data alone, if all other parameters were known; None: not at all
-    sd_data : from the data alone, all parameters free; None: not at all
-    sd_after : from data and priors, the frozen parameters held
-    frozen : whether it is held at its prior mean
-    why : reason why it is frozen, or what settles it
-    low, high : values beyond which it stands for something else
-    reason : for its prior
-    along : what the data know of it at other values
-    """
+    """Information of the data on one parameter, before any fit."""
 
     name: str
+    # value, unit: of the deck
     value: float
     unit: str
-    prior_sd: float
+    prior_sd: float  # of ln value
+    # from the data alone, if all other parameters were known; None: not at all
     sd_single: float | None
-    sd_data: float | None
-    sd_after: float
-    frozen: bool
-    why: str = ""
+    sd_data: float | None  # from the data alone, all parameters free; None: not at all
+    sd_after: float  # from data and priors, the frozen parameters held
+    frozen: bool  # whether it is held at its prior mean
+    why: str = ""  # reason why it is frozen, or what settles it
+    # low, high: values beyond which it stands for something else
     low: float | None = None
     high: float | None = None
-    reason: str = ""
-    along: tuple[ValueAndSpread, ...] = ()
+    reason: str = ""  # for its prior
+    along: tuple[ValueAndSpread, ...] = ()  # what the data know of it at other values
 
 
 @dataclass(frozen=True)
 class Identifiability:
-    """Information of the data on all parameters, before any fit.
-
-    Attributes
-    ----------
-    correlation : (p, p)   of all parameters, with data and priors
-    collinearity : index of Brun, Reichert and Künsch (2001) of the data alone; None: infinite
-    directions : of which the data tell less than the priors, as (parameter, change in %)
-    weighed : whether a weighed mass was among the data
-    """
+    """Information of the data on all parameters, before any fit."""
 
     parameters: tuple[ParameterKnowledge, ...] = ()
+    # (p, p) of all parameters, with data and priors
     correlation: tuple[tuple[float, ...], ...] = ()
+    # index of Brun, Reichert and Künsch (2001) of the data alone; None: infinite
     collinearity: float | None = None
+    # of which the data tell less than the priors, as (parameter, change in %)
     directions: tuple[tuple[tuple[str, float], ...], ...] = ()
-    weighed: bool = False
+    weighed: bool = False  # whether a weighed mass was among the data
 
     @property
     def frozen(self) -> tuple[str, ...]:
@@ -89,18 +73,11 @@ class NamedValue:
 
 @dataclass(frozen=True)
 class Basin:
-    """A place where fits from several starts ended.
+    """A place where fits from several starts ended."""
 
-    Attributes
-    ----------
-    above : -2 ln evidence above the best basin
-    starts : number of starts that ended here
-    values : of the free parameters
-    """
-
-    above: float
-    starts: int
-    values: tuple[NamedValue, ...]
+    above: float  # -2 ln evidence above the best basin
+    starts: int  # number of starts that ended here
+    values: tuple[NamedValue, ...]  # of the free parameters
 
 
 @dataclass(frozen=True)
@@ -120,18 +97,12 @@ class LikelihoodProfile:
 
 @dataclass(frozen=True)
 class ResponseBand:
-    """Magnitude of the response of one channel as the posterior predicts it, and the test.
-
-    Attributes
-    ----------
-    held_out : whether the fit never saw the channel
-    frequency : (n,) Hz, with the damping of the search on both sides
-    measured, low, high : (n,) |H|; 90 % of the draws lie between the last two
-    """
+    """Magnitude of the response of one channel as the posterior predicts it, and the test."""
 
     label: str
-    held_out: bool
-    frequency: tuple[float, ...]
+    held_out: bool  # whether the fit never saw the channel
+    frequency: tuple[float, ...]  # (n,) Hz, with the damping of the search on both sides
+    # measured, low, high: (n,) |H|; 90 % of the draws lie between the last two
     measured: tuple[float, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
@@ -139,51 +110,36 @@ class ResponseBand:
 
 @dataclass(frozen=True)
 class SampledParameter:
-    """A parameter over the draws of the posterior, and over the Gaussian of its Hessian.
-
-    Attributes
-    ----------
-    median, low, high : of the draws; 95 % lie between the last two
-    mode, gaussian_low, gaussian_high : the most probable value, 95 % interval of the Gaussian
-    sd_ratio : standard deviation of x of the draws over that of the Gaussian
-    autocorrelation_time : steps between independent draws
-    effective : number of independent draws that tell as much
-    """
+    """A parameter over the draws of the posterior, and over the Gaussian of its Hessian."""
 
     name: str
     unit: str
+    # median, low, high: of the draws; 95 % lie between the last two
     median: float
     low: float
     high: float
+    # mode, gaussian_low, gaussian_high: the most probable value, 95 % interval of the Gaussian
     mode: float
     gaussian_low: float
     gaussian_high: float
-    sd_ratio: float
-    autocorrelation_time: float
-    effective: float
+    sd_ratio: float  # standard deviation of x of the draws over that of the Gaussian
+    autocorrelation_time: float  # steps between independent draws
+    effective: float  # number of independent draws that tell as much
 
 
 @dataclass(frozen=True)
 class PosteriorSample:
-    """Draws from the posterior of all unknowns; frozen parameters are free with their priors.
+    """Draws from the posterior of all unknowns; frozen parameters are free with their priors."""
 
-    Attributes
-    ----------
-    parameters : of the calibration
-    walkers, steps, discarded : independent chains, their length, and the part that is left out
-    converged : whether chains are fifty autocorrelation times long in every unknown
-    autocorrelation_time : longest of all unknowns, nuisances included [steps]
-    draws : (kept, p)   of x of the parameters, thinned
-    gaussian_mean, gaussian_covariance : (p,), (p, p)   of x
-    """
-
-    parameters: tuple[SampledParameter, ...] = ()
+    parameters: tuple[SampledParameter, ...] = ()  # of the calibration
+    # walkers, steps, discarded: independent chains, their length, and the part that is left out
     walkers: int = 0
     steps: int = 0
     discarded: int = 0
-    converged: bool = False
-    autocorrelation_time: float = 0.0
-    draws: tuple[tuple[float, ...], ...] = ()
+    converged: bool = False  # whether chains are fifty autocorrelation times long in every unknown
+    autocorrelation_time: float = 0.0  # longest of all unknowns, nuisances included [steps]
+    draws: tuple[tuple[float, ...], ...] = ()  # (kept, p) of x of the parameters, thinned
+    # gaussian_mean, gaussian_covariance: (p,), (p, p) of x
     gaussian_mean: tuple[float, ...] = ()
     gaussian_covariance: tuple[tuple[float, ...], ...] = ()
 
@@ -203,44 +159,34 @@ class PosteriorSample:
 
 @dataclass(frozen=True)
 class ArticleValue:
-    """A parameter of one article.
-
-    Attributes
-    ----------
-    value, low, high : with its 95 % interval
-    away, reach : x less that of the mean of all articles, and half of its own 95 % interval; ln
-        value where it is a factor
-    """
+    """A parameter of one article."""
 
     article: str
+    # value, low, high: with its 95 % interval
     value: float
     low: float
     high: float
+    # away, reach: x less that of the mean of all articles, and half of its own 95 % interval; ln
+    # value where it is a factor
     away: float
     reach: float
 
 
 @dataclass(frozen=True)
 class ArticleParameter:
-    """A parameter of nominally equal articles: θ_a = μ + δ_a, δ_a ~ N(0, τ²).
-
-    Attributes
-    ----------
-    mean, low, high : μ with its 95 % interval
-    spread : τ of x, one for all parameters of this quantity; ln value where it is a factor
-    spread_low, spread_high : its 95 % interval; None where the tests do not bound it
-    articles : θ_a
-    """
+    """A parameter of nominally equal articles: θ_a = μ + δ_a, δ_a ~ N(0, τ²)."""
 
     name: str
     unit: str
+    # mean, low, high: μ with its 95 % interval
     mean: float
     low: float
     high: float
-    spread: float
+    spread: float  # τ of x, one for all parameters of this quantity; ln value where it is a factor
+    # spread_low, spread_high: its 95 % interval; None where the tests do not bound it
     spread_low: float
     spread_high: float | None
-    articles: tuple[ArticleValue, ...]
+    articles: tuple[ArticleValue, ...]  # θ_a
 
 
 @dataclass(frozen=True)
@@ -264,38 +210,26 @@ class PartDamping:
 
 @dataclass(frozen=True)
 class RegionShare:
-    """A part in the strain energy of the modes that still deviate.
-
-    Attributes
-    ----------
-    worst, good : its mean share in the strain energy of these modes, and of the others
-    factor : on its stiffness that fits the deviations of all frequencies best alone
-    removed : share of Σ ln(f_model / f_test)² that this removes
-    state : "free" or "frozen" where its stiffness was a parameter of the calibration
-    field : word of [[parameter]] for its stiffness
-    """
+    """A part in the strain energy of the modes that still deviate."""
 
     part: str
+    # worst, good: its mean share in the strain energy of these modes, and of the others
     worst: float
     good: float
-    factor: float
-    removed: float
-    state: str = ""
-    field: str = "E"
+    factor: float  # on its stiffness that fits the deviations of all frequencies best alone
+    removed: float  # share of Σ ln(f_model / f_test)² that this removes
+    state: str = ""  # "free" or "frozen" where its stiffness was a parameter of the calibration
+    field: str = "E"  # word of [[parameter]] for its stiffness
 
 
 @dataclass(frozen=True)
 class RegionsToFree:
-    """Where the modes that the calibrated deck misses most store their strain energy.
+    """Where the modes that the calibrated deck misses most store their strain energy."""
 
-    Attributes
-    ----------
-    worst, good : modes with the largest deviation or the lowest MAC, and the others
-    regions : all parts, the one first that explains most of the deviations
-    """
-
+    # worst, good: modes with the largest deviation or the lowest MAC, and the others
     worst: tuple[WorstMode, ...] = ()
     good: tuple[WorstMode, ...] = ()
+    # all parts, the one first that explains most of the deviations
     regions: tuple[RegionShare, ...] = ()
 
     @property
@@ -326,33 +260,24 @@ class RegionsToFree:
 
 @dataclass(frozen=True)
 class CalibrationStudy:
-    """Information, basins, covariance and profiles of a calibration.
+    """Information, basins, covariance and profiles of a calibration."""
 
-    Attributes
-    ----------
-    identifiability : before the fit
-    starts : number of starts of a Latin hypercube
-    basins : the ten best places where they ended, best first
-    names, mean, covariance : of the free parameters x after the fit, frozen ones at their priors
-    profiles : of the free parameters
-    bands : responses that the posterior predicts
-    compensating : reasons why the values stand for something else; empty where none does
-    sample : draws from the posterior; None where none were asked for
-    articles : parameters of several articles fitted together; empty with one
-    guidance : parts that a next calibration could free; None with fewer than three paired modes
-    damping : loss factors of the parts; empty without identified damping
-    """
-
-    identifiability: Identifiability = Identifiability()
-    starts: int = 0
-    basins: tuple[Basin, ...] = ()
+    identifiability: Identifiability = Identifiability()  # before the fit
+    starts: int = 0  # number of starts of a Latin hypercube
+    basins: tuple[Basin, ...] = ()  # the ten best places where they ended, best first
+    # names, mean, covariance: of the free parameters x after the fit, frozen ones at their priors
     names: tuple[str, ...] = ()
     mean: tuple[float, ...] = ()
     covariance: tuple[tuple[float, ...], ...] = ()
-    profiles: tuple[LikelihoodProfile, ...] = ()
-    bands: tuple[ResponseBand, ...] = ()
+    profiles: tuple[LikelihoodProfile, ...] = ()  # of the free parameters
+    bands: tuple[ResponseBand, ...] = ()  # responses that the posterior predicts
+    # reasons why the values stand for something else; empty where none does
     compensating: tuple[str, ...] = ()
+    # draws from the posterior; None where none were asked for
     sample: PosteriorSample | None = None
+    # parameters of several articles fitted together; empty with one
     articles: tuple[ArticleParameter, ...] = ()
+    # parts that a next calibration could free; None with fewer than three paired modes
     guidance: RegionsToFree | None = None
+    # loss factors of the parts; empty without identified damping
     damping: tuple[PartDamping, ...] = ()

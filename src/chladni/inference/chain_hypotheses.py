@@ -1,9 +1,8 @@
 """Errors of a whole recording, each tried against the responses of the model.
 
-Both sides are smoothed along frequency by the same Gaussian weights. A peak is then as high as the
-area below it, so that damping hardly matters, and no mode need be identified. A hypothesis changes
-how the numbers are read: another quantity, another unit of frequency, the other sign of time, other
-labels, another place of the force. It is scored by
+Both sides are smoothed along frequency (:mod:`.smoothed_responses`). A hypothesis changes how the
+numbers are read: another quantity, another unit of frequency, the other sign of time, other labels,
+another place of the force. It is scored by
 
 Q = median over channels of mean over lines |log10(H_model / g H_test)|²,
 
@@ -25,17 +24,17 @@ from ..ema.finding import Check, Finding
 from ..ema.frf_maps import Misreading, mapped, misreadings
 from ..ema.shape_faults import LEAST_CHANNELS
 from ..fem.measured_dofs import MeasuredDofs
-from ..fem.modelled import Modelled
 from ..units import HERTZ
 from .place_hypotheses import driven_elsewhere, mirrored, relabelled, two_forces
 from .smoothed_responses import (
     CHANCE,
     EXPLAINED,
     Hypothesis,
+    Reading,
     Smoothed,
+    against,
     log10_of,
     mean_squares,
-    smoothed,
 )
 
 REACH = 2.0  # times the highest line: modes the model must have
@@ -45,40 +44,31 @@ NOTHING_FITS = "nothing fits"  # no interpretation of the recording does
 FLAT = 1e-3  # of Q: responses that vary by 7 % about a power of frequency show no mode
 
 
-def chain_faults(
-    frf: FRF,
-    lines: np.ndarray,
-    model: Modelled,
-    outputs: MeasuredDofs,
-    inputs: MeasuredDofs,
-    before: Sequence[Finding] = (),
-) -> tuple[list[Finding], Check]:
+def chain_faults(reading: Reading, before: Sequence[Finding] = ()) -> tuple[list[Finding], Check]:
     """The error of a whole recording that explains most of how far it is from the model.
 
     Named is the best one, where it :func:`explains` Q as declared.
 
     Parameters
     ----------
-    lines : (n_f,) bool   of the recording, those to look at
-    model : of the deck as it was tested, a little beyond the band at least
     before : what the recording says of itself. A delay is one more hypothesis, known without the
         model.
     """
     name = "the chain against the model"
-    seen = smoothed(frf, lines, model, outputs, inputs)
+    seen = reading.smoothed()
     if seen is None:
         return [], Check(name, "too few lines or modes", None)
-    declared, _ = seen.as_declared()
-    tried = other_readings(frf, lines, seen, declared, model, outputs, inputs, before)
+    declared, _ = seen.as_declared
+    tried = other_readings(seen, before)
     best = min(tried, key=lambda h: h.share)
     late = [h for h in tried if h.finding.kind == "delay" and h.share <= 1]
     said = (
         f"smoothed Q {declared:.2g} as declared, {best.Q:.2g} for the best of {len(tried)} other "
         "interpretations"
     )
-    answers = without_modes(frf, lines) > FLAT
+    answers = without_modes(reading.frf, reading.lines) > FLAT
     answers &= min(_beyond_power(H, seen.weights @ seen.f) for H in seen.answers()) > FLAT
-    named = [best] if explains(best.Q, best.Q / best.share) and answers else late
+    named = [best] if explains(best.Q, best.declared) and answers else late
     findings = [_doubted(_applicable(h, tried)) for h in sorted(named, key=lambda h: h.share)[:1]]
     if not findings and answers and declared > EXPLAINED * CHANCE:
         stiffness = min(map(seen.score, seen.answers(shifts=STIFFNESS)))
@@ -101,7 +91,7 @@ def _doubted(named: Hypothesis) -> Finding:
     that the model lacks may leave less still, and only a diagnosis tries it. An error that a map of
     the numbers undoes was not chosen among many.
     """
-    found, unlike = named.finding, named.Q / named.share > EXPLAINED * CHANCE
+    found, unlike = named.finding, named.declared > EXPLAINED * CHANCE
     if unlike or found.mend or found.kind == "delay":
         return found
     return replace(found, severity="warning", left=(named.Q, named.over))
@@ -145,59 +135,41 @@ def explains(Q: float, declared: float) -> bool:
     return Q < EXPLAINED * min(declared, CHANCE)
 
 
-def other_readings(
-    frf: FRF,
-    lines: np.ndarray,
-    seen: Smoothed,
-    declared: float,
-    model: Modelled,
-    outputs: MeasuredDofs,
-    inputs: MeasuredDofs,
-    before: Sequence[Finding] = (),
-) -> list[Hypothesis]:
-    """Every error that is tried, ``declared`` being Q without any."""
-    tried = [*_read_otherwise(frf, lines, declared, model, outputs, inputs)]
+def other_readings(seen: Smoothed, before: Sequence[Finding] = ()) -> list[Hypothesis]:
+    """Every error that is tried."""
+    tried = [*_read_otherwise(seen)]
     for late in (f for f in before if f.kind == "delay"):
         Q = min(map(seen.score, seen.answers(delay=late.value)))
-        tried.append(Hypothesis(Q, Q / declared, late))
+        tried.append(Hypothesis(Q, seen.as_declared[0], late))
     inside = (seen.omega > 0) & (seen.omega <= 2 * np.pi * seen.f[-1])
-    if len(outputs.labels) >= LEAST_CHANNELS and inside.sum() >= LEAST_MODES:
-        swaps = relabelled(seen, declared, outputs.labels)
-        mixed = two_forces(seen, model, outputs, inputs)
+    if len(seen.reading.outputs.labels) >= LEAST_CHANNELS and inside.sum() >= LEAST_MODES:
+        swaps = relabelled(seen)
+        mixed = two_forces(seen)
         tried += swaps
-        tried += driven_elsewhere(seen, model, inputs)
+        tried += driven_elsewhere(seen)
         rivals = [h.Q for h in swaps if h.share < EXPLAINED]  # simpler, where they explain it
         tried += [h for h in mixed if h.Q < BEYOND_DOUBT * min(rivals, default=np.inf)]
-        tried += mirrored(frf, lines, declared, model, outputs, inputs)
+        tried += mirrored(seen)
     return tried
 
 
-def _read_otherwise(
-    frf: FRF,
-    lines: np.ndarray,
-    declared: float,
-    model: Modelled,
-    outputs: MeasuredDofs,
-    inputs: MeasuredDofs,
-) -> Iterator[Hypothesis]:
+def _read_otherwise(seen: Smoothed) -> Iterator[Hypothesis]:
     """Another quantity, sign, direction of time, form of complex numbers or unit of frequency."""
+    reading, (declared, _) = seen.reading, seen.as_declared
+    frf = reading.frf
 
     def of(Q: float, error: Misreading) -> Hypothesis:
-        said = (
-            f"{error.text}: with this interpretation smoothed Q against the model is {Q:.2g}, as "
-            f"declared {declared:.2g}."
-        )
+        said = f"{error.text}: with this interpretation {against(Q, declared)}"
         found = Finding(error.kind, said, "fault", (), error.repair, mend=error.mend)
-        return Hypothesis(Q, Q / declared, found)
+        return Hypothesis(Q, declared, found)
 
-    for error in (*_of_chain(frf, inputs), *misreadings(frf)):
-        read = smoothed(mapped(frf, error.mend), lines, model, outputs, inputs)
+    for error in (*_of_chain(frf, reading.inputs), *misreadings(frf)):
+        read = replace(reading, frf=mapped(frf, error.mend)).smoothed()
         if read is not None:
-            Q = min(map(read.score, read.answers()))
-            yield of(Q, error)
+            yield of(min(map(read.score, read.answers())), error)
     for unit, scale in HERTZ.items():
-        reached = (frf.frequency > 0) & (REACH * scale * frf.frequency <= model.band)
-        if scale == 1 or (all_lines := smoothed(frf, reached, model, outputs, inputs)) is None:
+        reached = (frf.frequency > 0) & (REACH * scale * frf.frequency <= reading.model.band)
+        if scale == 1 or (all_lines := replace(reading, lines=reached).smoothed()) is None:
             continue
         Q = min(map(all_lines.score, all_lines.answers(scale=scale)))
         mend = f'in case.toml, [test]: frequency_unit = "{unit}"'

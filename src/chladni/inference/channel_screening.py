@@ -3,9 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 
-from ..dynamics.frf import FRF
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.chain_checks import level_checks, modal_gains
 from ..ema.channel_checks import left_out
@@ -21,6 +19,7 @@ from ..fem.modelled import Modelled
 from ..geometry.grid_normals import grid_normals
 from ..geometry.sampling import farthest_point_sample
 from .chain_hypotheses import NOTHING_FITS, chain_faults
+from .smoothed_responses import Reading
 
 ACROSS = 0.9  # cosine to the normal: a sensor is glued flat on its sheet
 AWAY = 0.12  # of the structure: a patch that the model lacks bends shapes as a shorter move would
@@ -32,14 +31,7 @@ REACH = 1.3  # times the band: modes of the model that may mix with those of the
 
 
 def against_model(
-    before: Screening,
-    frf: FRF,
-    lines: np.ndarray,
-    found: Identified | None,
-    model: Modelled,
-    outputs: MeasuredDofs,
-    inputs: MeasuredDofs,
-    gain_known: bool = True,
+    before: Screening, reading: Reading, found: Identified | None, gain_known: bool = True
 ) -> Screening:
     """Screening of level, quantity and every channel, extended by the model.
 
@@ -49,14 +41,13 @@ def against_model(
 
     Parameters
     ----------
-    lines : (n_f,) bool   of the recording, those to look at
-    found : what was identified from it, its outputs in the order of ``outputs``; None where nothing
-    model : up to ``REACH`` times the band at least
+    reading : with the model up to ``REACH`` times the band at least
+    found : what was identified from it, its outputs in the order of its own; None where nothing
     """
-    found_in, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
+    found_in, check = chain_faults(reading, before.findings)
     faults = [f for f in found_in if f.severity == "fault"]
     if found is not None and not any(f.mend for f in faults):
-        alone = other_readings(frf, strong_modes(found), lines)
+        alone = other_readings(reading.frf, strong_modes(found), reading.lines)
         if alone and (not faults or alone[0].kind == faults[0].kind):
             found_in = faults = alone
     follows = _FOLLOWS if found_in else _CONFIRMED
@@ -66,8 +57,8 @@ def against_model(
     before = before.with_more(found_in, [check])
     if faults or found is None:
         return before
-    before = before.with_more(*_supports(strong_modes(found), model))
-    return _by_modes(before, found, model, outputs, inputs, gain_known)
+    before = before.with_more(*_supports(strong_modes(found), reading.model))
+    return _by_modes(before, found, reading, gain_known)
 
 
 def _supports(strong: Identified, model: Modelled) -> tuple[list[Finding], list[Check]]:
@@ -107,21 +98,16 @@ _FOLLOWS = ("wrong quantity", "reversed sign", "not reciprocal", "delay", "equal
 
 
 def _by_modes(
-    before: Screening,
-    found: Identified,
-    model: Modelled,
-    outputs: MeasuredDofs,
-    inputs: MeasuredDofs,
-    gain_known: bool,
+    before: Screening, found: Identified, reading: Reading, gain_known: bool
 ) -> Screening:
     """Level, quantity and every channel, by modal constants and shapes."""
-    strong, built = strong_modes(found), model.structure
-    near = _elastic(model, REACH * found.band[1])
+    strong, built = strong_modes(found), reading.model.structure
+    outputs, inputs = reading.outputs, reading.inputs
+    near = _elastic(reading.model, REACH * found.band[1])
     labels = found.outputs
     phi_o = outputs.rows(built) @ near.shapes
     phi_i = inputs.rows(built) @ near.shapes
-    omega_r = 2 * np.pi * near.frequency
-    before = _agreeing(before, labels, phi_o, phi_i, omega_r, 2 * np.pi * found.band[1])
+    before = _agreeing(before, found, phi_o, phi_i, near.frequency)
     if inputs.base.any() or not strong.order or not len(near.frequency):
         why = "the base moves" if inputs.base.any() else "no mode is above the noise"
         return before.with_more([], [Check("channels against the model", why, None)])
@@ -138,11 +124,9 @@ def _by_modes(
 def shapes_against_model(
     name: str, psi: np.ndarray, frequency: np.ndarray, model: Modelled, outputs: MeasuredDofs
 ) -> Screening:
-    """Screening of every channel of a modal model; its faults are mended in the table of sensors.
+    """Screening of every channel of a modal model by its real shapes ψ (n_out, r).
 
-    Parameters
-    ----------
-    psi : (n_out, r)   real shapes
+    Its faults are mended in the table of sensors.
     """
     near = _elastic(model, min(REACH * float(frequency.max()), model.band))
     every = np.arange(len(psi))
@@ -180,37 +164,30 @@ _UNUSABLE = ("dead channel", "duplicated channels")
 
 
 def _agreeing(
-    before: Screening,
-    labels: tuple[str, ...],
-    phi: np.ndarray,
-    drive: np.ndarray,
-    omega_r: np.ndarray,
-    top: float,
+    before: Screening, found: Identified, phi: np.ndarray, drive: np.ndarray, f: np.ndarray
 ) -> Screening:
     """Equal channels are no matter where the model's are equal as well, and a fault where not.
 
-    Parameters
-    ----------
-    phi, drive : (n, m), (n_in, m)   shapes at the outputs and at the inputs
-    omega_r, top : (m,), end of the band [rad/s]
+    The model has modes f (m,) [Hz], of shapes φ (n, m) at the outputs and (n_in, m) at the inputs.
     """
+    labels, omega_r, top = found.outputs, 2 * np.pi * f, 2 * np.pi * found.band[1]
     out = []
     s = 1j * np.linspace(0.1, 1.0, EQUAL_LINES) * top
     h = s[:, None] ** 2 / (s[:, None] ** 2 + 2 * EQUAL_DAMPING * omega_r * s[:, None] + omega_r**2)
     H = np.einsum("nm,fm,im->fni", phi, h, drive)
-    for f in before.findings:
-        if f.kind != "equal channels":
-            out.append(f)
+    for one in before.findings:
+        if one.kind != "equal channels":
+            out.append(one)
             continue
-        a, b = (H[:, labels.index(c)] for c in f.channels)
+        a, b = (H[:, labels.index(c)] for c in one.channels)
         apart = float(np.linalg.norm(a - b) / np.maximum(np.linalg.norm([a, b]), 1e-300))
-        if apart > UNLIKE and f.value < UNLIKE * apart:
+        if apart > UNLIKE and one.value < UNLIKE * apart:
             text = (
-                f"outputs {' and '.join(f.channels)} are equal within their noise, but differ by "
+                f"outputs {' and '.join(one.channels)} are equal within their noise, but differ by "
                 f"{100 * apart:.0f} % in the model: one sensor has two labels."
             )
-            mend = left_out(f.channels[1])
-            out.append(Finding("duplicated channels", text, "fault", f.channels, mend, f.value))
+            mend = left_out(one.channels[1])
+            out.append(Finding("duplicated channels", text, "fault", one.channels, mend, one.value))
     return replace(before, findings=tuple(out))
 
 
@@ -223,16 +200,13 @@ def _turned(
     """The place of a channel along either way of every axis that it does not point along."""
     axes = [k for k in range(3) if abs(dofs.directions[i, k]) < 0.9]
     ways = np.array([np.eye(3)[k] for k in axes])
-    rows = _rows(built, np.repeat(dofs.grids[i], len(axes)), dofs.points[i], ways) @ shapes
+    grids, points = np.repeat(dofs.grids[i], len(axes)), np.tile(dofs.points[i], (len(axes), 1))
+    rows = rows_of(built, grids, points, ways) @ shapes
     names = [_AXES[k] for k in axes] + [_AXES[k].replace("+", "-") for k in axes]
     values = np.concatenate([rows, -rows])
     size = np.linalg.norm(values, axis=1)
     seen = size > 0.02 * np.linalg.norm(shapes, axis=0).mean() / np.sqrt(len(shapes))
     return values[seen], [n for n, s in zip(names, seen, strict=True) if s]
-
-
-def _rows(built: Structure, grids: np.ndarray, point: np.ndarray, ways: np.ndarray) -> sp.csr_array:
-    return rows_of(built, grids, np.tile(point, (len(ways), 1)), ways)
 
 
 def _elsewhere(

@@ -35,20 +35,13 @@ EXCUSED = 0.05  # of the modes may exceed it, where the first order fails
 
 @dataclass(frozen=True, eq=False)
 class ModeCoupling:
-    """Complexity of identified modes.
+    """Complexity of identified modes."""
 
-    Attributes
-    ----------
-    frequency : (r,) Hz
-    complexity : (r,)    norm of the imaginary part of the unit shape that noise does not explain
-    bound : (r,)         the largest complexity that damping, all of it in one place, can cause
-    alike, coupled : int numbers of pairs of modes that are significantly coupled both ways: pairs
-        of equal signs, and all pairs
-    """
-
-    frequency: np.ndarray
+    frequency: np.ndarray  # (r,) [Hz]
+    # (r,) norm of the imaginary part of the unit shape that noise does not explain
     complexity: np.ndarray
-    bound: np.ndarray
+    bound: np.ndarray  # (r,) the largest complexity that damping, all of it in one place, can cause
+    # numbers of pairs of modes that are significantly coupled both ways: of equal signs, and all
     alike: int
     coupled: int
 

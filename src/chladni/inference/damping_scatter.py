@@ -53,9 +53,7 @@ class ModalDamping(IdentifiedDamping):
         own = _statistics(np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(self.ratio))))
         seen = _statistics(np.log(self.ratio)[None])[0]
         p = (1 + (own >= seen).sum(axis=0)) / (1 + DRAWS)
-        median, low, high = np.quantile(own[:, 0], (0.5, 0.005, 0.995))
-        row = FitStatistic("uneven damping", float(seen[0]), float(median), float(low), float(high))
-        return float(p.min()), row
+        return float(p.min()), FitStatistic.of("uneven damping", seen[0], own[:, 0])
 
     def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
         """P-value that damping follows a share (n,) of the modes by scatter alone; its statistic.
@@ -85,8 +83,8 @@ class ModalDamping(IdentifiedDamping):
         row = FitStatistic("damping where it is compliant", *map(float, each))
         return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
 
-    def said(self) -> tuple[str, str, tuple[float, ...]]:
-        """Sentence on the modes that stand out, their place, and their frequencies [Hz]."""
+    def said(self) -> tuple[str, tuple[float, ...]]:
+        """Sentence on the modes that stand out, and their frequencies [Hz]."""
         excess = np.log(self.ratio) - np.median(np.log(self.ratio))
         out = np.flatnonzero(excess > 3 * SCATTER)
         out = out if len(out) else np.array([int(np.argmax(excess))])
@@ -99,8 +97,7 @@ class ModalDamping(IdentifiedDamping):
             f"{len(out)} of {len(self.ratio)} modes have a damping of {span}, the others about "
             f"{100 * usual:.1f} %: stiffness and mass cannot explain this dissipation"
         )
-        modes = tuple(float(f) for f in self.frequency[out])
-        return what, "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz", modes
+        return what, tuple(float(f) for f in self.frequency[out])
 
 
 def _statistics(log_ratio: np.ndarray) -> np.ndarray:

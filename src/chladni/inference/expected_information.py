@@ -27,16 +27,10 @@ SETTLED = 0.01  # of the entropy: no further measurement is chosen below it
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Predicted(ShownBriefly):
-    """Data of a measurement as each hypothesis predicts them, in units of the noise.
+    """Data of a measurement as each hypothesis predicts them, in units of the noise."""
 
-    Attributes
-    ----------
-    mean : (m, n) μ_j
-    factors : (n, k_j) F_j of each hypothesis
-    """
-
-    mean: np.ndarray
-    factors: tuple[np.ndarray, ...]
+    mean: np.ndarray  # (m, n) μ_j
+    factors: tuple[np.ndarray, ...]  # (n, k_j) F_j of each hypothesis
 
     def __add__(self, other: "Predicted") -> "Predicted":
         """Both measurements, of independent noise."""
@@ -76,14 +70,9 @@ def nothing(like: Predicted) -> Predicted:
 
 @dataclass(frozen=True, eq=False)
 class Rivals:
-    """Hypotheses of which one is true.
+    """Hypotheses of which one is true."""
 
-    Attributes
-    ----------
-    probability : (m,) p_j
-    """
-
-    probability: np.ndarray
+    probability: np.ndarray  # (m,) p_j
 
     @property
     def entropy(self) -> float:
@@ -114,52 +103,39 @@ class Rivals:
             for mean, F in zip(seen.mean, seen.factors, strict=True)
         ])  # fmt: skip
         posterior = self.posterior(seen, each).reshape(len(p), len(p), draws).swapaxes(0, 1)
-        own = posterior[np.arange(len(p)), np.arange(len(p))]  # (m, draws): of the true one
+        own = np.einsum("jjn->jn", posterior)  # (m, draws): of the true one
         gain = np.log(np.maximum(own, 1e-300)) - np.log(p)[:, None]
         return Forecast(float(p @ gain.mean(axis=1)), p, posterior)
 
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """Outcomes that are expected of a measurement.
+    """Outcomes that are expected of a measurement."""
 
-    Attributes
-    ----------
-    information : [nat]
-    probability : (m,) of each hypothesis before it
-    posterior : (m, m, n) of draw n under the true hypothesis (first): that of each (second)
-    """
-
-    information: float
-    probability: np.ndarray
+    information: float  # [nat]
+    probability: np.ndarray  # (m,) of each hypothesis before it
+    # (m, m, n) of draw n under the true hypothesis (first): that of each (second)
     posterior: np.ndarray
 
     def settled(self, odds: float) -> float:
         """Probability that the true hypothesis gets these odds against all others together."""
-        own = self.posterior[np.arange(len(self.probability)), np.arange(len(self.probability))]
+        own = np.einsum("jjn->jn", self.posterior)
         return float(self.probability @ (own >= odds / (1 + odds)).mean(axis=1))
 
     def misled(self, odds: float) -> float:
         """Probability that a wrong hypothesis gets these odds."""
         wrong = self.posterior >= odds / (1 + odds)
-        wrong[np.arange(len(self.probability)), np.arange(len(self.probability))] = False
+        np.einsum("jjn->jn", wrong)[:] = False
         return float(self.probability @ wrong.any(axis=1).mean(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
 class OpenQuantity:
-    """A quantity x = x_0 + a z + rest of one explanation, z ~ N(0, I) as its data left it.
+    """A quantity x = x_0 + a z + rest of one explanation, z ~ N(0, I) as its data left it."""
 
-    Attributes
-    ----------
-    name : in words
-    along : (k,) a
-    rest : variance that no measurement sees
-    """
-
-    name: str
-    along: np.ndarray
-    rest: float
+    name: str  # in words
+    along: np.ndarray  # (k,) a
+    rest: float  # variance that no measurement sees
 
     def variance(self, seen: Predicted) -> float:
         """Var x after data of factor F: rest + a (I + FᵀF)⁻¹ aᵀ."""

@@ -21,7 +21,7 @@ from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN
 from .likelihood import Data, Responses
 from .linear_model import LinearModel
-from .map_fit import Fit, MassMeasurement, constants, fit, linearised_fit, prior_residuals
+from .map_fit import Fit, MassMeasurement, constants, fit, prior_residuals
 from .own_optimum import Base, LocalOptimum, distinct, own_optimum
 from .pole_data import SCALE, SCALE_SD, Poles
 
@@ -121,28 +121,21 @@ class HypothesisFit:
 
 @dataclass(frozen=True, eq=False)
 class UpdatingProblem:
-    """Data and model of a diagnosis.
-
-    Attributes
-    ----------
-    base : calibration parameters and nuisances, free in every fit
-    nuisance : the nuisances alone
-    damping, coupling : of the identified modes, if responses are compared
-    found : effects found earlier and now in the base, each with its parameters
-    families : of effects that are tried
-    """
+    """Data and model of a diagnosis."""
 
     reduced: ReducedProblem
-    data: Responses | Poles
+    data: Data
     mass_measurement: MassMeasurement | None
-    base: tuple[Effect, ...]
-    nuisance: tuple[Effect, ...]
+    base: tuple[Effect, ...]  # calibration parameters and nuisances, free in every fit
+    nuisance: tuple[Effect, ...]  # the nuisances alone
     setup: Setup
     labels: tuple[str, ...] = ()
+    # damping, coupling: of the identified modes, if responses are compared
     damping: ModalDamping | None = None
     coupling: ModeCoupling | None = None
+    # effects found earlier and now in the base, each with its parameters
     found: tuple[tuple[Effect, np.ndarray], ...] = ()
-    families: tuple[Family, ...] = field(default_factory=catalogue)
+    families: tuple[Family, ...] = field(default_factory=catalogue)  # of effects that are tried
 
     @property
     def where(self) -> EffectContext:
@@ -281,9 +274,9 @@ def _fit_responses(
     assert data.error is not None
     error, begun = data.error, None
     for _ in range(ROUNDS):
-        found, there = linearised_fit(
-            model, effects, data, mass_measurement, x, max_steps, begun=begun
-        )
+        found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps, begun=begun)
+        there = found.linear
+        assert there is not None
         likely = there.model.learned(there.r, there.r0)
         change = abs(np.log(likely.delta / error.delta))
         error = error.with_delta(likely.delta)
@@ -299,6 +292,10 @@ def _fit_responses(
 SCALES = np.geomspace(0.003, 0.2, 25)
 
 
+ALIKE = 1.0  # in -2 ln evidence: fits of one state on different scales
+ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settles
+
+
 def _fit_poles(
     model: Reduced,
     effects: Sequence[Effect],
@@ -307,43 +304,35 @@ def _fit_poles(
     x: np.ndarray,
 ) -> Fit:
     """Alternate the fit with the most probable scale of the irreducible spread."""
+
+    def at_scale(scale: float, x: np.ndarray, max_steps: int = 30) -> Fit:
+        given = replace(data, scale=scale)
+        return fit(model, effects, given, mass_measurement, x, max_steps=max_steps)
+
+    def settled(x: np.ndarray) -> Fit:
+        """Fit scale and parameters in turn until the scale is that of its own fit."""
+        best, scale = None, 0.0
+        for _ in range(6):
+            before, state = scale, evaluate(model, effects, x, False)
+            scale = min(SCALES, key=lambda s: neg2_log_mixture(replace(data, scale=s), state))
+            if scale == before:
+                break
+            now = at_scale(scale, x)
+            known = prior_residuals(effects, mass_measurement, now.x, now.state)
+            S = over_scales(data, now.state, *known) + constants(effects)
+            now = replace(now, neg2_log_evidence=S)
+            if best is not None and S > best.neg2_log_evidence + ALIKE:
+                break
+            best, x = now, now.x
+        return best if best is not None else now
+
     options = []
     for road in ROADS:
         there = x
         for scale in road:
-            given = replace(data, scale=scale)
-            there = fit(model, effects, given, mass_measurement, there, max_steps=8).x
-        options.append(_settled(model, effects, data, mass_measurement, there))
+            there = at_scale(scale, there, 8).x
+        options.append(settled(there))
     return min(options, key=lambda f: f.neg2_log_evidence)
-
-
-ALIKE = 1.0  # in -2 ln evidence: fits of one state on different scales
-ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settles
-
-
-def _settled(
-    model: Reduced,
-    effects: Sequence[Effect],
-    data: Poles,
-    mass_measurement: MassMeasurement | None,
-    x: np.ndarray,
-) -> Fit:
-    """Fit scale and parameters in turn until the scale is that of its own fit."""
-    best, scale = None, 0.0
-    for _ in range(6):
-        before, state = scale, evaluate(model, effects, x, False)
-        scale = _likely_scale(replace(data, scale=SCALES[0]), state)
-        if scale == before:
-            break
-        now = fit(model, effects, replace(data, scale=scale), mass_measurement, x)
-        S = over_scales(
-            data, now.state, *prior_residuals(effects, mass_measurement, now.x, now.state)
-        )
-        now = replace(now, neg2_log_evidence=S + constants(effects))
-        if best is not None and now.neg2_log_evidence > best.neg2_log_evidence + ALIKE:
-            break
-        best, x = now, now.x
-    return best if best is not None else now
 
 
 def over_scales(data: Poles, state: State, r0: np.ndarray, J0: np.ndarray) -> float:
@@ -357,17 +346,11 @@ def over_scales(data: Poles, state: State, r0: np.ndarray, J0: np.ndarray) -> fl
     for scale in SCALES:
         given = replace(data, scale=scale)
         r, J = given.scaled(state, True)
-        A, g = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0
-        cost = r @ r + r0 @ r0 - g @ np.linalg.solve(A, g)
         widths = 2 * np.log(given.std()[data.use]).sum()
-        every.append(cost + np.linalg.slogdet(A)[1] + widths + _scale_prior(scale))
+        S = LinearModel(None, J, J0).neg2_log_evidence(r, r0)
+        every.append(S + widths + _scale_prior(scale))
     step = np.log(SCALES[1] / SCALES[0]) / (SCALE_SD * np.sqrt(np.pi))
     return float(-2 * (logsumexp(-np.array(every) / 2) + np.log(step)))
-
-
-def _likely_scale(data: Poles, state: State) -> float:
-    """The scale at which the pairing as a whole is most probable."""
-    return float(min(SCALES, key=lambda scale: neg2_log_mixture(replace(data, scale=scale), state)))
 
 
 def neg2_log_mixture(data: Poles, state: State) -> float:

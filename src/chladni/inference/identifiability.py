@@ -61,9 +61,7 @@ class Information:
     def frozen(self, at: Sequence[np.ndarray], weighed: bool | None = None) -> list[int]:
         """Positions in ``at`` of effects that the data do not know, in the order of freezing.
 
-        Parameters
-        ----------
-        at : positions of the parameters of each effect; an effect is frozen as a whole
+        ``at`` are the positions of the parameters of each effect, which is frozen as a whole.
         """
         kept, out = list(range(len(at))), []
         while kept:
@@ -121,17 +119,12 @@ def identifiability(problem: UpdatingProblem) -> Identifiability:
     ``DECADES`` are also looked at along their range: those that the data know anywhere are free.
     """
     mean, effects = problem.mean(), [e for e in problem.base if e.kind == "calibration"]
-    at = _positions(effects)
+    at = [np.arange(own.start, own.stop) for _, own in slices(effects)]
     nominal = information(problem, mean)
-    frozen = nominal.frozen(at)
     curves = dict(_curves(problem, mean))
-    frozen = [k for k in frozen if not _known_somewhere(curves, at[k])]
+    frozen = [k for k in nominal.frozen(at) if not _known_somewhere(curves, at[k])]
     settled = set(frozen) - set(nominal.frozen(at, True)) if not nominal.weighed else set()
     return _in_words(effects, at, nominal, frozen, settled, curves)
-
-
-def _positions(effects: Sequence[Effect]) -> list[np.ndarray]:
-    return [np.arange(s.start, s.stop) for _, s in slices(effects)]
 
 
 Curves = dict[int, tuple[ValueAndSpread, ...]]
@@ -172,9 +165,7 @@ def _in_words(
 ) -> Identifiability:  # fmt: skip
     """The table of all parameters, with the reason of each that is frozen.
 
-    Parameters
-    ----------
-    settled : effects among the frozen ones that a weighing would settle
+    A weighing would settle the effects ``settled`` among these.
     """
     names = parameter_names(effects)
     every, plausible = unknowns(effects), [r for e in effects for r in _plausible(e)]
@@ -199,7 +190,9 @@ def _in_words(
         )
         for k in range(len(names))
     )  # fmt: skip
-    C = _correlation(np.linalg.inv(F + np.eye(len(F))))
+    C = np.linalg.inv(F + np.eye(len(F)))
+    sd = np.sqrt(np.diag(C))
+    C /= np.outer(sd, sd)
     return Identifiability(
         rows, tuple(map(tuple, C.tolist())), collinearity(F), tuple(_directions(F, names, prior)),
         told.weighed,
@@ -239,11 +232,6 @@ def _alone(F: np.ndarray) -> list[float | None]:
         if not np.any(V[n, null] ** 2 > 1e-6):
             out[k] = float(np.sqrt((V[n, ~null] ** 2 / w[~null]).sum()) / scale[k])
     return out
-
-
-def _correlation(C: np.ndarray) -> np.ndarray:
-    sd = np.sqrt(np.diag(C))
-    return np.asarray(C / np.outer(sd, sd))
 
 
 def collinearity(F: np.ndarray) -> float | None:

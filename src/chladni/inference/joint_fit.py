@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.effect import Effect, of_test
+from ..effects.effect import Effect, Parameter, of_test
 from ..reduced.reduced_model import State
 from .hypothesis_fit import HypothesisFit
 from .linear_model import Squares
 from .map_fit import MassMeasurement, Point, descend, posterior
+
+MAX_STEPS = 30
 
 SharedKey = tuple[str, str, int]  # an effect's name, where it acts, number of the parameter
 Posterior = dict[SharedKey, tuple[float, float]]  # mean and standard deviation
@@ -22,20 +24,15 @@ Posterior = dict[SharedKey, tuple[float, float]]  # mean and standard deviation
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """All states at their most probable x.
+    """All states at their most probable x."""
 
-    Attributes
-    ----------
-    x, covariance : (n,), (n, n)   of every unknown
-    where : for each state, positions of its parameters in x
-    shared : {(effect, text, number): position in x} of parameters that the states share
-    fits : the states one by one, with their part of x and of the covariance
-    """
-
+    # x, covariance: (n,), (n, n) of every unknown
     x: np.ndarray
     covariance: np.ndarray
-    where: tuple[np.ndarray, ...]
+    where: tuple[np.ndarray, ...]  # for each state, positions of its parameters in x
+    # {(effect, text, number): position in x} of parameters that the states share
     shared: dict[SharedKey, int]
+    # the states one by one, with their part of x and of the covariance
     fits: tuple[HypothesisFit, ...]
 
     def posterior(self) -> Posterior:
@@ -45,19 +42,14 @@ class JointFit:
 
 
 def joint_fit(
-    states: Sequence[HypothesisFit], masses: Sequence[MassMeasurement | None],
-    *, max_steps: int = 30, tol: float = 0.05,
-) -> JointFit:  # fmt: skip
+    states: Sequence[HypothesisFit], masses: Sequence[MassMeasurement | None], tol: float = 0.05
+) -> JointFit:
     """Fit all states at once, starting from the fit of each.
 
-    Parameters
-    ----------
-    states : one fit each; the first that has a shared parameter sets its prior
-    masses : weighed mass of each state
+    The first state that has a shared parameter sets its prior.
     """
-    where, shared, first = _positions(states)
-    n = 1 + max(int(at.max(initial=-1)) for at in where)
-    start, priors = np.zeros(n), [p for p, _ in sorted(first, key=lambda pair: pair[1])]
+    where, shared, priors = _positions(states)
+    start = np.zeros(len(priors))
     for fit, at in zip(reversed(states), reversed(where), strict=True):
         start[at] = fit.fit.x
     mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
@@ -82,21 +74,20 @@ def joint_fit(
         return Point(total, sloped)
 
     limit = np.array([p.step for p in priors])
-    x, squares, found, _ = descend(objective, start, limit, max_steps, tol)
+    x, squares, found, _ = descend(objective, start, limit, MAX_STEPS, tol)
     covariance = np.linalg.inv(squares.information)
-    fits = tuple(
-        _of_state(one, x[at], covariance[np.ix_(at, at)], state)
-        for one, at, state in zip(states, where, found, strict=True)
-    )
-    return JointFit(x, covariance, tuple(where), shared, fits)
+    fits = []
+    for one, at, state in zip(states, where, found, strict=True):
+        own = replace(one.fit, x=x[at], covariance=covariance[np.ix_(at, at)], state=state)
+        fits.append(replace(one, fit=own.kept()))
+    return JointFit(x, covariance, tuple(where), shared, tuple(fits))
 
 
 def _positions(
     states: Sequence[HypothesisFit],
-) -> tuple[list[np.ndarray], dict[SharedKey, int], list]:
-    """Positions of every state's and of the shared parameters, and (prior, position) of all."""
-    shared: dict[SharedKey, int] = {}
-    where, first, n = [], [], 0
+) -> tuple[list[np.ndarray], dict[SharedKey, int], list[Parameter]]:
+    """Positions of every state's and of the shared parameters, and the priors of all."""
+    shared, where, priors = dict[SharedKey, int](), [], list[Parameter]()
     for one in states:
         at = []
         for effect in one.fit.effects:
@@ -105,25 +96,18 @@ def _positions(
                 key = (effect.name, effect.text, k)
                 known = shared.get(key) if common else None
                 if known is None:
-                    known, n = n, n + 1
-                    first.append((p, known))
+                    known = len(priors)
+                    priors.append(p)
                     if common:
                         shared[key] = known
                 at.append(known)
         where.append(np.array(at, dtype=int))
-    return where, shared, first
+    return where, shared, priors
 
 
 def of_the_object(effect: Effect) -> bool:
     """True where an effect belongs to the object in all its states, not to one test of it."""
     return effect.kind in ("calibration", "nuisance") and not of_test(effect)
-
-
-def _of_state(
-    one: HypothesisFit, x: np.ndarray, covariance: np.ndarray, state: State
-) -> HypothesisFit:
-    fit = replace(one.fit, x=x, covariance=covariance, state=state).kept()
-    return replace(one, fit=fit)
 
 
 def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:

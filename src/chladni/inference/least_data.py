@@ -27,9 +27,7 @@ def numbers(modes: int, channels: int) -> int:
 def too_little(modes: int, channels: int, taken: float = TAKEN) -> str:
     """Reason why so many modes and fitted channels rarely separate explanations; or "".
 
-    Parameters
-    ----------
-    taken : effective number of calibration parameters
+    The calibration parameters take ``taken`` numbers in effect.
     """
     if modes >= MODES and numbers(modes, channels) >= taken + EFFECT:
         return ""

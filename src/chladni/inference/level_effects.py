@@ -25,9 +25,7 @@ NOWHERE = "levels alone do not show where"
 def level_effects(study: LevelStudy, model: Modelled) -> tuple[NamedEffect, ...]:
     """Friction or clearance, one effect for all modes that show it; none for other signatures.
 
-    Parameters
-    ----------
-    model : the calibrated deck, whose modes give the strain energy of each part
+    Modes of the calibrated deck give the strain energy of each part.
     """
     out = []
     for name in dict.fromkeys(EFFECT.get(m.signature, "") for m in study.moving):
@@ -66,21 +64,14 @@ def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
 
 @dataclass(frozen=True)
 class LinearJoint:
-    """K and GE, common to all springs and bushes, that reproduce a mode at one level.
+    """K and GE, common to all springs and bushes, that reproduce a mode at one level."""
 
-    Attributes
-    ----------
-    mode_hz, level : frequency at the lowest level [Hz], and the level [N] or [m/s²]
-    stiffness : factor on K of the deck, which is that of the level that was fitted
-    loss : GE of the joints; other losses stay in the damping of the mode
-    share : share of the mode's strain energy in springs and bushes
-    """
-
+    # mode_hz, level: frequency at the lowest level [Hz], and the level [N] or [m/s²]
     mode_hz: float
     level: float
-    stiffness: float
-    loss: float
-    share: float
+    stiffness: float  # factor on K of the deck, which is that of the level that was fitted
+    loss: float  # GE of the joints; other losses stay in the damping of the mode
+    share: float  # share of the mode's strain energy in springs and bushes
 
 
 def linear_joints(
@@ -89,12 +80,8 @@ def linear_joints(
     """K and GE of springs and bushes at each level, where friction or clearance may sit in them.
 
     The element's κ is a share of the mode's stiffness.  Joints that hold the share e of the mode's
-    strain energy produce κ with K (1 + κ'/e) and GE = κ''/(e + κ') (modal strain energy, to first
-    order).
-
-    Parameters
-    ----------
-    fitted : the level at which the deck was fitted
+    strain energy produce κ with K (1 + κ'/e) and GE = κ''/(e + κ'), to first order.  K is that of
+    the deck at the level ``fitted``.
     """
     known = [
         t for one, t in zip(study.modes, level_tables(study), strict=True)
@@ -125,11 +112,9 @@ def joint_comment(joints: Sequence[LinearJoint]) -> str:
 
 
 def energy_shares(model: Modelled, frequency: Sequence[float]) -> list[dict[str, float]]:
-    """Shares of the strain energy of the deck's nearest modes, largest first; none if none is near.
+    """Shares of the strain energy of the deck's modes nearest to frequencies (k,) [Hz].
 
-    Parameters
-    ----------
-    frequency : (k,) [Hz]
+    They are in order, the largest first; none if no mode is near.
     """
     if not len(frequency):
         return []

@@ -1,12 +1,13 @@
 """Compare a recording with a state of the reduced model: whitened residuals and their slopes.
 
 :class:`Responses` are the complex log10 deviation of the damping-equalised FRF on s = ω (ζ + i).
-This is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides. The same
-interface serves natural frequencies alone (:class:`.pole_data.Poles`).
+This is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides. Natural
+frequencies alone (:class:`.pole_data.Poles`) have the same interface: residuals of a state, their
+slopes, and ``error``, the covariance of errors of form that is still in them.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal, Protocol, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -15,28 +16,13 @@ from ..ema.identification import DERIVATIVES
 from ..reduced.matrix_slopes import spanned
 from ..reduced.matrix_stack import EVERY
 from ..reduced.reduced_model import Reduced, State
-from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
-from .sensor_errors import SensorErrors, columns, variance
-from .whitening import Whitening, whitening
+from .discrepancy import MEDIAN, Discrepancy, Form, discrepancy, form
+from .pole_data import Poles
+from .sensor_errors import SensorErrors, Whitening, whitening
 
 LN10 = np.log(10.0)
-
-
-class Data(Protocol):
-    """Residuals of a state; their covariance is one without an error of form."""
-
-    @property
-    def error(self) -> Discrepancy | None:
-        """Covariance of the model's errors of form, or None."""
-
-    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """r (n,) over the spread of each sample and ∂r/∂x (n, n_p); ``error`` is still in them."""
-
-    def scaled_slopes(self, state: State) -> np.ndarray:
-        """The slopes ∂r/∂x of :meth:`scaled` alone."""
-
-    def rebased(self, model: Reduced) -> Self:
-        """Return the data with rows in another basis."""
+USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
+WRAPS = 0.4  # relative deviation of H from which its phase may wrap
 
 
 def rms_over_lines(values: np.ndarray) -> np.ndarray:
@@ -46,37 +32,27 @@ def rms_over_lines(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Damping-equalised FRFs.
+    """Damping-equalised FRFs."""
 
-    Attributes
-    ----------
-    values : (n_f, n_out, n_in) complex    H_X(s)
-    s : (n_f,) complex                     [rad/s]
-    outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
-    direct : (n_out, n_in)                 rigid motion with a moving base, 0 for forces
-    use : (n_f, n_out) bool                lines and channels the fit may see
-    sigma_model : float                    sd of log10 H that neither noise nor δ explains
-    noise : (n_f, n_out, n_in)             sd of log10 H of independent samples, spread included
-    spread : (n_f, n_out, n_in)            sd of log10 H between repeats or articles
-    level : (n_out, n_in)                  rms of |H_X| over fitted lines; None: over all lines
-    """
-
-    values: np.ndarray
-    s: np.ndarray
+    values: np.ndarray  # (n_f, n_out, n_in) H_X(s), complex
+    s: np.ndarray  # (n_f,) [rad/s], complex
+    # outputs, inputs: sparse rows (n_out, n), (n_in, n) of the structure
     outputs: object
     inputs: object
-    use: np.ndarray
+    use: np.ndarray  # (n_f, n_out) bool, lines and channels the fit may see
     quantity: str = "accelerance"
-    sigma_model: float = 0.003
+    sigma_model: float = 0.003  # sd of log10 H that neither noise nor δ explains
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    # (n_f, n_out, n_in) sd of log10 H of independent samples, spread included
     noise: np.ndarray | None = None
-    spread: np.ndarray | None = None
+    spread: np.ndarray | None = None  # (n_f, n_out, n_in) sd of log10 H between repeats or articles
+    # (n_out, n_in) rms of |H_X| over fitted lines; None: over all lines
     level: np.ndarray | None = None
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
     about: State | None = None  # from which the errors of form spread
-    direct: np.ndarray | float = 0.0
+    direct: np.ndarray | float = 0.0  # (n_out, n_in) rigid motion with a moving base, 0 for forces
     sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
     known: Whitening | None = None  # of what those errors do to the lines and channels in use
 
@@ -99,8 +75,11 @@ class Responses:
         If effects dissipate, the modes are complex (:mod:`.frequency_dependent_stiffness`), and so
         they are with spinning parts (:mod:`.gyroscopic`).
         """
-        H = self.receptance(state, *self.modal(state))
-        return self.s[:, None, None] ** self.power * H + self.direct
+        return self._measured(self.receptance(state, *self.modal(state)))
+
+    def _measured(self, receptance: np.ndarray) -> np.ndarray:
+        """H_A of receptances (..., n_f, n_out, n_in)."""
+        return self.s[:, None, None] ** self.power * receptance + self.direct
 
     def receptance(
         self, state: State, phi_o: np.ndarray, phi_i: np.ndarray, d: np.ndarray,
@@ -128,9 +107,10 @@ class Responses:
         """Split an array over all places into outputs and inputs."""
         return places[: len(self.a)], places[len(self.a) :]
 
-    def deviation(self, state: State) -> np.ndarray:
-        """δ = log10(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in)."""
-        delta = log10(self.model(state) / self.values)
+    def deviation(self, state: State, receptance: np.ndarray | None = None) -> np.ndarray:
+        """δ = log10(H_A / H_X), complex, phase wrapped; of other receptances (..., *H) if given."""
+        H = self.model(state) if receptance is None else self._measured(receptance)
+        delta = log10(H / self.values)
         return delta if state.offset is None else wrapped(delta + state.offset[:, None])
 
     def std(self) -> np.ndarray:
@@ -147,20 +127,75 @@ class Responses:
         they count as independent, and a smaller δ would gain on every sample.
         """
         plain = self.exactly()
-        data = replace(plain, bent=curvature(plain, state), about=state)
-        return data._spread(state, delta)
+        return replace(plain, bent=plain.curvature(state), about=state)._spread(delta)
 
-    def _spread(self, about: State, delta: float) -> Self:
+    def _spread(self, delta: float) -> Self:
         """Covariance of the lines and channels in use."""
         data = replace(self, known=None, error=None)
-        if self.sensors is not None:
-            own, common = columns(self.sensors, data, about, LN10 * data.std())
-            data = replace(data, known=whitening(data, own, common))
-        return replace(data, error=discrepancy(data, about).with_delta(delta))
+        about, errors = self.about, self.sensors
+        assert about is not None
+        if errors is not None:
+            own, common = map(data.stacked, data.sensor_slopes(errors, about, LN10 * data.std()))
+            outputs = np.broadcast_to(np.arange(self.use.shape[1]), self.use.shape)[self.use]
+            output = np.tile(np.repeat(outputs, self.values.shape[2]), 2)
+            data = replace(data, known=whitening(output, own, common))
+        W = data.form_slopes(about, form(about, float(self.s.imag.max())))
+        return replace(data, error=discrepancy(W).with_delta(delta))
+
+    def form_slopes(self, state: State, about: Form) -> np.ndarray:
+        """∂r/∂G and ∂r/∂G' of pairs of modes, times the standard deviation at δ = 1 (n, 2 pairs).
+
+        dH = -s^k a_oᵀ (Λ^½ dG Λ^½ + s² dG') a_i with a = T D φ, T the reference modes' share in
+        those of the state.
+        """
+        i, j = about.pairs.T
+        phi_o, phi_i, d = self.modal(state)
+        H, sd = self.model(state), self.std()
+        T = about.rows @ state.vectors
+        a_o = state.between(self.s, d, phi_o, T).transpose(2, 0, 1)
+        a_i = state.between(self.s, d, T, phi_i).transpose(1, 0, 2)
+        a_o = a_o * (self.s**self.power)[:, None]
+        std = np.where(i == j, 0.5, np.sqrt(0.5))  # half, for i = j counts twice below
+        root = np.sqrt(about.lam[i] * about.lam[j])
+        out = np.empty((2, len(i), *H.shape), complex)
+        for p in range(len(phi_i)):
+            both = a_o[i] * a_i[j, :, p, None] + a_o[j] * a_i[i, :, p, None]
+            both *= -std[:, None, None]
+            out[0, ..., p] = root[:, None, None] * both
+            out[1, ..., p] = self.s[:, None] ** 2 * both
+        out /= H * sd * LN10
+        return self.stacked(out.reshape(2 * len(i), *H.shape))
+
+    def curvature(self, state: State) -> np.ndarray:
+        """Standard deviation of log10 H beyond what is linear in G (n_f, n_out, n_in).
+
+        For H = H_0 (1 + z) with z of variance σ², ln(1 + z) = z - z²/2. Near a zero of H, where σ
+        is large, the logarithm is curved, and beyond σ = 0.4 its phase may wrap. The remaining part
+        of the exact response to G is similar along lines and counts ``BENT`` times.
+        """
+        every = self.only(np.ones(self.use.shape, bool))
+        var = (every.form_slopes(state, form(state, float(self.s.imag.max()))) ** 2).sum(axis=1)
+        sd = every.std() * LN10 * USUAL
+        sigma2 = sd**2 * var.reshape(2, *self.values.shape).sum(axis=0) + self.wrong(state)
+        return BENT * sigma2 / (2 * LN10) * (1 + (sigma2 / WRAPS**2) ** 2)
+
+    def sensor_slopes(
+        self, errors: SensorErrors, state: State, scale: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Columns d ln H / scale per sd: of each output (5, *H), of the gain of each input."""
+        _, phi_i, d = self.modal(state)
+        H, out = self.model(state), [errors.gain / scale]
+        for modal, with_base in zip(errors.modal, errors.with_base, strict=True):
+            G = state.between(self.s, d, modal @ state.phi, phi_i)
+            out.append((self.s[:, None, None] ** self.power * G + with_base) / (H * scale))
+        return np.stack(out), errors.gain / scale * np.eye(scale.shape[-1])[:, None, None]
 
     def wrong(self, state: State) -> np.ndarray | float:
         """E|d ln H|² of the independent errors of sensors (n_f, n_out, n_in)."""
-        return 0.0 if self.sensors is None else variance(self.sensors, self, state)
+        if self.sensors is None:
+            return 0.0
+        both = self.sensor_slopes(self.sensors, state, np.ones(self.values.shape))
+        return np.asarray(sum((np.abs(z) ** 2).sum(axis=0) for z in both))
 
     def exactly(self) -> Self:
         """Return these responses for a model and a test without errors of form."""
@@ -169,9 +204,7 @@ class Responses:
     def using(self, use: np.ndarray) -> Self:
         """Return other lines and channels, with the same errors of the model's form."""
         data = replace(self, use=use)
-        if self.error is None or self.about is None:
-            return data
-        return data._spread(self.about, self.error.delta)
+        return data if self.error is None else data._spread(self.error.delta)
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """:meth:`scaled` with the errors of the model's form whitened out."""
@@ -222,7 +255,7 @@ class Responses:
         left, right = phi_o * d[:, None], phi_i * d[:, None]  # φ_o D, φ_i D (n_f, ., r)
         if state.spin is not None:
             left = state.spin.passed(s, d, phi_o)
-            right = state.spin.passed(s, d, phi_i, transposed=True)
+            right = state.spin.reverse.passed(s, d, phi_i)
         q = state.vectors @ right.transpose(1, 2, 0)  # (n_in, m, n_f)
         span, parts = spanned(np.concatenate([*q, *(q * s**2)], axis=1))
         of_K, of_M = np.split(parts.reshape(len(span.T), 2, len(q), -1), 2, axis=1)
@@ -262,3 +295,6 @@ class Responses:
         if not use.any():
             return float("nan")
         return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
+
+
+Data = Responses | Poles

@@ -16,24 +16,11 @@ from .discrepancy import Discrepancy
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Sum of squares of residuals r with slopes J.
+    """Sum of squares of residuals r with slopes J."""
 
-    Attributes
-    ----------
-    cost : float                   |r|²
-    gradient : (n_p,)              Jᵀr
-    information : (n_p, n_p)       JᵀJ
-    """
-
-    cost: float
-    gradient: np.ndarray
-    information: np.ndarray
-
-    @classmethod
-    def of(cls, r: np.ndarray, J: np.ndarray) -> Self:
-        """Squares of residuals (n,) and slopes (n, n_p); J without columns where none are known."""
-        gradient = J.T @ r if J.shape[1] else np.zeros(0)
-        return cls(float(r @ r), gradient, J.T @ J)
+    cost: float  # |r|²
+    gradient: np.ndarray  # (n_p,) Jᵀr
+    information: np.ndarray  # (n_p, n_p) JᵀJ
 
     @property
     def further(self) -> float:
@@ -65,33 +52,20 @@ def cost(error: Discrepancy | None, r: np.ndarray, r0: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """Evidence over all δ, and which δ the data prefer.
+    """Evidence over all δ, and which δ the data prefer."""
 
-    Attributes
-    ----------
-    neg2_log_evidence : float  -2 ln evidence, δ integrated out
-    delta : float            its most probable value
-    """
-
-    neg2_log_evidence: float
-    delta: float
+    neg2_log_evidence: float  # -2 ln evidence, δ integrated out
+    delta: float  # its most probable value
 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Slopes of residuals, with the products that all residuals of one state share.
+    """Slopes of residuals, with the products that all residuals of one state share."""
 
-    Attributes
-    ----------
-    error : Discrepancy or None     of the data's residuals
-    J : (n, n_p)                    slopes of the data's residuals, not whitened by C
-    J0 : (m, n_p)                   those of the priors and the weighing
-    within : LinearModel or None    with the first columns of J; its products are reused
-    """
-
-    error: Discrepancy | None
-    J: np.ndarray
-    J0: np.ndarray
+    error: Discrepancy | None  # of the data's residuals
+    J: np.ndarray  # (n, n_p) slopes of the data's residuals, not whitened by C
+    J0: np.ndarray  # (m, n_p) those of the priors and the weighing
+    # with the first columns of J; its products are reused
     within: "LinearModel | None" = field(default=None, kw_only=True)
 
     @cached_property

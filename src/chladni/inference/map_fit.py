@@ -40,28 +40,34 @@ class MassMeasurement:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """Effects at their most probable x.
+class LinearPosterior:
+    """A state with its slopes, and residuals of the data (n,) and of all other knowledge (m,)."""
 
-    Attributes
-    ----------
-    effects : tuple of Effect      in the order of x
-    x : (n_p,)                     most probable parameters
-    covariance : (n_p, n_p)        of x, Laplace's
-    misfit : float                 |r|² of the data alone
-    neg2_log_evidence : float      -2 ln evidence up to a constant common to all fits of the data
-    state : State                  the reduced model there
-    data : Data                    what was fitted
-    """
-
-    effects: tuple[Effect, ...]
-    x: np.ndarray
-    covariance: np.ndarray
-    misfit: float
-    neg2_log_evidence: float
     state: State
-    data: Data
+    model: LinearModel
+    r: np.ndarray
+    r0: np.ndarray
+
+    def under(self, error: Discrepancy) -> "Point":
+        """The posterior at the same x with errors of form of another size."""
+        linear = replace(self.model, error=error, within=self.model)
+        squares, there = linear.squares(self.r, self.r0), replace(self, model=linear)
+        return Point(squares.cost, lambda: (squares, there))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Effects at their most probable x."""
+
+    effects: tuple[Effect, ...]  # in the order of x
+    x: np.ndarray  # (n_p,) most probable parameters
+    covariance: np.ndarray  # (n_p, n_p) of x, Laplace's
+    misfit: float  # |r|² of the data alone
+    neg2_log_evidence: float  # -2 ln evidence up to a constant common to all fits of the data
+    state: State  # the reduced model there
+    data: Data  # what was fitted
     status: Status
+    linear: LinearPosterior | None = None
 
     def of(self, effect: Effect) -> np.ndarray:
         """The part of x that belongs to one effect."""
@@ -78,7 +84,7 @@ class Fit:
 
     def kept(self) -> Self:
         """The fit without ∂K and ∂M of its state, so that a search can keep many fits."""
-        return replace(self, state=self.state.without_slopes())
+        return replace(self, state=self.state.without_slopes(), linear=None)
 
     def sd(self, effect: Effect) -> np.ndarray:
         """Standard deviations of an effect's parameters."""
@@ -140,22 +146,6 @@ def constants(effects: Sequence[Effect]) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearPosterior:
-    """A state with its slopes, and residuals of the data (n,) and of all other knowledge (m,)."""
-
-    state: State
-    model: LinearModel
-    r: np.ndarray
-    r0: np.ndarray
-
-    def under(self, error: Discrepancy) -> "Point":
-        """The posterior at the same x with errors of form of another size."""
-        linear = replace(self.model, error=error, within=self.model)
-        squares, there = linear.squares(self.r, self.r0), replace(self, model=linear)
-        return Point(squares.cost, lambda: (squares, there))
-
-
-@dataclass(frozen=True, eq=False)
 class Point:
     """A sum of squares at one x; ``sloped`` computes its slopes, and a second value of any kind."""
 
@@ -169,14 +159,7 @@ def posterior(
 ) -> Point:  # fmt: skip
     """-2 ln posterior at x up to a constant, and the :class:`LinearPosterior` when it is needed.
 
-    Parameters
-    ----------
-    priors : False leaves the priors of x out
-
-    Raises
-    ------
-    ModelError
-        If x is no structure.
+    Without ``priors`` those of x are left out. A :class:`ModelError` says that x is no structure.
     """
     state = evaluate(model, effects, x)
     r = data.scaled(state, False)[0]
@@ -201,23 +184,13 @@ def fit(
     *,
     max_steps: int = 30,
     tol: float = 0.05,
-) -> Fit:
-    """Most probable x from one start, and the evidence there.
-
-    Parameters
-    ----------
-    start : (n_p,)      initial x
-    tol : float        stop when a step improves -2 ln posterior by less
-    """
-    return linearised_fit(model, effects, data, mass_measurement, start, max_steps, tol)[0]
-
-
-def linearised_fit(
-    model: Reduced, effects: Sequence[Effect], data: Data,
-    mass_measurement: MassMeasurement | None, start: np.ndarray, max_steps: int, tol: float = 0.05,
     begun: Point | None = None,
-) -> tuple[Fit, LinearPosterior]:  # fmt: skip
-    """Fit as :func:`fit`, and keep the linear model at the end; ``begun`` is at the start."""
+) -> Fit:
+    """Most probable x from one start (n_p,), and the evidence there.
+
+    A step that improves -2 ln posterior by less than ``tol`` is the last one; ``begun`` is the
+    posterior at the start, where it is known.
+    """
     limit = np.array([p.step for p in unknowns(effects)])
 
     def objective(x: np.ndarray) -> Point:
@@ -225,10 +198,9 @@ def linearised_fit(
 
     x, found, there, status = descend(objective, start, limit, max_steps, tol, begun)
     A = found.information
-    S = found.cost + np.linalg.slogdet(A)[1] + constants(effects)
+    S = float(found.cost + np.linalg.slogdet(A)[1] + constants(effects))
     misfit = found.cost - float(there.r0 @ there.r0)
-    done = tuple(effects), x, np.linalg.inv(A), misfit, float(S), there.state, data, status
-    return Fit(*done), there
+    return Fit(tuple(effects), x, np.linalg.inv(A), misfit, S, there.state, data, status, there)
 
 
 Objective = Callable[[np.ndarray], Point]
@@ -241,11 +213,8 @@ def descend(
 ) -> tuple[np.ndarray, Squares, Any, Status]:  # fmt: skip
     """Levenberg-Marquardt: final x, its squares, second value of the objective, status.
 
-    Parameters
-    ----------
-    limit : (n_p,)     longest step
-    tol : stop when a step improves the sum of squares by less, or a further one by far less
-    begun : at the start, where it is known
+    Steps are no longer than ``limit`` (n_p,). The last one improves the sum of squares by less than
+    ``tol``, or a further one would by far less.
     """
     x, damping = start.copy(), 1e-2
     found, here = (begun or objective(x)).sloped()

@@ -6,7 +6,7 @@ every y (Golub and Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432): only slopes 
 by differences where an effect is local (:mod:`..reduced.local_effect`).
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -83,11 +83,8 @@ def own_optimum(
     """Optimise an effect from a start, with the base linear about the best of some states.
 
     The evidence is that of responses linear in the base.  A strong effect spoils the base of a fit
-    without it; that of the deck is then the nearer.
-
-    Parameters
-    ----------
-    local : adds the effect to a state of the base; without it ``model`` must represent the effect
+    without it; that of the deck is then the nearer. Without ``local``, which adds the effect to a
+    state of the base, ``model`` must represent the effect.
     """
     effects = [*base, effect]
 
@@ -104,7 +101,23 @@ def own_optimum(
         return (np.array(near) - r).T / steps
 
     def objective(at: Base) -> Objective:
-        return _objective(effects, data, mass_measurement, at, state_of, slopes)
+        """-2 ln posterior of own parameters, the base eliminated; its second value is the whole."""
+        alone, n = at.alone, len(at.x)
+
+        def point(y: np.ndarray) -> Point:
+            state = state_of(at.x, y, at.state)
+            r, z = data.scaled(state, False)[0], np.concatenate([at.x, y])
+            r0, J0 = prior_residuals(effects, mass_measurement, z, state)
+            frozen = replace(alone, J0=J0[:, :n], within=alone)
+
+            def sloped() -> tuple[Squares, tuple[LinearModel, np.ndarray, np.ndarray]]:
+                J = np.concatenate([alone.J, slopes(at, y, state, r)], axis=1)
+                whole = replace(frozen, J=J, J0=J0, within=frozen)
+                return whole.squares(r, r0).profiled(n), (whole, r, r0)
+
+            return Point(frozen.squares(r, r0).profiled(n).cost, sloped)
+
+        return point
 
     ways = [objective(each) for each in about]
     begun = [way(start) for way in ways]
@@ -129,27 +142,3 @@ def own_optimum(
     return Fit(
         tuple(effects), z, covariance, misfit, S, state.without_slopes(), data, Status.CONVERGED
     )
-
-
-def _objective(
-    effects: Sequence[Effect], data: Data, mass_measurement: MassMeasurement | None, about: Base,
-    state_of: Callable[..., State], slopes: Callable[..., np.ndarray],
-) -> Objective:  # fmt: skip
-    """-2 ln posterior of own parameters, the base eliminated; its second value is the whole."""
-    alone, n = about.alone, len(about.x)
-
-    def objective(y: np.ndarray) -> Point:
-        state = state_of(about.x, y, about.state)
-        r = data.scaled(state, False)[0]
-        z = np.concatenate([about.x, y])
-        r0, J0 = prior_residuals(effects, mass_measurement, z, state)
-        frozen = replace(alone, J0=J0[:, :n], within=alone)
-
-        def sloped() -> tuple[Squares, tuple[LinearModel, np.ndarray, np.ndarray]]:
-            J = np.concatenate([alone.J, slopes(about, y, state, r)], axis=1)
-            whole = replace(frozen, J=J, J0=J0, within=frozen)
-            return whole.squares(r, r0).profiled(n), (whole, r, r0)
-
-        return Point(frozen.squares(r, r0).profiled(n).cost, sloped)
-
-    return objective

@@ -6,7 +6,6 @@ from itertools import product
 
 import numpy as np
 
-from ..dynamics.frf import FRF
 from ..ema.finding import Finding
 from ..errors import named as listed
 from ..fem.locate import rows_of
@@ -18,10 +17,10 @@ from .smoothed_responses import (
     EXPLAINED,
     Hypothesis,
     Smoothed,
+    against,
     level_free,
     log10_of,
     mean_squares,
-    smoothed,
 )
 
 PLACES = 400  # where the force may act
@@ -30,22 +29,22 @@ MOVED = 0.02  # of the structure: places nearer than that to their mirror images
 OFF = 0.05  # of the structure: mirror images farther from every grid are off it
 
 
-def relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list[Hypothesis]:
+def relabelled(seen: Smoothed) -> list[Hypothesis]:
     """The outputs under each other's labels, as many as it takes; of two, shapes tell better."""
     from scipy.optimize import linear_sum_assignment
 
+    labels, (declared, _) = seen.reading.outputs.labels, seen.as_declared
     itself = np.arange(len(labels))
-    best: tuple[float, np.ndarray, np.ndarray] = (np.inf, itself, np.zeros((0, 0)))
-    for H in seen.answers():
+
+    def exchanged(H: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         log_H = level_free(H)
         apart = np.stack(
             [mean_squares(log_H - seen.log_test[:, [k]]).mean(axis=1) for k in range(len(labels))]
         )  # (output as labelled, place in the model)
         _, place = linear_sum_assignment(apart)
-        Q = float(np.median(apart[np.arange(len(labels)), place]))
-        if Q < best[0]:
-            best = (Q, place, apart)
-    Q, place, apart = best
+        return float(np.median(apart[itself, place])), place, apart
+
+    Q, place, apart = min(map(exchanged, seen.answers()), key=lambda found: found[0])
     moved = np.flatnonzero(place != itself)
     if len(moved) == 2:
         return _exchanged(apart[itself, itself], apart[itself, place], moved, labels)
@@ -53,12 +52,12 @@ def relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> list
         return []
     rows = [f"{labels[k]} that of {labels[place[k]]}" for k in moved]
     text = (
-        f"{len(moved)} of {len(labels)} outputs have exchanged labels: after the exchange smoothed "
-        f"Q against the model is {Q:.2g}, as declared {declared:.2g}."
+        f"{len(moved)} of {len(labels)} outputs have exchanged labels: after the exchange "
+        + against(Q, declared)
     )
     mend = f"in sensors.csv give each the grid and direction of the other: {listed(rows, 6)}"
     channels = tuple(labels[k] for k in moved)
-    return [Hypothesis(Q, Q / declared, Finding("permuted labels", text, "fault", channels, mend))]
+    return [Hypothesis(Q, declared, Finding("permuted labels", text, "fault", channels, mend))]
 
 
 def _exchanged(
@@ -69,13 +68,12 @@ def _exchanged(
         return []
     Q, declared = float(after.mean()), float(before.mean())
     names = tuple(labels[k] for k in pair)
-    text = (
-        f"outputs {names[0]} and {names[1]} are exchanged: after the exchange mean smoothed Q "
-        f"against the model is {Q:.2g}, as declared {declared:.2g}."
+    text = f"outputs {names[0]} and {names[1]} are exchanged: after the exchange mean " + against(
+        Q, declared
     )
     mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
     found = Finding("swapped channels", text, "fault", names, mend, mend=("exchanged", *names))
-    return [Hypothesis(Q, Q / declared, found, "mean")]
+    return [Hypothesis(Q, declared, found, "mean")]
 
 
 def _drives(model: Modelled, way: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -86,14 +84,14 @@ def _drives(model: Modelled, way: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     return grids, at, rows_of(built, grids, at, np.tile(way, (len(pick), 1))) @ model.modes.shapes
 
 
-def driven_elsewhere(seen: Smoothed, model: Modelled, inputs: MeasuredDofs) -> list[Hypothesis]:
+def driven_elsewhere(seen: Smoothed) -> list[Hypothesis]:
     """Each force at other grids, along the direction it is said to have."""
+    inputs, out = seen.reading.inputs, list[Hypothesis]()
     if inputs.base.any():
-        return []
-    out = []
+        return out
     for j, label in enumerate(inputs.labels):
         one = slice(j, j + 1)
-        grids, at, drive = _drives(model, inputs.directions[j])
+        grids, at, drive = _drives(seen.reading.model, inputs.directions[j])
         declared = min(seen.score(H[:, :, one], one) for H in seen.answers())
         Q = np.full(len(grids), np.inf)
         for H in seen.answers(drive=drive):
@@ -104,33 +102,29 @@ def driven_elsewhere(seen: Smoothed, model: Modelled, inputs: MeasuredDofs) -> l
         off = float(np.linalg.norm(at[k] - inputs.points[j]))
         text = (
             f"the force {label} acts near grid {grids[k]}, {off:.3g} m from the declared place: "
-            f"there smoothed Q against the model is {Q[k]:.2g}, as declared {declared:.2g}."
+            f"there {against(Q[k], declared)}"
         )
         mend = f"in sensors.csv give input {label} the grid {grids[k]}, or its true place"
         found = Finding("misplaced force", text, "fault", (label,), mend, float(grids[k]))
-        out.append(Hypothesis(float(Q[k]), float(Q[k] / declared), found))
+        out.append(Hypothesis(float(Q[k]), declared, found))
     return out
 
 
-def two_forces(
-    seen: Smoothed, model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs
-) -> list[Hypothesis]:
+def two_forces(seen: Smoothed) -> list[Hypothesis]:
     """Some outputs under the declared force, the others under one at another grid.
 
     Q is the mean over outputs here: their median does not see fewer than half of them. The outputs
     of the other force are unlike the model as declared (``EXPLAINED`` of ``CHANCE``).
     """
+    inputs = seen.reading.inputs
     if inputs.base.any():
         return []
-    return [
-        h for j in range(len(inputs.labels)) for h in _two_forces(seen, model, outputs, inputs, j)
-    ]
+    return [h for j in range(len(inputs.labels)) for h in _two_forces(seen, j)]
 
 
-def _two_forces(
-    seen: Smoothed, model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs, j: int
-) -> Iterator[Hypothesis]:
-    grids, _, drive = _drives(model, inputs.directions[j])
+def _two_forces(seen: Smoothed, j: int) -> Iterator[Hypothesis]:
+    outputs, inputs = seen.reading.outputs, seen.reading.inputs
+    grids, _, drive = _drives(seen.reading.model, inputs.directions[j])
     declared, best = np.inf, np.inf
     split = 0, np.zeros(0), np.zeros(0)
     for H, others in zip(seen.answers(), seen.answers(drive=drive), strict=True):
@@ -158,44 +152,39 @@ def _two_forces(
     )
     mend = "give the outputs of each force a recording, or an input, of their own"
     found = Finding("two forces mixed", text, "fault", labels, mend, float(grid))
-    yield Hypothesis(best, best / declared, found, "mean")
+    yield Hypothesis(best, declared, found, "mean")
 
 
-def mirrored(
-    frf: FRF,
-    lines: np.ndarray,
-    declared: float,
-    model: Modelled,
-    outputs: MeasuredDofs,
-    inputs: MeasuredDofs,
-) -> list[Hypothesis]:
+def mirrored(seen: Smoothed) -> list[Hypothesis]:
     """Sensors and forces at the mirror images of their places, about the middle or through zero.
 
     Several images fit equally well on a symmetric structure: that of the fewest axes is taken.
     """
-    points = model.structure.assembly.points
+    reading, (declared, _) = seen.reading, seen.as_declared
+    points = reading.model.structure.assembly.points
     centres = (points.min(axis=0) + points.max(axis=0)) / 2, np.zeros(3)
-    best: tuple[float, int, str] | None = None
+    found = list[tuple[float, int, str]]()
     for signs, middle in product(product((1, -1), repeat=3), centres):
         turn = np.array(signs)
-        seen, driven = (_image(at, turn, middle, model) for at in (outputs, inputs))
-        if seen is None or driven is None:
+        outputs, inputs = (
+            _image(at, turn, middle, reading.model) for at in (reading.outputs, reading.inputs)
+        )
+        if outputs is None or inputs is None:
             continue
-        if (read := smoothed(frf, lines, model, seen, driven)) is None:
+        if (read := replace(reading, outputs=outputs, inputs=inputs).smoothed()) is None:
             continue
         Q = round(min(map(read.score, read.answers())), 4)
         axes = " and ".join(axis for axis, sign in zip("XYZ", signs, strict=True) if sign < 0)
-        best = min(best or (np.inf, 0, ""), (Q, len(axes), axes))
-    if best is None:
+        found.append((Q, len(axes), axes))
+    if not found:
         return []
-    Q, _, axes = best
+    Q, _, axes = min(found)
     text = (
         f"deck and sensors are mirrored against each other along {axes}: with sensors and force at "
-        f"the mirror images of their places smoothed Q against the model is {Q:.2g}, as declared "
-        f"{declared:.2g}."
+        f"the mirror images of their places {against(Q, declared)}"
     )
     mend = f"reverse {axes} of all places in sensors.csv, or of all grids in the deck"
-    return [Hypothesis(Q, Q / declared, Finding("mirrored deck", text, "fault", (), mend))]
+    return [Hypothesis(Q, declared, Finding("mirrored deck", text, "fault", (), mend))]
 
 
 def _image(

@@ -30,33 +30,22 @@ SCALE_SD = 0.35  # of its logarithm: these are the ends of its 95 % interval
 
 @dataclass(frozen=True, eq=False)
 class Poles:
-    """Natural frequencies, each with the standard deviation of its logarithm.
+    """Natural frequencies, each with the standard deviation of its logarithm."""
 
-    Attributes
-    ----------
-    frequency : (n,) Hz       increasing
-    sd : (n,)                 of ln f, from the identification
-    use : (n,) bool           poles the fit may see
-    strength : (n,)           peak height relative to the highest
-    band : (low, high) Hz     in which the test would have shown a mode
-    scale : float             irreducible spread of ln f; learned with every hypothesis
-    spurious : (n,) or float  chance of each pole to belong to no mode of the structure
-    outputs, inputs           rows at the likely places of sensors and shakers, or None
-    shapes : ShapeData        of every pole at the first of the outputs, or None
-    """
-
-    frequency: np.ndarray
-    sd: np.ndarray
-    use: np.ndarray
-    strength: np.ndarray
-    band: tuple[float, float]
-    scale: float = SCALE
+    frequency: np.ndarray  # (n,) [Hz], increasing
+    sd: np.ndarray  # (n,) of ln f, from the identification
+    use: np.ndarray  # (n,) bool, poles the fit may see
+    strength: np.ndarray  # (n,) peak height relative to the highest
+    band: tuple[float, float]  # (low, high) [Hz] in which the test would have shown a mode
+    scale: float = SCALE  # irreducible spread of ln f; learned with every hypothesis
+    # outputs, inputs: rows at the likely places of sensors and shakers, or None
     outputs: object = None
     inputs: object = None
+    # (n,) chance of each pole to belong to no mode of the structure
     spurious: np.ndarray | float = SPURIOUS
     a: np.ndarray | None = None
     b: np.ndarray | None = None
-    shapes: ShapeData | None = None
+    shapes: ShapeData | None = None  # of every pole at the first of the outputs, or None
 
     @property
     def compared(self) -> Literal["frequencies", "modes"]:
@@ -205,19 +194,6 @@ class Poles:
 
     using = only  # poles are independent
 
-    @classmethod
-    def of_list(cls, frequency: np.ndarray, band: tuple[float, float] = (0.0, np.inf)) -> Self:
-        """Natural frequencies (n,) [Hz] that a user lists, in increasing order."""
-        one = np.ones(len(frequency))
-        return cls(frequency, 1e-3 * one, one > 0, one, band, spurious=SPURIOUS_LISTED)
-
-    def partners(self, f_model: np.ndarray) -> np.ndarray:
-        """Position of the partner of each pole among modes (m,) [Hz] in increasing order; or -1."""
-        lam, none = (2 * np.pi * f_model) ** 2, np.zeros(0)
-        state = State(lam, np.eye(len(lam)), np.zeros((0, len(lam))), None, None, 0.0, none, None,
-                      None)  # fmt: skip
-        return self.forced(state, np.ones(len(self.frequency), bool))[1]
-
     def forced(self, state: State, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """ln(f_model / f_test) and the model mode of every real pole (n,); all are paired."""
         wide = replace(self.all_paired(), scale=0.1)
@@ -244,3 +220,15 @@ class Poles:
         """Expected terms of :meth:`Q` from the noise of the poles in use (k,)."""
         of_shapes = 0.0 if self.shapes is None else self.shapes.variance[use].sum(axis=1)
         return np.asarray((self.sd[use] ** 2 + of_shapes) / LN10**2)
+
+
+def partners(frequency: np.ndarray, f_model: np.ndarray, band: tuple[float, float]) -> np.ndarray:
+    """Position of the partner of each listed frequency (n,) among modes (m,) [Hz]; or -1.
+
+    Both are in increasing order.
+    """
+    one, none, lam = np.ones(len(frequency)), np.zeros(0), (2 * np.pi * f_model) ** 2
+    poles = Poles(frequency, 1e-3 * one, one > 0, one, band, spurious=SPURIOUS_LISTED)
+    own = np.zeros((0, len(lam)))
+    state = State(lam, np.eye(len(lam)), own, None, None, 0.0, none, None, None)
+    return poles.forced(state, one > 0)[1]

@@ -28,17 +28,11 @@ Proposal = Callable[[np.ndarray, np.random.RandomState], tuple[np.ndarray, np.nd
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Draws of all walkers after the burn-in.
+    """Draws of all walkers after the burn-in."""
 
-    Attributes
-    ----------
-    x : (steps, walkers, n)
-    autocorrelation_time : (n,)   steps between independent draws of each unknown
-    steps, discarded : of each walker, and the first of them that are left out
-    """
-
-    x: np.ndarray
-    autocorrelation_time: np.ndarray
+    x: np.ndarray  # (steps, walkers, n)
+    autocorrelation_time: np.ndarray  # (n,) steps between independent draws of each unknown
+    # steps, discarded: of each walker, and the first of them that are left out
     steps: int
     discarded: int
 
@@ -59,13 +53,7 @@ class Chains:
 
 
 def sampler_package() -> ModuleType:
-    """The sampler.
-
-    Raises
-    ------
-    FileError
-        If it is not installed.
-    """
+    """The sampler; a :class:`FileError` says that it is not installed."""
     return optional_package("emcee", "'chladni[posterior]'")
 
 
@@ -80,11 +68,6 @@ def sampled(
     log_density : x (n,) -> ln p up to a constant; -inf where there is no structure
     mean, covariance : (n,), (n, n)   of the Gaussian that scales the steps
     most : steps of a walker at most
-
-    Raises
-    ------
-    FileError
-        If the sampler is not installed.
     """
     emcee = sampler_package()
     root = np.linalg.cholesky((covariance + covariance.T) / 2)

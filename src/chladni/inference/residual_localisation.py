@@ -24,23 +24,16 @@ NEAR_BEST = 0.5  # of the best gain: parts that reach it are named too
 
 @dataclass(frozen=True, eq=False)
 class ResidualLocalisation:
-    """Gain of a small local change of stiffness or mass, by place.
+    """Gain of a small local change of stiffness or mass, by place."""
 
-    Attributes
-    ----------
-    gain : (m,)     in -2 ln evidence, of each shell of the assembly; NaN where the test is blind
-    on_beams : (k,) the same of each member beam
-    parts : names of the parts that gain most, best first
-    grid, point_m : where the best change sits [m]
-    best : float    its gain
-    """
-
+    # (m,) in -2 ln evidence, of each shell of the assembly; NaN where the test is blind
     gain: np.ndarray
-    on_beams: np.ndarray
-    parts: tuple[str, ...]
+    on_beams: np.ndarray  # (k,) the same of each member beam
+    parts: tuple[str, ...]  # names of the parts that gain most, best first
+    # grid, point_m: where the best change sits [m]
     grid: int
     point_m: tuple[float, float, float]
-    best: float
+    best: float  # its gain
 
     @property
     def blind(self) -> float:

@@ -6,7 +6,7 @@ flexibility beyond the basis.  Calibration parameters, scatter and the errors of
 are marginalised: C = I + W Wᵀ with W the slopes times the prior standard deviations (Woodbury).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,15 +25,13 @@ from .map_fit import MassMeasurement, unknowns
 class Baseline:
     """A state of the base effects, linearised to score small changes.
 
-    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|².  ``slopes`` (n, n_p) are those of the
-    residual.  Both include the row of the weighing.
+    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|², with the row of the weighing.
     """
 
     effects: tuple[Effect, ...]
     x: np.ndarray
     state: State
     residual: np.ndarray
-    slopes: np.ndarray
     Z: np.ndarray
     mass_measurement: MassMeasurement | None
 
@@ -69,7 +67,7 @@ def baseline(
     W = np.concatenate([J * np.array([p.sd for p in unknowns(effects)]), shapes], axis=1)
     L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
     Z = np.linalg.solve(L, W.T)
-    return Baseline(tuple(effects), x, state, r, J, Z, mass_measurement)
+    return Baseline(tuple(effects), x, state, r, Z, mass_measurement)
 
 
 def point_scores(
@@ -78,16 +76,13 @@ def point_scores(
 ) -> np.ndarray:  # fmt: skip
     """Score of one mass or spring of each strength at each place (n_places, n_strengths).
 
-    Parameters
-    ----------
-    strengths : [kg] or [N/m]
-    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
+    Strengths are in kg or N/m, the flexibility (n_places,) of places beyond the basis in m/N.
     """
-    at = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
+    residuals = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
     out = np.empty((len(places), len(strengths)))
     for k, c in enumerate(strengths):
         D, added = (c * data.s**2, c) if matrix == "M" else (c + 0 * data.s, 0.0)
-        out[:, k] = base.score(at.residuals(D, added))
+        out[:, k] = base.score(residuals(D, added))
     return out
 
 
@@ -97,81 +92,43 @@ def oscillator_scores(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Best mass on a spring at each place, and the score with it (n_places, n_hertz).
 
-    The responses are taken as linear in the mass along the secant from none to ``mass`` [kg].
-
-    Parameters
-    ----------
-    hertz : (k,)                    frequencies of the mass on its spring, with a fixed base
-    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
+    The responses are taken as linear in the mass along the secant from none to ``mass`` [kg]. The
+    frequencies ``hertz`` are those of the mass on its spring with a fixed base.
     """
-    at = reanalysis(base, model, data, places, residual_flexibility, True)
+    residuals = reanalysis(base, model, data, places, residual_flexibility, True)
     amount, score = np.empty((2, len(places), len(hertz)))
     for k, omega2 in enumerate((2 * np.pi * hertz) ** 2):
         D = mass * data.s**2 * omega2 / (omega2 + data.s**2)
-        secant = at.residuals(D, mass) - base.residual[:, None]
+        secant = residuals(D, mass) - base.residual[:, None]
         amount[:, k], score[:, k] = direction_scores(base, secant)
     return mass * amount, score
-
-
-@dataclass(frozen=True, eq=False)
-class Reanalysis:
-    """Responses of a state with a dynamic stiffness added at one of many places.
-
-    Attributes
-    ----------
-    H : (n_f, n_out, n_in)                     receptances of the state
-    G_ob, G_bi : (n_places, n_f, n_out or n_in)  from the places to outputs, from inputs to them
-    G_bb : (n_places, n_f)                     of the places themselves
-    """
-
-    base: Baseline
-    data: Responses
-    H: np.ndarray
-    G_ob: np.ndarray
-    G_bi: np.ndarray
-    G_bb: np.ndarray
-
-    def residuals(self, D: np.ndarray, added: float) -> np.ndarray:
-        """Residuals (n, n_places) with the dynamic stiffness D (n_f,) and ``added`` kg of mass."""
-        share = D / (1 + D * self.G_bb)
-        change = self.G_ob[..., None] * (share[:, :, None, None] * self.G_bi[:, :, None, :])
-        r = whitened(self.data, self.base.state, self.H[None] - change)
-        return self.base.with_mass(r, added)
 
 
 def reanalysis(
     base: Baseline, model: Reduced, data: Responses, places: ElementGrids,
     residual_flexibility: np.ndarray, massive: bool,
-) -> Reanalysis:  # fmt: skip
-    """Receptances between the places, the outputs and the inputs.
+) -> Callable[[np.ndarray, float], np.ndarray]:  # fmt: skip
+    """Residuals (n, n_places) with a dynamic stiffness D (n_f,) and so much mass [kg] at a place.
 
     A ``massive`` addition is also loaded by base motion; a spring only by the structure's motion.
     """
     phi_o, phi_i, d = data.modal(base.state)
     phi_b = model.rows(places.rows) @ base.state.phi
+    H = data.receptance(base.state, phi_o, phi_i, d)
+    G_ob = base.state.between(data.s, d, phi_o, phi_b).transpose(2, 0, 1)
     G_bi = base.state.between(data.s, d, phi_b, phi_i).transpose(1, 0, 2)
+    G_bb = (phi_b**2) @ d.T + residual_flexibility[:, None]
     if massive and model.base is not None:
         moved_with_base = model.base.motion.moved_with_base(places.rows)
         G_bi = G_bi + moved_with_base[:, None] / (data.s**2)[:, None]
-    return Reanalysis(
-        base,
-        data,
-        data.receptance(base.state, phi_o, phi_i, d),
-        base.state.between(data.s, d, phi_o, phi_b).transpose(2, 0, 1),
-        G_bi,
-        (phi_b**2) @ d.T + residual_flexibility[:, None],
-    )
 
+    def residuals(D: np.ndarray, added: float) -> np.ndarray:
+        share = D / (1 + D * G_bb)
+        change = G_ob[..., None] * (share[:, :, None, None] * G_bi[:, :, None, :])
+        delta = data.deviation(base.state, H[None] - change)
+        return base.with_mass(data.stacked(delta / data.std()), added)
 
-def whitened(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
-    """Whitened residuals of many responses (m, n_f, n_out, n_in) as columns (n, m)."""
-    from ..ema.correlation import log10, wrapped
-
-    H = data.s[:, None, None] ** data.power * H + data.direct
-    delta = log10(H / data.values)
-    if state.offset is not None:
-        delta = wrapped(delta + state.offset[:, None])
-    return data.stacked(delta / data.std())
+    return residuals
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,9 +196,7 @@ def spin_scores(
     The responses are linear in it about none, its prior is N(0, sd²) along each axis:
     dH = -s G_oβ S G_βi with S = -[h]×.
 
-    Parameters
-    ----------
-    rows : (3k, n)  rotations of each place about the axes of the basic frame
+    ``rows`` (3k, n) are the rotations of each place about the axes of the basic frame.
     """
     (phi_o, phi_i, d), state, s = data.modal(base.state), base.state, data.s
     per_line = -sd * s ** (1 + data.power)

@@ -10,7 +10,8 @@ H_u is the response along u.  The slopes of the sheet ∂H/∂u = -φ_v, ∂H/�
 rotations (w(x + dx) = w + θ × dx · n); solids have no rotations, and the slopes are those of their
 faces. V Vᵀ is the covariance of the errors of the outputs and of
 the gains of the gauges. It is whitened out of the residuals before anything is fitted
-(C = I + V Vᵀ). Tilt and place of a gauge act on all channels: they are unknowns of every fit
+(C = I + V Vᵀ): first the columns of one output, then those that all outputs share. Tilt and place
+of a gauge act on all channels: they are unknowns of every fit
 (:class:`..effects.channels.GaugeErrors`).
 """
 
@@ -25,36 +26,29 @@ from ..effects.effect import Parameter
 from ..ema.setup import SensorAccuracy
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
-from ..reduced.reduced_model import Reduced, State
-from .discrepancy import Lines
+from ..reduced.reduced_model import Reduced
 
 WAYS = ("tilt about u", "tilt about v", "place along u", "place along v")
-LN10 = np.log(10.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
-    """Errors of measured dofs.
+class SensorErrors:
+    """Errors of measured dofs."""
 
-    Attributes
-    ----------
-    gain : relative standard deviation
-    rows : four (k, n)     motions added by tilts and wrong places, times standard deviations
-    with_base : (4, k, n_in) rigid-body share of these motions under a moving base
-    modal : (4, k, r)      the rows in a basis
-    """
-
-    gain: float
+    gain: float  # relative standard deviation
+    # four (k, n), motions added by tilts and wrong places, times standard deviations
     rows: tuple[sp.csr_array, ...]
-    with_base: np.ndarray
-    modal: np.ndarray
+    with_base: np.ndarray  # (4, k, n_in) rigid-body share of these motions under a moving base
+    modal: np.ndarray  # (4, k, r) the rows in a basis
 
     def rebased(self, model: Reduced) -> Self:
         """The rows in the basis of this model."""
         return replace(self, modal=np.stack([model.rows(rows) for rows in self.rows]))
 
 
-def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy) -> Side:
+def sensor_errors(
+    dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
+) -> SensorErrors:
     """Errors of all outputs, or of all inputs; a place's own sd, if any, replaces the usual one."""
     u, v = dofs.across()
     place, turn = np.where(dofs.sd > 0, dofs.sd, known.position), known.direction
@@ -63,26 +57,8 @@ def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: Sens
     with_base = np.stack(
         [turn * u.moved_with_base(inputs), turn * v.moved_with_base(inputs), still, still]
     )
-    return Side(known.gain, tuple(map(sp.csr_array, rows)), with_base, np.zeros((len(WAYS), 0, 0)))
-
-
-@dataclass(frozen=True, eq=False)
-class SensorErrors:
-    """Errors of all sensors, and the relative standard deviation of the gain of a force gauge."""
-
-    outputs: Side
-    gain: float
-
-    def rebased(self, model: Reduced) -> Self:
-        """The errors with their rows in the basis of this model."""
-        return replace(self, outputs=self.outputs.rebased(model))
-
-
-def sensor_errors(
-    outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
-) -> SensorErrors:
-    """Expected errors of sensors of this accuracy, and of the gains of force gauges."""
-    return SensorErrors(side(outputs, inputs, built, known), known.gain)
+    modal = np.zeros((len(WAYS), 0, 0))
+    return SensorErrors(known.gain, tuple(map(sp.csr_array, rows)), with_base, modal)
 
 
 def gauge_errors(
@@ -91,7 +67,7 @@ def gauge_errors(
     """Tilt and place of every force gauge; a moving base has none."""
     n, found = len(outputs.labels), list[GaugeErrors]()
     unknown = tuple(Parameter(way, "-", 0.0, 1.0, kind="linear", step=0.5) for way in WAYS)
-    rows = side(inputs, inputs, built, known).rows
+    rows = sensor_errors(inputs, inputs, built, known).rows
     for k in np.flatnonzero(~inputs.base).tolist():
         at = np.eye(n + len(inputs.labels))[:, [n + k]]
         own = tuple(sp.csr_array(row[[k]]) for row in rows)
@@ -99,27 +75,48 @@ def gauge_errors(
     return found
 
 
-def columns(
-    errors: SensorErrors, data: Lines, state: State, scale: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Columns d ln H / scale per sd: of each output (5, *H), of the gain of each input (k, *H)."""
-    outputs = _of_outputs(errors.outputs, data, state, data.model(state), scale)
-    return outputs, errors.gain / scale * np.eye(scale.shape[-1])[:, None, None]
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """C^-½ of C = I + V Vᵀ."""
+
+    own: sp.csc_array  # (n, k) columns that live on one output each, orthonormal
+    own_less: np.ndarray  # (k,) 1 - 1/√(1 + s)
+    common: np.ndarray  # (n, m), orthonormal
+    common_less: np.ndarray  # (m,)
+
+    def whitened(self, r: np.ndarray) -> np.ndarray:
+        """Residuals or columns of slopes (n, ...)."""
+        return _less(self.common, self.common_less, _less(self.own, self.own_less, r))
 
 
-def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
-    """Expected |d ln H|² from the sensor errors (n_f, n_out, n_in)."""
-    both = columns(errors, data, state, np.ones(data.values.shape))
-    return np.asarray(sum((np.abs(z) ** 2).sum(axis=0) for z in both))
+def whitening(output: np.ndarray, own: np.ndarray, common: np.ndarray) -> Whitening:
+    """Whitening of errors along columns over the spread of each sample.
+
+    Parameters
+    ----------
+    output : (n,)       of each row
+    own : (n, k)        errors of one output each
+    common : (n, m)     errors that all outputs share
+    """
+    blocks, less = [sp.csc_array((len(own), 0))], [np.zeros(0)]
+    for k in np.unique(output):
+        at = np.flatnonzero(output == k)
+        U, share = _orthonormal(own[at])
+        rows, columns = np.repeat(at, U.shape[1]), np.tile(np.arange(U.shape[1]), len(at))
+        blocks.append(sp.coo_array((U.ravel(), (rows, columns)), shape=(len(own), U.shape[1])))
+        less.append(share)
+    U, own_less = sp.csc_array(sp.hstack(blocks)), np.concatenate(less)
+    return Whitening(U, own_less, *_orthonormal(_less(U, own_less, common)))
 
 
-def _of_outputs(
-    errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
-) -> np.ndarray:
-    """Change of the deviation of each output by one sd of each of its errors (5, *H)."""
-    _, phi_i, d = data.modal(state)
-    out = [errors.gain / scale]
-    for modal, with_base in zip(errors.modal, errors.with_base, strict=True):
-        G = state.between(data.s, d, modal @ state.phi, phi_i)
-        out.append((data.s[:, None, None] ** data.power * G + with_base) / (H * scale))
-    return np.stack(out)
+def _less(U: np.ndarray | sp.csc_array, less: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Remove from r its share along each column."""
+    along = U.T @ r
+    return r - U @ (less[:, None] * along if along.ndim > 1 else less * along)
+
+
+def _orthonormal(V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """U (n, k) of V Vᵀ = U diag(s) Uᵀ, and 1 - 1/√(1 + s)."""
+    s, Q = np.linalg.eigh(V.T @ V)
+    kept = s > 1e-9 * max(float(s.max(initial=0.0)), 1e-9)
+    return V @ (Q[:, kept] / np.sqrt(s[kept])), 1 - 1 / np.sqrt(1 + s[kept])

@@ -23,16 +23,10 @@ UNIT = 1e-300  # least norm of a shape
 
 @dataclass(frozen=True, eq=False)
 class ShapeData:
-    """Measured shapes at the sensors.
+    """Measured shapes at the sensors."""
 
-    Attributes
-    ----------
-    values : (n, n_out)     real, of unit norm
-    variance : (n, n_out)   of each entry, without errors of the model's form: D
-    """
-
-    values: np.ndarray
-    variance: np.ndarray
+    values: np.ndarray  # (n, n_out) real, of unit norm
+    variance: np.ndarray  # (n, n_out) of each entry, without errors of the model's form: D
 
     def mac(self, phi: np.ndarray) -> np.ndarray:
         """MAC of each shape with a column of φ (n_out, n) at its place (n,)."""
@@ -76,12 +70,9 @@ class ShapeData:
     ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
         """Whitened misfit of some pairs (k, n_out), its slopes (n_p, k, n_out), ln det C/D.
 
-        The sum of squares and the last value is that of :meth:`costs`. The covariance counts as
-        constant in the slopes: what its change does has mean zero.
-
-        Parameters
-        ----------
-        slopes : (n_p, n_out, k)    ∂φ of the partners at the sensors
+        The sum of squares and the last value is that of :meth:`costs`. ``slopes`` (n_p, n_out, k)
+        are ∂φ of the partners at the sensors. The covariance counts as constant in the slopes: what
+        its change does has mean zero.
         """
         shape = len(test), self.values.shape[1]
         out, J, wide, c = np.zeros(shape), np.zeros((len(slopes), *shape)), 0.0, mixing(lam)
@@ -119,11 +110,7 @@ def shape_slopes(state: State, at: np.ndarray, modes: np.ndarray) -> np.ndarray:
     """∂φ/∂x of some modes where they are measured, but for their norm (n_p, n_out, k).
 
     ∂φ_i = Σ_j φ_j φ_jᵀ(∂K - λ_i ∂M)φ_i / (λ_i - λ_j), exact in the basis (Fox and Kapoor 1968,
-    AIAA J. 6, 2426-2429).
-
-    Parameters
-    ----------
-    at : (n_out, m)   all modes of the state there
+    AIAA J. 6, 2426-2429). All modes of the state are ``at`` (n_out, m) there.
     """
     assert state.dK is not None
     assert state.dM is not None

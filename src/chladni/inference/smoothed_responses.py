@@ -6,6 +6,7 @@ so that damping hardly matters and no mode need be identified.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -34,39 +35,66 @@ Average = Literal["median", "mean"]
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One way of reading a recording: its Q, its share of Q as declared, and what it would mean."""
+    """One way of reading a recording: its Q, Q as declared, and what it would mean."""
 
     Q: float
-    share: float
+    declared: float
     finding: Finding
     over: Average = "median"  # of the outputs, in Q
+
+    @property
+    def share(self) -> float:
+        """Its Q over Q as declared."""
+        return self.Q / self.declared
+
+
+def against(Q: float, declared: float) -> str:
+    """Q of a hypothesis in words."""
+    return f"smoothed Q against the model is {Q:.2g}, as declared {declared:.2g}."
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A recording as it is read, the model that is to answer likewise, and the channels on it."""
+
+    frf: FRF
+    lines: np.ndarray  # (n_f,) bool, those to look at
+    model: Modelled  # of the deck as it was tested, a little beyond the band at least
+    outputs: MeasuredDofs
+    inputs: MeasuredDofs
+
+    def smoothed(self) -> "Smoothed | None":
+        """A recording and a model on wide lines; None where lines or modes are too few."""
+        frf, modes = self.frf, self.model.modes
+        k = self.lines & (frf.frequency > 0) & np.isfinite(frf.values).all(axis=(1, 2))
+        f, H = frf.frequency[k], frf.values[k]
+        if len(f) < LEAST_LINES or f[-1] < f[0] * (1 + WIDTH) ** 3 or not len(modes):
+            return None
+        log_test = log10_of(np.einsum("sf,foi->soi", _weights(f, f), H))
+        level = float(np.median(log_test.real))
+        some = f[:: -(-len(f) // MOST_LINES)]
+        omega = np.where(modes.frequency < RIGID * f[-1], 0.0, 2 * np.pi * modes.frequency)
+        built, weights = self.model.structure, _weights(f, some)
+        phi_o, drive = (
+            self.outputs.rows(built) @ modes.shapes,
+            self.inputs.loads(built) @ modes.shapes,
+        )
+        return Smoothed(self, some, weights, log_test - level, level, phi_o, drive, omega)
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A recording on a few wide lines, and the model that is to answer likewise.
+    """A recording on a few wide lines, and the model that is to answer likewise."""
 
-    Attributes
-    ----------
-    f : (n_f,)                      lines on which the model is evaluated [Hz]
-    weights : (n_s, n_f)            of the smoothing
-    log_test : (n_s, n_out, n_in)   log10 of the smoothed recording, less its level
-    level : median of log10 |H|
-    phi_o, drive : (n_out, r), (n_in, r)   shapes at outputs, loads of the inputs
-    omega : (r,)                    [rad/s], 0 of rigid motions
-    direct : (n_out, n_in)          what a moving base carries along
-    power : derivatives of the quantity
-    """
-
-    f: np.ndarray
-    weights: np.ndarray
-    log_test: np.ndarray
-    level: float
+    reading: Reading
+    f: np.ndarray  # (n_f,) lines on which the model is evaluated [Hz]
+    weights: np.ndarray  # (n_s, n_f) of the smoothing
+    log_test: np.ndarray  # (n_s, n_out, n_in) log10 of the smoothed recording, less its level
+    level: float  # median of log10 |H|
+    # phi_o, drive: (n_out, r), (n_in, r) shapes at outputs, loads of the inputs
     phi_o: np.ndarray
     drive: np.ndarray
-    omega: np.ndarray
-    direct: np.ndarray
-    power: int
+    omega: np.ndarray  # (r,) [rad/s], 0 of rigid motions
 
     def answers(
         self,
@@ -79,14 +107,15 @@ class Smoothed:
 
         Lines are times ``scale``; the model's frequencies are shifted by each of ``shifts`` (ln).
         """
-        load = self.drive if drive is None else drive
-        direct = self.direct if drive is None else 0.0
+        read, load = self.reading, self.drive if drive is None else drive
+        direct = read.outputs.moved_with_base(read.inputs) if drive is None else 0.0
         for shift in shifts:
             s = 2j * np.pi * self.f[:, None] * scale / np.exp(shift)
-            above = s**self.power * np.exp(-s * delay)
+            above = s ** DERIVATIVES[read.frf.quantity] * np.exp(-s * delay)
             D = self.weights @ (above / (self.omega**2 + 2 * DAMPING * self.omega * s + s**2))
             yield modal_sum(self.phi_o, D, load) + direct
 
+    @cached_property
     def as_declared(self) -> tuple[float, float]:
         """Q, and how many times as large the recording is as the model."""
         scored = [(self.score(H), float(np.median(log10_of(H).real))) for H in self.answers()]
@@ -114,32 +143,6 @@ def level_free(H: np.ndarray) -> np.ndarray:
 def mean_squares(delta: np.ndarray) -> np.ndarray:
     """Mean square over lines of log10 ratios (n_s, ...), phase wrapped."""
     return np.asarray((np.abs(wrapped(delta)) ** 2).mean(axis=0))
-
-
-def smoothed(
-    frf: FRF, lines: np.ndarray, model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs
-) -> Smoothed | None:
-    """A recording and a model on wide lines; None where lines or modes are too few.
-
-    Parameters
-    ----------
-    lines : (n_f,) bool   those to look at
-    """
-    k = lines & (frf.frequency > 0) & np.isfinite(frf.values).all(axis=(1, 2))
-    f, H = frf.frequency[k], frf.values[k]
-    if len(f) < LEAST_LINES or f[-1] < f[0] * (1 + WIDTH) ** 3 or not len(model.modes):
-        return None
-    log_test = log10_of(np.einsum("sf,foi->soi", _weights(f, f), H))
-    level = float(np.median(log_test.real))
-    some = f[:: -(-len(f) // MOST_LINES)]
-    built, modes = model.structure, model.modes
-    omega = 2 * np.pi * modes.frequency
-    return Smoothed(
-        some, _weights(f, some), log_test - level, level,
-        outputs.rows(built) @ modes.shapes, inputs.loads(built) @ modes.shapes,
-        np.where(modes.frequency < RIGID * f[-1], 0.0, omega),
-        outputs.moved_with_base(inputs), DERIVATIVES[frf.quantity],
-    )  # fmt: skip
 
 
 def _weights(every: np.ndarray, f: np.ndarray) -> np.ndarray:

@@ -21,20 +21,14 @@ KNOWN = -1  # group of parameters whose standard deviation is known
 
 @dataclass(frozen=True, eq=False)
 class UnitSpread:
-    """Spread of each group, and the place of each article about the mean of all.
+    """Spread of each group, and the place of each article about the mean of all."""
 
-    Attributes
-    ----------
-    tau, low : (g,)   most likely spread, and the lower end of its 95 % interval
-    high : (g,)       the upper end; inf where the tests do not bound it
-    away : (A, p)     θ_a less their mean, shrunk by τ
-    covariance : (p, p)   of each of these, with τ at its upper end: an uncertain τ narrows nothing
-    """
-
+    # tau, low: (g,) most likely spread, and the lower end of its 95 % interval
     tau: np.ndarray
     low: np.ndarray
-    high: np.ndarray
-    away: np.ndarray
+    high: np.ndarray  # (g,) the upper end; inf where the tests do not bound it
+    away: np.ndarray  # (A, p) θ_a less their mean, shrunk by τ
+    # (p, p) of each of these, with τ at its upper end: an uncertain τ narrows nothing
     covariance: np.ndarray
 
 

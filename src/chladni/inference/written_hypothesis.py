@@ -20,29 +20,16 @@ def as_written(
 ) -> HypothesisFit:
     """Fit what a deck can hold: calibrated numbers and the effects of the hypothesis.
 
-    The fit begins at the found or at the given values, where its residual is smaller.
+    The fit begins at the found or at the given values, where its residual is smaller. If the deck
+    is ``halved``, so is every shell.
 
-    Every deck is a fit of its own. The decks of one diagnosis are nested: the given deck, the
-    calibrated deck and the deck with the effects. Each is judged as its file stands. Mesh
-    error, folds and scatter are no numbers of a deck. Joints whose change exceeds their usual
-    scatter are calibrated, too: without them a deck whose adhesive is six times too soft stays 4 %
-    off in frequency.
+    Every deck is a fit of its own and is judged as its file stands. Mesh error, folds and scatter
+    are no numbers of a deck. Joints whose change exceeds their usual scatter are calibrated, too:
+    without them a deck whose adhesive is six times too soft stays 4 % off in frequency.
 
-    A named effect that no card can hold acts in the data. It stays in the fit: otherwise the
-    numbers of the deck would compensate for it.
-
-    The learned error of the model stays in the likelihood. Otherwise the parameters would
-    compensate for mesh and joints. On a coarse plate with a concealed crack E went to 264 GPa for
-    210 without it, and to 212 with it.
-
-    Parameters
-    ----------
-    halved : the deck has every shell halved
-
-    Raises
-    ------
-    ModelError
-        If neither the found values nor the deck's own values belong to a physical structure.
+    A named effect that no card can hold stays in the fit, and so does the learned error of the
+    model. Otherwise the numbers of the deck would compensate for them. On a coarse plate with a
+    concealed crack E went to 264 GPa for 210 without that error, and to 212 with it.
     """
     found = hypothesis.fit
     named = hypothesis.effects

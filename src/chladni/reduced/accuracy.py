@@ -9,17 +9,17 @@ times P on the missing vectors: then the estimate is at least about 4ab/(a+b)² 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..dynamics.reduction import beyond
-from ..effects.effect import Effect, MatrixTerm, PointTerm, Term, of
+from ..effects.effect import Effect, PointTerm, of
 from .effect_dofs import acting_at, own_part, own_positions
 from .field_factors import log_fields, mass_log, multiplied, stiffness_log
-from .frequency_dependent_stiffness import UnrisenModes, applied
+from .frequency_dependent_stiffness import applied
 from .modal_factors import ModalFactors, modal_factors
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import ReducedProblem
@@ -30,18 +30,11 @@ RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as 
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """Frequencies of the reduced model and their estimated errors.
+    """Frequencies of the reduced model and their estimated errors."""
 
-    Attributes
-    ----------
-    frequency : (k,) Hz    flexible modes up to the highest frequency of interest
-    error : (k,)           estimated relative error of each, f / f_true - 1 >= 0
-    missing : (n, k)       the part of each mode that the basis lacks
-    """
-
-    frequency: np.ndarray
-    error: np.ndarray
-    missing: np.ndarray
+    frequency: np.ndarray  # (k,) [Hz] of flexible modes up to the highest frequency of interest
+    error: np.ndarray  # (k,) estimated relative error of each, f / f_true - 1 >= 0
+    missing: np.ndarray  # (n, k) the part of each mode that the basis lacks
 
     @property
     def worst(self) -> float:
@@ -137,10 +130,14 @@ def products(
             K += model.load(part.coefficient * (part.operator @ strained[:m]))
     for each, modes, rows in factors:
         K = K + rows.T @ (each.W.T @ (modes.T @ K))
-    frame = _without_rise(model, effects, x)
-    for part in (part for part in shares if part.rise is not None):
+    if rising := [part for part in shares if part.rise is not None]:
+        lost = evaluate(model, effects, x, gradient=False).dissipated
+        assert lost is not None
+        lam, phi = lost.unrisen
+        frame = model.vectors.combined(phi[: len(phi) - n_own])
+    for part in rising:
         m = part.operator.shape[0]
-        K[:m] += part.coefficient * applied(part, u[:m], frame, system.M)
+        K[:m] += part.coefficient * applied(part, u[:m], lam, frame, system.M)
     K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
     for (_, _, terms), first in zip(acting, own_positions(effects), strict=True):
         for term in of(PointTerm, terms):
@@ -158,32 +155,6 @@ def _coordinates(model: Reduced, factors: ModalFactors) -> tuple[np.ndarray, sp.
     idle = sp.csr_array((rows.shape[0], model.vectors.shape[0] - rows.shape[1]))
     modes = model.vectors.combined(model.modes_of(factors.rows))
     return modes, sp.csr_array(sp.hstack([rows, idle]))
-
-
-@dataclass(frozen=True, eq=False)
-class _Level(Effect):
-    """An effect whose stiffness does not rise with frequency."""
-
-    of: Effect = field(default_factory=Effect)
-
-    def terms(self, x: np.ndarray) -> tuple[Term, ...]:
-        """The terms of the effect without their rise with frequency."""
-        every = self.of.terms(x)
-        return tuple(replace(t, rise=None) if isinstance(t, MatrixTerm) else t for t in every)
-
-
-def _without_rise(model: Reduced, effects: Sequence[Effect], x: np.ndarray) -> UnrisenModes:
-    """Modes without the rise, in which rising stiffness is defined; empty where none rises."""
-    rising = {
-        id(e)
-        for e, _, terms in acting_at(effects, x)
-        if any(m.rise is not None for m in of(MatrixTerm, terms))
-    }
-    if not rising:
-        return UnrisenModes(np.zeros(0), np.zeros((model.vectors.shape[0], 0)))
-    level = [_Level(e.parameters, of=e) if id(e) in rising else e for e in effects]
-    state = evaluate(model, level, x, gradient=False)
-    return UnrisenModes(state.lam, model.vectors.combined(state.phi))
 
 
 def _spread(model: Reduced, matrices: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -15,13 +15,7 @@ Fields = dict[str, np.ndarray]
 def log_fields(
     acting: Acting, groups: ElementGroups, n_p: int, split: bool
 ) -> tuple[Fields, Fields]:
-    """Sum of the log fields (g,) over the groups and their gradients (g, n_p), by name.
-
-    Raises
-    ------
-    ModelError
-        If a component of the plane stiffness changes in a model that is not split into components.
-    """
+    """Sum of the log fields (g,) over the groups and their gradients (g, n_p), by name."""
     logs = {name: np.zeros(len(groups)) for name in ("t", "E", "rho", "bending", *COMPONENTS)}
     slopes = {name: np.zeros((len(groups), n_p)) for name in logs}
     for effect, at, terms in acting:

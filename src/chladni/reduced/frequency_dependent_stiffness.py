@@ -27,7 +27,6 @@ import scipy.sparse as sp
 
 from ..effects.effect import MatrixTerm, Rise
 from .matrix_slopes import MatrixSlopes, Part
-from .matrix_stack import EVERY
 
 CLOSE = 1e-7  # relative distance of λ within which a divided difference is a derivative
 RIGID = 1e-9  # of the highest λ: modes below have no strain
@@ -35,39 +34,30 @@ VISIBLE = 2.0  # of the highest spectral line: modes below follow the parameters
 APART = 1e-4  # relative distance of λ within which two modes are one and do not mix
 
 
-class UnrisenModes(NamedTuple):
-    """λ (m,) of the model without the rise and its modes on all dofs (n, m)."""
-
-    lam: np.ndarray
-    modes: np.ndarray
-
-
-def applied(part: MatrixTerm, u: np.ndarray, frame: UnrisenModes, M: sp.csr_array) -> np.ndarray:
-    """Gᵀ A G u on all dofs (n, k); the rise is constant beyond the modes of the frame."""
+def applied(
+    part: MatrixTerm, u: np.ndarray, lam: np.ndarray, modes: np.ndarray, M: sp.csr_array
+) -> np.ndarray:
+    """Gᵀ A G u on all dofs (n, k), λ and modes without the rise; it is constant beyond these."""
     assert part.rise is not None
-    L = part.rise.log_frequency(frame.lam)
+    L = part.rise.log_frequency(lam)
     g, rest = np.exp(part.rise.power * L)[:, None], np.exp(part.rise.power * L.max())
-    modes, M_modes = frame.modes[: len(u)], M[: len(u), : len(u)] @ frame.modes[: len(u)]
+    modes, M_modes = modes[: len(u)], M[: len(u), : len(u)] @ modes[: len(u)]
     v = part.operator @ (rest * u + modes @ ((g - rest) * (M_modes.T @ u)))
     return np.asarray(rest * v + M_modes @ ((g - rest) * (modes.T @ v)))
 
 
 @dataclass(frozen=True, eq=False)
 class Dissipated:
-    """Dissipation of effects in the modes of a state.
+    """Dissipation of effects in the modes of a state."""
 
-    Attributes
-    ----------
-    ratio, slopes : (m,), (n_p, m)           ζ that effects add to each mode, ∂ζ/∂x
-    coupling, dcoupling : (m, m), (n_p, m, m)   N off its diagonal, ∂N/∂x with the modes held
-    omega : (m,) [rad/s]    of the modes; infinite for rigid ones, which are not coupled
-    """
-
+    # ratio, slopes: (m,), (n_p, m) ζ that effects add to each mode, ∂ζ/∂x
     ratio: np.ndarray
     slopes: np.ndarray
+    # coupling, dcoupling: (m, m), (n_p, m, m) N off its diagonal, ∂N/∂x with the modes held
     coupling: np.ndarray
     dcoupling: np.ndarray
-    omega: np.ndarray
+    omega: np.ndarray  # (m,) [rad/s] of the modes; infinite for rigid ones, which are not coupled
+    unrisen: tuple[np.ndarray, np.ndarray]  # λ (m,) and φ (m, m) of the model without the rise
 
     @property
     def held(self) -> "Dissipated":
@@ -140,14 +130,14 @@ class Rising:
         """The modes with the rise, from those without it; φ⁻ᵀ is M φ."""
         parts = [_RisenPart(part, at, phi.T @ A @ phi, lam) for part, A, at in self.parts]
         risen, V = np.linalg.eigh(np.diag(lam) + sum(one.stiffness - one.plain for one in parts))
-        modes, mixing, slopes = phi @ V, None, []
+        modes, slopes, mixing = phi @ V, [], tuple[np.ndarray, ...]()
         if gradient:
             slopes = [one.slopes(phi, dK, dM) for one in parts]
             more = [(dK.count - 1, each.over_basis(M @ phi)) for each in slopes]
             dK = replace(dK, parts=[*dK.parts, *more])
-            mixing = _mixing(risen, modes, dK, dM, parts)
-        count = dK.count if gradient else 0
-        return Risen(risen, modes, dK, dM, _dissipated(parts, slopes, risen, V, mixing, count))
+            mixing = _mixing(risen, modes, dK, dM, max(one.rise.band[1] for one in parts))
+        lost = _dissipated(parts, slopes, (lam, phi), risen, V, mixing)
+        return Risen(risen, modes, dK, dM, lost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,30 +192,18 @@ class _RisenSlopes:
     """∂(c G A G - c A)/∂x = c (H + Hᵀ) + own - plain in modes; the last two by own parameters.
 
     H = G A ∂G: its low modes change their factor, the high ones have one factor for all.
-
-    Attributes
-    ----------
-    at : own parameters
-    GA : (m, m)
-    low : (k,)              modes below the upper end of the band
-    rows, columns : (n_p, k, m), (n_p, m, k)   ∂G of low modes by all, and of high modes by low ones
-    own, plain : (n_own, m, m)
     """
 
-    at: slice
+    at: slice  # own parameters
     c: float
-    GA: np.ndarray
-    low: np.ndarray
+    GA: np.ndarray  # (m, m)
+    low: np.ndarray  # (k,) modes below the upper end of the band
+    # rows, columns: (n_p, k, m), (n_p, m, k) ∂G of low modes by all, and of high modes by low ones
     rows: np.ndarray
     columns: np.ndarray
+    # own, plain: (n_own, m, m)
     own: np.ndarray
     plain: np.ndarray
-
-    def half(self, left: np.ndarray, right: np.ndarray, p: slice = EVERY) -> np.ndarray:
-        """Left H right of parameters p, for left (a, m) and right (m, b): (n_p, a, b)."""
-        side = left @ self.GA
-        out = side[:, self.low] @ (self.rows[p] @ right)
-        return np.asarray(out + (side @ self.columns[p]) @ right[self.low])
 
     def over_basis(self, back: np.ndarray) -> Part:
         """The slopes over the basis, with φ⁻ᵀ (m, m)."""
@@ -251,7 +229,8 @@ class _RisenSlopes:
 
     def own_in(self, V: np.ndarray) -> np.ndarray:
         """∂(c G A G)/∂x by the own parameters in modes V (m, m): (n_own, m, m)."""
-        half = self.half(V.T, V, self.at)
+        side, p = V.T @ self.GA, self.at
+        half = side[:, self.low] @ (self.rows[p] @ V) + (side @ self.columns[p]) @ V[self.low]
         return np.asarray(self.c * (half + half.swapaxes(1, 2)) + V.T @ self.own @ V)
 
 
@@ -265,56 +244,42 @@ def _divided(g: np.ndarray, lam: np.ndarray, rise: Rise) -> np.ndarray:
     return np.where(close, steep[:, None], (g[:, None] - g) / np.where(close, 1.0, gap))
 
 
-class _Mixing(NamedTuple):
+def _mixing(
+    lam: np.ndarray, phi: np.ndarray, dK: MatrixSlopes, dM: MatrixSlopes, top: float
+) -> tuple[np.ndarray, ...]:
     """How the modes that a test sees follow the parameters.
 
-    Attributes
-    ----------
-    seen : (k,)                 positions of these modes
-    turned : (n_p, m, k)        ∂φ/∂x in modes, without the change of length
-    growth, scaled : (n_p, k)   ∂λ and φᵀ∂Mφ
+    They lie below ``VISIBLE`` times the ``top`` of the band [Hz]. Returned are their positions
+    (k,), ∂φ/∂x in modes without the change of length (n_p, m, k), ∂λ and φᵀ∂Mφ (n_p, k). Modes
+    nearer than ``APART`` do not mix: any mixture of them is a mode.
     """
-
-    seen: np.ndarray
-    turned: np.ndarray
-    growth: np.ndarray
-    scaled: np.ndarray
-
-
-def _mixing(
-    lam: np.ndarray,
-    phi: np.ndarray,
-    dK: MatrixSlopes,
-    dM: MatrixSlopes,
-    parts: Sequence[_RisenPart],
-) -> _Mixing:
-    """Modes nearer than ``APART`` do not mix with each other: any mixture of them is a mode."""
-    highest = 2 * np.pi * VISIBLE * max(one.rise.band[1] for one in parts)
-    seen = np.flatnonzero(lam <= highest**2)
+    seen = np.flatnonzero(lam <= (2 * np.pi * VISIBLE * top) ** 2)
     gap = lam[seen] - lam[:, None]
     inverse = gap / (gap**2 + (APART * np.maximum(np.abs(lam[seen]), RIGID * lam[-1])) ** 2)
     K, M = (each.between(phi, phi[:, seen]) for each in (dK, dM))
     k = np.arange(len(seen))
     scaled = M[:, seen, k]
     growth = K[:, seen, k] - lam[seen] * scaled
-    return _Mixing(seen, (K - M * lam[seen]) * inverse, growth, scaled)
+    return seen, (K - M * lam[seen]) * inverse, growth, scaled
 
 
 def _dissipated(
-    parts: Sequence[_RisenPart], slopes: Sequence[_RisenSlopes], lam: np.ndarray, V: np.ndarray,
-    mixing: _Mixing | None, count: int,
+    parts: Sequence[_RisenPart], slopes: Sequence[_RisenSlopes],
+    unrisen: tuple[np.ndarray, np.ndarray], lam: np.ndarray, V: np.ndarray,
+    mixing: tuple[np.ndarray, ...],
 ) -> Dissipated:  # fmt: skip
     """Dissipation of the rising parts in the modes of λ (m,), V (m, m) in those without the rise.
 
     Modes beyond those that are seen have no slopes.
     """
+    count = len(mixing[1]) if mixing else 0
     m, strained = len(lam), np.where(lam > RIGID * lam[-1], lam, np.inf)
     N, dN, ratios = np.zeros((m, m)), np.zeros((count, m, m)), np.zeros((count, m))
     off_diagonal = 1 - np.eye(m)
     for one, slope in zip_longest(parts, slopes):
         rise, B = one.rise, V.T @ one.stiffness @ V
         N += rise.loss * B
-        if mixing is None:
+        if slope is None:
             continue
         seen, turned, growth, scaled = mixing
         share = np.diag(B)[seen] / strained[seen]
@@ -325,4 +290,4 @@ def _dissipated(
         gained = rise.loss * slope.own_in(V) + rise.loss_gradient[:, None, None] * B
         dN[one.at] += gained * off_diagonal
     ratio = np.diag(N) / 2 / strained
-    return Dissipated(ratio, ratios, N * off_diagonal, dN, np.sqrt(strained))
+    return Dissipated(ratio, ratios, N * off_diagonal, dN, np.sqrt(strained), unrisen)

@@ -31,17 +31,11 @@ def skew(h: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Spin:
-    """All spinning parts of a state.
+    """All spinning parts of a state."""
 
-    Attributes
-    ----------
-    rows : β (k, m)       rotations over the modes
-    matrix : S (k, k)     skew
-    slopes : L (j, m) and R (j, m) with ∂(βᵀSβ)/∂x = LᵀR, by position of the parameter
-    """
-
-    rows: np.ndarray
-    matrix: np.ndarray
+    rows: np.ndarray  # β (k, m), rotations over the modes
+    matrix: np.ndarray  # S (k, k), skew
+    # L (j, m) and R (j, m) with ∂(βᵀSβ)/∂x = LᵀR, by position of the parameter
     slopes: Mapping[int, tuple[np.ndarray, np.ndarray]]
 
     def of_last(self, first: int) -> Self:
@@ -49,17 +43,14 @@ class Spin:
         own = {p - first: pair for p, pair in self.slopes.items() if p >= first}
         return replace(self, slopes=own)
 
-    def passed(
-        self, s: np.ndarray, d: np.ndarray, phi: np.ndarray, transposed: bool = False
-    ) -> np.ndarray:
-        """φ A⁻¹, or φ A⁻ᵀ, of places φ (n, m) from d = D (n_f, m) at s (n_f,): (n_f, n, m)."""
-        S, b, s = (
-            self.matrix.T if transposed else self.matrix,
-            d[:, None] * self.rows,
-            s[:, None, None],
-        )
-        inner = np.linalg.solve(np.eye(len(S)) + s * (b @ self.rows.T) @ S, b)
-        return np.asarray(phi * d[:, None] - s * ((phi @ b.swapaxes(1, 2)) @ S) @ inner)
+    @property
+    def reverse(self) -> Self:
+        """All parts spinning the other way."""
+        return replace(self, matrix=self.matrix.T)
+
+    def passed(self, s: np.ndarray, d: np.ndarray, phi: np.ndarray) -> np.ndarray:
+        """φ A⁻¹ of places φ (n, m) from d = D (n_f, m) at s (n_f,): (n_f, n, m)."""
+        return phi * d[:, None] + self.seen(s, d, phi, np.eye(phi.shape[1]))
 
     def seen(self, s: np.ndarray, d: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
         """Change of the responses at places left to forces at places right (n_f, n_l, n_r)."""

@@ -52,13 +52,7 @@ class LocalEffect:
         return local if local._seated(operators, points).count <= MOST_ROWS else None
 
     def added(self, state: State, x: np.ndarray, y: np.ndarray) -> State:
-        """The state of the base at x with the effect at y; without slopes.
-
-        Raises
-        ------
-        ModelError
-            If it is no structure.
-        """
+        """The state of the base at x with the effect at y, if it is a structure; without slopes."""
         operators, points = self._operators(x, y), of(PointTerm, self.effect.terms(y))
         rows, weight = self._seated([A for _, A, _ in operators], points), self.effect.weight(y)
         K, M = np.zeros((2, rows.count, rows.count))
@@ -106,18 +100,12 @@ class LocalEffect:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rows B (k, n) on which some parts act: operators, and rows of points.
-
-    Attributes
-    ----------
-    at : positions of each part among the rows
-    dense : each operator on its own rows
-    in_basis, flexibility : B Φ (k, r), and R (k, k)
-    """
+    """Rows B (k, n) on which some parts act: operators, and rows of points."""
 
     parts: list[sp.csr_array]
-    at: list[np.ndarray]
-    dense: list[np.ndarray]
+    at: list[np.ndarray]  # positions of each part among the rows
+    dense: list[np.ndarray]  # each operator on its own rows
+    # in_basis, flexibility: B Φ (k, r), R (k, k)
     in_basis: np.ndarray
     flexibility: np.ndarray
 

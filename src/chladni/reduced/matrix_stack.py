@@ -15,13 +15,9 @@ COLUMNS = 64  # of a block
 
 @dataclass(frozen=True, eq=False)
 class MatrixStack:
-    """Matrices (g, r, r), symmetric.
+    """Matrices (g, r, r), symmetric."""
 
-    Attributes
-    ----------
-    blocks : (g, end, k) each   columns of the upper triangle, which end with the k of the diagonal
-    """
-
+    # (g, end, k) each, columns of the upper triangle, which end with the k of the diagonal
     blocks: tuple[np.ndarray, ...]
 
     @property
@@ -34,11 +30,9 @@ class MatrixStack:
         return MatrixStack((*self.blocks, border))
 
     def divided(self, parent: np.ndarray, pieces: np.ndarray, of: np.ndarray) -> "MatrixStack":
-        """Matrices of other groups: the p-th is that of ``parent[p]``, pieces have their own.
+        """Matrices of other groups: the p-th is that of ``parent[p]``, pieces (k,) have their own.
 
-        Parameters
-        ----------
-        pieces : positions (k,) of the groups with matrices ``of`` (k, r, r)
+        The latter are ``of`` (k, r, r).
         """
         out = []
         for at, block in self._placed():

@@ -20,27 +20,18 @@ CLOSE = 1e-9  # distance of two logarithms within which a divided difference is 
 
 @dataclass(frozen=True, eq=False)
 class ModalFactors:
-    """All factors on one set of modes.
+    """All factors on one set of modes."""
 
-    Attributes
-    ----------
-    rows : (k, n)          ΦᵀM
-    W : (k, k)
-    slopes : ∂W/∂x (k, k), by the position of the parameter
-    """
-
-    rows: sp.csr_array
-    W: np.ndarray
-    slopes: dict[int, np.ndarray]
+    rows: sp.csr_array  # (k, n) ΦᵀM
+    W: np.ndarray  # (k, k)
+    slopes: dict[int, np.ndarray]  # ∂W/∂x (k, k), by the position of the parameter
 
     def multiply(
         self, U: np.ndarray, V: np.ndarray, K: np.ndarray, dK: MatrixSlopes
     ) -> MatrixSlopes:
         """Make GᵀKG of K (m, m) in place; return its slopes from ∂K.
 
-        Parameters
-        ----------
-        U, V : (r, k), (k, r)   the modes over a basis, and its coordinates in them
+        U (r, k) are the modes over a basis, V (k, r) its coordinates in them.
         """
         a, b = _touched(U.T), _touched(V)  # the modes are among the vectors of most bases
         U, WV = U[a], self.W @ V[:, b]

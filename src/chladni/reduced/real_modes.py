@@ -10,13 +10,7 @@ FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: flexible modes lie above;
 
 
 def real_modes(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """λ (m,) and φ (m, m) of K φ = λ M φ.
-
-    Raises
-    ------
-    ModelError
-        If mass or stiffness lost its positive (semi-)definiteness: an effect is wrong.
-    """
+    """λ (m,) and φ (m, m) of K φ = λ M φ; a :class:`ModelError` says that an effect is wrong."""
     try:
         lam, phi = sl.eigh(K, M, driver="gvd", check_finite=True)
     except (sl.LinAlgError, ValueError) as error:

@@ -29,7 +29,6 @@ from ..effects.element_groups import COMPONENTS, ElementGroups
 from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
-from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import Acting, acting_at, own_part, own_positions, row, with_own
 from .field_factors import Fields, log_fields, mass_log, multiplied, stiffness_log
 from .frequency_dependent_stiffness import Rising
@@ -37,35 +36,27 @@ from .gyroscopic import Spin, spin
 from .matrix_stack import MatrixStack, stacked
 from .modal_factors import modal_factors
 from .real_modes import real_modes
-from .running_sums import RunningSums
+from .running_sums import BaseParticipation, Participating, RunningSums, participation
 from .state import State as State
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """Projected operators over one basis.
+    """Projected operators over one basis."""
 
-    Attributes
-    ----------
-    groups : of the structure's shells and beams
-    vectors : Φ (n, r)        M-orthonormal; dofs of released clamps follow those of the deck
-    linear, cubic : {component: (g, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
-    mass : (g, r)             these three are stacks of r by r matrices, one for each group
-    K0, M0 : (r, r)           share of everything outside the groups
-    weight0 : float           mass outside the groups [kg]
-    base : participation of the basis in base motion, or None where forces drive the structure
-    following : (n, clamps)   response of the structure to unit motions of released clamps
-    """
-
-    groups: ElementGroups
-    vectors: Basis
+    groups: ElementGroups  # of the structure's shells and beams
+    vectors: Basis  # Φ (n, r), M-orthonormal; dofs of released clamps follow those of the deck
+    # linear, cubic: by component, "" alone, or one entry for each of Q11 Q22 Q12 Q66
     linear: Mapping[str, MatrixStack]
     cubic: Mapping[str, MatrixStack]
-    mass: MatrixStack
+    mass: MatrixStack  # these three are stacks of r by r matrices, one for each group
+    # K0, M0: (r, r), share of everything outside the groups
     K0: np.ndarray
     M0: np.ndarray
-    weight0: float
+    weight0: float  # mass outside the groups [kg]
+    # participation of the basis in base motion, or None where forces drive the structure
     base: BaseParticipation | None = None
+    # (n, clamps) response of the structure to unit motions of released clamps
     following: np.ndarray | None = None
     axis: np.ndarray | None = None  # (3,) axis 1 of the components; None: that of the deck
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
@@ -293,10 +284,7 @@ def evaluate(
 ) -> State:
     """Eigenvalues, modes and exact derivatives of the model with these effects at x.
 
-    Raises
-    ------
-    ModelError
-        If the stiffness lost its positive (semi-)definiteness: an effect is wrong.
+    A :class:`ModelError` says that stiffness or mass lost its positive (semi-)definiteness.
     """
     n_p = count(effects)
     acting = acting_at(effects, x)
@@ -306,10 +294,12 @@ def evaluate(
     sums = RunningSums.of_fields(
         *model.with_fields(logs), (model.linear, model.cubic), model.mass, logs, slopes, n_own
     )
-    weight, dweight = _weight(model, logs, slopes)
-    offset: np.ndarray | None = None
-    doffset: np.ndarray | None = None
-    base, rising = _participating(model, logs, slopes, n_own), Rising()
+    w = model.groups.weight * np.exp(mass_log(logs))
+    weight, dweight = float(model.weight0 + w.sum()), np.asarray(w @ mass_log(slopes))
+    offset, doffset = None, None
+    rising, base = Rising(), None
+    if model.base is not None:
+        base = Participating(model.base, logs, slopes, n_own)
     for share in multiplied(acting, model.groups, logs, slopes, split):
         part = share.term
         A = with_own(model.operator(part.operator, part.matrix == "K"), n_own)
@@ -381,20 +371,3 @@ def _spin(model: Reduced, acting: Acting, phi: np.ndarray) -> Spin | None:
         for term in of(SpinTerm, terms)
     ]  # fmt: skip
     return spin(parts) if parts else None
-
-
-def _participating(
-    model: Reduced, logs: Fields, slopes: Fields, n_own: int
-) -> Participating | None:
-    """Base participation of the shells with these fields; None where the base does not move."""
-    if model.base is None:
-        return None
-    w = np.exp(mass_log(logs))
-    return Participating(model.base, w, w[:, None] * mass_log(slopes), n_own)
-
-
-def _weight(
-    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray]
-) -> tuple[float, np.ndarray]:
-    w = model.groups.weight * np.exp(mass_log(logs))
-    return float(model.weight0 + w.sum()), np.asarray(w @ mass_log(slopes))

@@ -23,31 +23,23 @@ from .reduced_model import Reduced, reduce
 FEWEST = 12  # modes of a basis without a flexible mode in reach: six rigid, six flexible
 FOLLOWED = 10  # iterations for the response to a clamp's motion, which use a shifted factor
 AT_ONCE = 32  # places whose static responses are in memory at a time
+MOST_PLACES = 200  # candidates
 REACH = 2.5  # the basis holds modes up to this many times the highest frequency of interest
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedProblem:
-    """One structure, its reduced model, and the candidate places of effects.
-
-    Attributes
-    ----------
-    frequency : (r,) Hz      of the nominal model's modes, rigid ones included
-    f_max : highest frequency of interest [Hz]
-    candidates : ElementGrids  a sample of all of ``grids``
-    flexibility : (k,)       static response at each candidate beyond the basis [m/N]
-    hertz : shift of the static responses
-    """
+    """One structure, its reduced model, and the candidate places of effects."""
 
     structure: Structure
     groups: ElementGroups
     model: Reduced
-    frequency: np.ndarray
+    frequency: np.ndarray  # (r,) [Hz] of the nominal model's modes, rigid ones included
     factor: Factor
-    hertz: float
+    hertz: float  # shift of the static responses
     grids: ElementGrids
-    candidates: ElementGrids
-    f_max: float
+    candidates: ElementGrids  # a sample of all of ``grids``
+    f_max: float  # highest frequency of interest [Hz]
 
     def flexibility(self, where: ElementGrids) -> np.ndarray:
         """b (K + σM)⁻¹ bᵀ less the share within the basis (k,) [m/N]."""
@@ -66,10 +58,6 @@ class ReducedProblem:
         for stack in (*self.model.linear.values(), *self.model.cubic.values()):
             K += stack.weighted(np.ones(stack.shape[0]))
         return np.linalg.inv(K)
-
-    def with_attachments(self, rows: sp.csr_array) -> Reduced:
-        """The reduced model over a basis with the static responses to loads on these rows."""
-        return self.model.extended(attachments(self.factor, rows))
 
     def model_for(self, effect: Effect, x: np.ndarray) -> Reduced:
         """The reduced model over a basis that can represent an effect near x, split as needed."""
@@ -133,9 +121,8 @@ def _pieces(rows: sp.csr_array) -> Iterator[sp.csr_array]:
 
 
 def reduced_problem(
-    model: Modelled | Assembly, f_max: float, rows: sp.csr_array | None = None, *, most: int = 200,
-    groups: int = 64, extra: np.ndarray | None = None, reach: float = REACH,
-    base: np.ndarray | None = None,
+    model: Modelled | Assembly, f_max: float, rows: sp.csr_array | None = None, *,
+    groups: int = 64, reach: float = REACH, base: np.ndarray | None = None,
 ) -> ReducedProblem:  # fmt: skip
     """Build the reduced problem of a structure.
 
@@ -144,8 +131,6 @@ def reduced_problem(
     model : its modes are solved to REACH times ``f_max``; an assembly is solved here
     f_max : highest frequency of interest [Hz]
     rows : (k, n) places whose static response the basis must hold (sensors, shakers)
-    extra : (n, m) further vectors for the basis
-    most : candidate places
     reach : the basis holds modes up to this many times ``f_max``
     base : (k, 3) unit vectors along which the supports move, where that is the input
     """
@@ -161,23 +146,12 @@ def reduced_problem(
     blocks = [modes.shapes]
     if rows is not None and rows.shape[0]:
         blocks.append(attachments(factor, rows))
-    if extra is not None:
-        blocks.append(extra)
     moved = None if base is None else base_motion(built, base)
     if moved is not None:
         blocks.append(factor.solve(moved.force))
     basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
     shells = element_groups(built, groups)
     grids = element_grids(shells)
-    chosen = grids.only(grids.spread(most))
-    return ReducedProblem(
-        built,
-        shells,
-        reduce(shells, basis, moved),
-        modes.frequency,
-        factor,
-        hertz,
-        grids,
-        chosen,
-        f_max,
-    )
+    over, f = reduce(shells, basis, moved), modes.frequency
+    candidates = grids.only(grids.spread(MOST_PLACES))
+    return ReducedProblem(built, shells, over, f, factor, hertz, grids, candidates, f_max)

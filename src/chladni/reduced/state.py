@@ -14,38 +14,29 @@ from .matrix_slopes import MatrixSlopes
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The reduced model at one x.
+    """The reduced model at one x."""
 
-    Attributes
-    ----------
-    lam : (m,)             ω² [rad²/s²]; m = r plus the degrees of freedom that effects add
-    phi : (r, m)           eigenvectors in the basis
-    own : (m - r, m)       eigenvectors at the degrees of freedom of effects
-    dK, dM                 ∂K, ∂M over the basis and dofs of effects; None where not requested
-    weight, dweight        weighed mass [kg] and its gradient (n_p,)
-    offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
-    drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
-    dissipated             dissipation of effects in the modes, or None
-    spin                   spinning parts, or None; λ and φ are those at rest
-    moved, dmoved          change of the modes where they are measured, outputs and inputs (p, m),
-                           or None, and its derivatives by position of the parameter
-    """
-
-    lam: np.ndarray
-    phi: np.ndarray
-    own: np.ndarray
+    lam: np.ndarray  # (m,) ω² [rad²/s²]; m = r plus the degrees of freedom that effects add
+    phi: np.ndarray  # (r, m) eigenvectors in the basis
+    own: np.ndarray  # (m - r, m) eigenvectors at the degrees of freedom of effects
+    # dK, dM: ∂K, ∂M over the basis and dofs of effects; None where not requested
     dK: MatrixSlopes | None
     dM: MatrixSlopes | None
+    # weight, dweight: weighed mass [kg] and its gradient (n_p,)
     weight: float
     dweight: np.ndarray
+    # offset, doffset: log10 factor of the channels (n_out,), (n_out, n_p), or None
     offset: np.ndarray | None
     doffset: np.ndarray | None
+    # drive, ddrive: load of a moving base on each mode (k, r), (n_p, k, r), or None
     drive: np.ndarray | None = None
     ddrive: np.ndarray | None = None
+    # moved, dmoved: change of the modes where they are measured, outputs and inputs (p, m), or
+    # None, and its derivatives by position of the parameter
     moved: np.ndarray | None = None
     dmoved: Mapping[int, np.ndarray] = field(default_factory=dict)
-    dissipated: Dissipated | None = None
-    spin: Spin | None = None
+    dissipated: Dissipated | None = None  # dissipation of effects in the modes, or None
+    spin: Spin | None = None  # spinning parts, or None; λ and φ are those at rest
 
     def between(
         self, s: np.ndarray, d: np.ndarray, left: np.ndarray, right: np.ndarray

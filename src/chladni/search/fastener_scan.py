@@ -27,7 +27,7 @@ from ..dynamics.reduction import attachments
 from ..effects.joints import MOST_RUN, Connection, fasteners, joined, lines
 from ..geometry.sampling import farthest_point_sample
 from ..inference.likelihood import Responses
-from ..inference.scan import Baseline, whitened
+from ..inference.scan import Baseline
 from ..reduced.reduced_model import State
 from ..reduced.reduced_problem import ReducedProblem
 from ..sparse.factor import Factor
@@ -150,7 +150,8 @@ def fastener_scores(
     state, out = base.state, np.empty(left.shape)
     for j, one in enumerate(joints):
         H = loosened_receptance(state, reduced, data, one, left[j])
-        out[j] = base.score(base.with_mass(whitened(data, state, H), 0.0))
+        r = data.stacked(data.deviation(state, H) / data.std())
+        out[j] = base.score(base.with_mass(r, 0.0))
     return out
 
 

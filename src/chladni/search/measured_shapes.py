@@ -15,7 +15,7 @@ from ..ema.correlation import mac
 from ..ema.shapes import turned
 from ..fem.modelled import Modelled
 from ..inference.pole_data import MIXED
-from ..inference.sensor_errors import side
+from ..inference.sensor_errors import sensor_errors
 from ..inference.shape_data import ShapeData
 from .question import Question
 
@@ -44,7 +44,7 @@ def shape_data(
     flexible = (modes.frequency > RIGID * f[0])[:, None]
     away = np.log(np.maximum(modes.frequency, RIGID * f[0])[:, None] / f) / NEAR
     partner = np.where(flexible, mac(phi, found.values.T) - away**2, -np.inf).argmax(axis=0)
-    wrong = side(question.outputs, question.outputs, nominal.structure, question.accuracy)
+    wrong = sensor_errors(question.outputs, question.outputs, nominal.structure, question.accuracy)
     moved = sum((rows @ modes.shapes[:, partner]) ** 2 for rows in wrong.rows)
     size = np.maximum((phi[:, partner] ** 2).sum(axis=0), 1e-300)
     known = (moved / size).T + (wrong.gain * found.values) ** 2

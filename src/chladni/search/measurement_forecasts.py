@@ -16,7 +16,7 @@ from ..effects.effect import Effect
 from ..effects.effect_context import ElementGrids
 from ..errors import ModelError
 from ..fem.measured_dofs import MeasuredDofs
-from ..inference.discrepancy import Form, columns, curvature, form
+from ..inference.discrepancy import Form, form
 from ..inference.expected_information import OpenQuantity, Predicted, Rivals
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from ..inference.likelihood import LN10, Responses
@@ -72,7 +72,7 @@ class Rival:
     @cached_property
     def strong(self) -> np.ndarray:
         """The ``MOST_FORMS`` entries of the errors of form that move the recording most."""
-        moved = (columns(self.data, self.state, self.form) ** 2).sum(axis=0)
+        moved = (self.data.form_slopes(self.state, self.form) ** 2).sum(axis=0)
         return np.argsort(-moved)[:MOST_FORMS]
 
     def slopes(self, data: Responses, state: State) -> np.ndarray:
@@ -80,7 +80,7 @@ class Rival:
         error = self.data.error
         size = 0.0 if error is None else error.delta
         J = data.scaled(state, True)[1]
-        return np.hstack([J, size * columns(data, state, self.form)[:, self.strong]])
+        return np.hstack([J, size * data.form_slopes(state, self.form)[:, self.strong]])
 
     @cached_property
     def posterior(self) -> tuple[np.ndarray, np.ndarray]:
@@ -304,7 +304,7 @@ def _new(
     about = elsewhere(first.state if about is None else about)
     values = given.model(about)
     given = replace(given, values=values, level=np.abs(values).max(axis=0))
-    given = replace(given, bent=curvature(given, about))
+    given = replace(given, bent=given.curvature(about))
     rows = replace(given, a=rival.model.rows(outputs, keep=False),
                    b=rival.model.rows(inputs, keep=False))  # fmt: skip
     mean, F = rival.predicted(rows, elsewhere(rival.state if state is None else state))

@@ -21,7 +21,7 @@ from ..ema.shapes import driven_shapes, mixture, real_shapes, shape_covariance, 
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..inference.channel_screening import shapes_against_model
-from ..inference.pole_data import ABOVE, Poles
+from ..inference.pole_data import ABOVE, partners
 from ..parallel import one_blas_thread
 from ..progress import Progress, silent
 from ..results import Result
@@ -312,7 +312,7 @@ def _by_poles(case: Case, near: ModalModel) -> Correlation:
     poles = tables[0]
     f = poles.of(poles.states[0]).frequency
     by_test = np.argsort(f, kind="stable")
-    at = Poles.of_list(f[by_test], case.band or (0.0, np.inf)).partners(near.frequency)
+    at = partners(f[by_test], near.frequency, case.band or (0.0, np.inf))
     pairs = pairs_of(at, by_test, len(near))
     return Correlation((), (), None, f, near.frequency, None, pairs,
                        notes=tuple(case.said("correlate")))  # fmt: skip

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..case import Case
-from ..dynamics.frf import FRF
 from ..effects.channels import GaugeErrors
 from ..effects.estimate import Estimate, Location
 from ..ema.finding import Check, Finding, Screening, Severity
@@ -20,7 +19,7 @@ from ..inference.map_fit import Fit
 from ..inference.pole_data import Poles
 from ..inference.result import NamedEffect
 from ..inference.sensor_errors import gauge_errors
-from ..inference.smoothed_responses import smoothed
+from ..inference.smoothed_responses import Reading
 from ..model.point_masses import with_mass_pairs
 from ..search.question import Prepared
 from .case_model import REACH
@@ -57,24 +56,23 @@ def screened_by_model(
     lines = (case.lines(frf.frequency) if use is None else use) & (frf.frequency > above)
     places = dict(zip(case.outputs.labels, case.outputs.points, strict=True))
     alone = screened(case.recordings[0], found, case.recordings[1:], places, use, alone=False)
-    if masses := _masses(case, frf, lines, model):
+    reading = Reading(frf, lines, model, case.outputs, case.inputs)
+    if masses := _masses(case, reading):
         return alone.with_more(masses, [Check("given masses", "check them", False)])
-    return against_model(
-        alone, frf, lines, found, model, case.outputs, case.inputs, case.gain_known
-    )
+    return against_model(alone, reading, found, case.gain_known)
 
 
-def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Finding]:
+def _masses(case: Case, reading: Reading) -> list[Finding]:
     """Report sensors in grams and a weighing in pounds, if the responses show it."""
     deck = float(mass_properties(case.assembly)[0])
     sensor_masses = sum(m for _, m in case.sensor_masses)
     found, weighed = [], case.setup.mass
-    seen = smoothed(frf, lines, model, case.outputs, case.inputs)
-    Q, level = (np.nan, np.nan) if seen is None else seen.as_declared()
+    seen, model = reading.smoothed(), reading.model
+    Q, level = (np.nan, np.nan) if seen is None else seen.as_declared
     if sensor_masses > HEAVY * deck:
         light = modelled(with_mass_pairs(case.assembly, case.sensor_masses, 1e-3), model.band)
-        other = smoothed(frf, lines, light, case.outputs, case.inputs)
-        less = np.nan if other is None else other.as_declared()[0]
+        other = replace(reading, model=light).smoothed()
+        less = np.nan if other is None else other.as_declared[0]
         grams = explains(less, Q)
         said = f"the sensors weigh {sensor_masses:.3g} kg in all, the structure {deck:.3g} kg"
         if grams:
@@ -153,7 +151,7 @@ def settled(case: Case, screening: Screening, above: float, after: Modelled, fit
         return screening
     frf = case.frfs[0]
     lines = case.lines(frf.frequency) & (frf.frequency > above)
-    seen = smoothed(frf, lines, after, case.outputs, case.inputs)
+    seen = Reading(frf, lines, after, case.outputs, case.inputs).smoothed()
     if seen is None:
         return screening
     seen = replace(seen, drive=seen.drive + _gauges(case, after, fit))

@@ -6,7 +6,7 @@ from ..case import Case
 from ..ema.channel_checks import drive_points, driving_share
 from ..ema.frf_maps import mapped
 from ..fem.modelled import Modelled, modelled
-from ..inference.smoothed_responses import smoothed
+from ..inference.smoothed_responses import Reading
 from .case_model import REACH
 
 DECIDED = 0.5  # share of the power at a drive point that goes one way
@@ -28,7 +28,8 @@ def with_sign_of_gain(case: Case, model: Modelled | None = None) -> Case:
         return case if shares[0] > 0 else _negative(case, said)
     high = case.band[1] if case.band else float(frf.frequency[-1])
     model = model or modelled(case.tested(case.assembly), REACH * high)
-    seen = smoothed(frf, case.lines(frf.frequency), model, case.outputs, case.inputs)
+    lines = case.lines(frf.frequency)
+    seen = Reading(frf, lines, model, case.outputs, case.inputs).smoothed()
     if seen is None:
         return case
     Q = [min(seen.score(sign * H) for H in seen.answers()) for sign in (1, -1)]
