@@ -16,7 +16,7 @@ from chladni.inference.likelihood import LN10
 from chladni.output import run_folder, write_npz
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import measurement_forecasts
-from chladni.search.conclusion import open_explanations
+from chladni.search.decide import open_explanations
 from chladni.search.decision_in_words import BEYOND
 from chladni.search.hypotheses import ALONE
 from chladni.search.measurement_forecasts import (

@@ -87,9 +87,8 @@ def test_the_fit_is_not_asked_to_go_below_the_spread_and_others_are_scored():
     assert np.all(ready.problem.data.noise >= alone.problem.data.noise)
     assert ready.problem.data.noise.mean() > 2 * alone.problem.data.noise.mean()
     assert any("B and the recording that is fitted differ by" in note for note in ready.notes)
-    question = asked(OtherRecording("B", "article", recorded(article, 3)))
     heavy = modelled(article, ready.nominal.band)
-    (row,) = scored_others(question, ready, [ready.nominal, ready.nominal, heavy])
+    (row,) = scored_others(ready, [ready.nominal, ready.nominal, heavy])
     assert (row.name, row.relation) == ("B", "article")
     assert_allclose(row.nominal, row.apart, rtol=0.2)  # the deck is the first article
     assert row.with_effect < 0.1 * row.nominal

@@ -211,7 +211,7 @@ def test_a_rival_has_a_basis_of_its_own_again(two, found):
         alternative.data.scaled(alternative.fit.state, False)
     null = null_of(two)
     diagnosis = Diagnosis(null, null, null, (lead, alternative))
-    rival = Hypotheses(None, SimpleNamespace(problem=two), diagnosis).singles[1]
+    rival = Hypotheses(SimpleNamespace(problem=two), diagnosis).singles[1]
     again = rival.whole
     assert rival.chances.test is not None
     assert again.data.scaled(again.fit.state, False)[0].size

@@ -24,14 +24,12 @@ from ..inference.unit_spread import KNOWN, unit_spread
 from ..reduced.effect_dofs import slices
 from ..reduced.reduced_model import evaluate
 from .posterior import values_at, with_frozen
-from .question import Prepared, Question
+from .question import Prepared
 
 Tests = dict[str, list[tuple[np.ndarray, np.ndarray]]]  # article: ln H over the first's, its noise
 
 
-def articles_together(
-    question: Question, prepared: Prepared, null: HypothesisFit
-) -> tuple[ArticleParameter, ...]:
+def articles_together(prepared: Prepared, null: HypothesisFit) -> tuple[ArticleParameter, ...]:
     """Fit all articles of a case together; empty where it has one, or no responses.
 
     Parameters
@@ -41,7 +39,7 @@ def articles_together(
     data = null.data
     if not isinstance(data, Responses) or prepared.identified is None:
         return ()
-    tests = _tests(question, prepared, data, prepared.identified)
+    tests = _tests(prepared, data, prepared.identified)
     if len(tests) < 2:
         return ()
     logs = np.array([np.mean([log for log, _ in each], axis=0) for each in tests.values()])
@@ -64,10 +62,9 @@ def articles_together(
     return _summary(mean, tuple(tests), away, width, (tau, low, high))
 
 
-def _tests(
-    question: Question, prepared: Prepared, data: Responses, identified: Identified
-) -> Tests:
+def _tests(prepared: Prepared, data: Responses, identified: Identified) -> Tests:
     """The tests of every article at the level of the first: ln of H over the first's, and noise."""
+    question = prepared.question
     assert question.frf is not None
     first = equalised(identified, data.s)
     out: Tests = {

@@ -14,7 +14,7 @@ from ..inference.map_fit import fit
 from ..inference.pole_data import Poles
 from ..reduced.accuracy import LIMIT, Accuracy, accuracy
 from ..reduced.reduced_problem import reduced_problem
-from .nuisances import measured_on, mesh_hidden, nuisances
+from .base_effects import measured_on, mesh_hidden, nuisances
 from .preparation import SOLVED, updating_problem
 from .question import Prepared, Question
 
@@ -41,9 +41,7 @@ class Refinement:
         )
 
 
-def refined(
-    question: Question, prepared: Prepared, hypothesis: HypothesisFit, written: bool = False
-) -> Refinement:
+def refined(prepared: Prepared, hypothesis: HypothesisFit, written: bool = False) -> Refinement:
     """Fit a hypothesis again on an accurate reduced model, and report the model's error.
 
     Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
@@ -53,7 +51,7 @@ def refined(
     """
     problem = prepared.problem
     if any(e.traits.remakes_structure for e in hypothesis.effects):
-        problem, hypothesis = _on_new_structure(question, problem, hypothesis)
+        problem, hypothesis = _on_new_structure(prepared.question, problem, hypothesis)
     found = _accuracy(problem, hypothesis)
     note, first = _said(found), found.worst
     for _ in range(TRIES):
@@ -115,13 +113,9 @@ def _on_new_structure(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,
     )  # fmt: skip
-    fresh = updating_problem(
-        changed,
-        reduced,
-        data.rebased(reduced.model),
-        [*nuisances(reduced, model, mesh, None if rows else f_max), *filter(of_test, old.nuisance)],
-        f_max,
-    )
+    own = nuisances(reduced, model, mesh, None if rows else f_max)
+    own = [*own, *filter(of_test, old.nuisance)]
+    fresh = updating_problem(changed, reduced, data.rebased(reduced.model), own)
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
     (first, start), *others = found
     fresh = fresh.holding(others)

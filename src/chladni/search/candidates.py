@@ -1,7 +1,7 @@
 """The most promising of every family of effects, and the services by which families find them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
@@ -30,7 +30,7 @@ from ..parallel import in_parallel
 from ..reduced.local_effect import LocalEffect
 from ..reduced.reduced_model import Reduced, evaluate
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
-from .pole_starts import global_starts
+from .pole_starts import global_starts, squared_prior
 
 APART = 1 / 6  # of the structure's size: effects nearer to each other are one
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
@@ -103,11 +103,11 @@ def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
 
 def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> list[Candidate]:
     """Candidates with the best scores at their start, less the price of the places tried."""
-    price = [2 * float(np.log(c.effect.trials_factor)) for c in every]
     score = [
-        float(context.scores(c.effect, [c.start]).min()) + _prior(c.effect, c.start) + p
-        for c, p in zip(every, price, strict=True)
-    ]
+        float(context.scores(c.effect, [c.start]).min())
+        + squared_prior(c.effect, c.start) + 2 * float(np.log(c.effect.trials_factor))
+        for c in every
+    ]  # fmt: skip
     return [every[k] for k in np.argsort(score, kind="stable")[:most]]
 
 
@@ -130,6 +130,13 @@ class UpdatingContext:
     problem: UpdatingProblem
     null_fit: HypothesisFit  # the best without any effect
     about: np.ndarray | None = None
+    # model of an effect with parts of its own; scores of joints and of lines of shells, which
+    # several families try
+    _components: dict[str, Reduced] = field(default_factory=dict, init=False)
+    _loose: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(
+        default_factory=dict, init=False
+    )
+    _bent: dict[tuple[int, bytes], np.ndarray] = field(default_factory=dict, init=False)
 
     @property
     def where(self) -> EffectContext:
@@ -253,7 +260,7 @@ class UpdatingContext:
             except FAILED:
                 continue
             if isinstance(data, Poles):
-                prior = _prior(effect, start)
+                prior = squared_prior(effect, start)
                 for scale_index, scale in enumerate(ways):
                     r, _ = replace(data, scale=scale).scaled(state, False)
                     out[scale_index, k] = r @ r + prior
@@ -261,10 +268,6 @@ class UpdatingContext:
                 r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
-
-    @cached_property
-    def _components(self) -> dict[str, Reduced]:
-        return {}
 
     def own(self, effect: Effect, start: np.ndarray) -> tuple[float, np.ndarray]:
         """-2 ln evidence at the own optimum of an effect, and the optimum; inf without one."""
@@ -363,10 +366,6 @@ class UpdatingContext:
             known[key_too] = fastener_scores(base, reduced, self.data, joints, left)
         return known[key_too]
 
-    @cached_property
-    def _loose(self) -> dict[tuple[tuple[int, ...], bytes], np.ndarray]:
-        return {}
-
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -381,13 +380,3 @@ class UpdatingContext:
         known |= zip(fresh, np.transpose(direction_scores(base, slopes)), strict=True)
         amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
         return amount, score
-
-    @cached_property
-    def _bent(self) -> dict[tuple[int, bytes], np.ndarray]:
-        return {}
-
-
-def _prior(effect: Effect, x: np.ndarray) -> float:
-    """((x - μ)/σ)² over the effect's parameters."""
-    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
-    return float((((x - mean) / sd) ** 2).sum())

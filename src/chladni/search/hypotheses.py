@@ -18,7 +18,7 @@ from ..inference.written_hypothesis import as_written, preferred_mesh
 from .basis_refinement import refined
 from .decision_rules import RULES
 from .diagnosis import Diagnosis, FitChances, fit_test
-from .question import Prepared, Question
+from .question import Prepared
 from .search_round import on_common_basis, taken
 from .several import Several
 from .verdict_models import scores_of
@@ -136,7 +136,7 @@ class Explanation:
         """The hypothesis fitted again on an accurate model; a rival first gets its own basis."""
         case = self.case
         try:
-            made = refined(case.question, case.prepared, self.whole)
+            made = refined(case.prepared, self.whole)
         except ModelError as error:
             return Explanation(case, self.fit, together=self.together, lost=str(error))
         again = Explanation(
@@ -184,7 +184,6 @@ class Explanation:
 class Hypotheses:
     """All hypotheses of a diagnosis, and the problem on which one of them is fitted again."""
 
-    question: Question
     prepared: Prepared
     found: Diagnosis
     # the last rival that was fitted again; it keeps its model, 10 to 300 MB on a tailgate, until

@@ -96,16 +96,14 @@ def spread_note(
     ]
 
 
-def scored_others(
-    question: Question, prepared: Prepared, stages: Sequence[Modelled]
-) -> tuple[RecordingScore, ...]:
+def scored_others(prepared: Prepared, stages: Sequence[Modelled]) -> tuple[RecordingScore, ...]:
     """Q of the nominal, calibrated and updated deck on every recording that was not fitted."""
     score = prepared.score
     if not isinstance(score, Responses) or not prepared.others:
         return ()
     use = score.use | prepared.held.whole
     f_max = prepared.problem.setup.f_max
-    own = {id(m): seen(question, score, m, f_max) for m in stages}
+    own = {id(m): seen(prepared.question, score, m, f_max) for m in stages}
     out = []
     for other in prepared.others:
         values = equalised(other.identified, score.s)
@@ -115,7 +113,7 @@ def scored_others(
             data, state = own[id(model)]
             assert isinstance(data, Responses)
             there = replace(data, values=values)
-            offset = gain_offset(question, prepared, there, state)
+            offset = gain_offset(prepared, there, state)
             Q.append(there.Q(replace(state, offset=offset), use))
         name, relation = other.recording.name, other.recording.relation
         out.append(RecordingScore(name, relation, apart, *Q))

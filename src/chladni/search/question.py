@@ -121,6 +121,7 @@ class HeldOut:
 class Prepared:
     """An updating problem and the data that score it."""
 
+    question: Question
     problem: UpdatingProblem
     score: Responses | Poles  # Q is reported on it, over the same basis; ``use``: fitted samples
     # samples held out, of ``score`` and of ``problem.data``

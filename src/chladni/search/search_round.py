@@ -4,7 +4,7 @@ The base of the round contains the effects found before it. A later round theref
 of an effect in addition to the others.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,17 +14,12 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
-from ..inference.hypothesis_fit import (
-    FAILED,
-    ROUGH,
-    HypothesisFit,
-    UpdatingProblem,
-    fitted,
-)
+from ..inference.hypothesis_fit import FAILED, ROUGH, HypothesisFit, UpdatingProblem, fitted
 from ..inference.likelihood import Responses
 from ..inference.map_fit import Status
 from ..inference.own_optimum import LocalOptimum, distinct
 from ..parallel import in_parallel
+from ..progress import Progress
 from ..reduced.reduced_model import Reduced
 from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
@@ -37,11 +32,9 @@ LATER = 2  # of them in later rounds
 WHOLE = 6  # that keep their model, 10 to 300 MB each on a tailgate
 FOOT = 0.01  # of the gain (a tenth of the amplitude), by which a simpler effect may fall behind
 
-Say = Callable[[str, float], None]
-
 
 def search_round(
-    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Progress,
     least: float | None = None,
 ) -> list[HypothesisFit]:  # fmt: skip
     """The best hypothesis of every family, best first.
@@ -60,10 +53,10 @@ def search_round(
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
         others |= {t.effect.name: behind for t in fits}
         give_back_freed_memory()
-    worst = BEHIND + min((t.neg2_log_evidence for t in hypotheses), default=0.0)
+    worst = BEHIND + _best(hypotheses, 0.0)
     more = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
     hypotheses = _lighter(problem, by_family([t for fits in more for t in fits]), whole)
-    if least is not None and not _gained(null, hypotheses, least):
+    if least is not None and null.neg2_log_evidence - _best(hypotheses) <= least:
         return simplest_first(by_family([*hypotheses, *left]), null.neg2_log_evidence)
     progress("refining the place", 0.8)
     running = running if later else max(running, _in_the_running(hypotheses[:whole]))
@@ -102,24 +95,14 @@ def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[Hyp
     return list(hypotheses)
 
 
+def _best(hypotheses: Sequence[HypothesisFit], none: float = np.inf) -> float:
+    """The least -2 ln evidence."""
+    return min((t.neg2_log_evidence for t in hypotheses), default=none)
+
+
 def _in_the_running(hypotheses: Sequence[HypothesisFit]) -> int:
     """How many are one answer with the best of them by rough fits."""
-    least = min((t.neg2_log_evidence for t in hypotheses), default=0.0)
-    return sum(t.neg2_log_evidence < least + TIED for t in hypotheses)
-
-
-def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: float) -> bool:
-    """True if the best hypothesis gains at least this much over the null."""
-    best = min((t.neg2_log_evidence for t in hypotheses), default=np.inf)
-    return bool(null.neg2_log_evidence - best > least)
-
-
-def _by_name(tried: Sequence[Candidate]) -> dict[str, list[Candidate]]:
-    """Candidates of each family."""
-    out: dict[str, list[Candidate]] = {}
-    for c in tried:
-        out.setdefault(c.effect.name, []).append(c)
-    return out
+    return sum(t.neg2_log_evidence < _best(hypotheses) + TIED for t in hypotheses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +139,16 @@ Fits = tuple[list[HypothesisFit], _Others]
 
 
 def _family_fits(
-    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Progress,
     least: float | None, left: list[HypothesisFit],
 ) -> Iterator[Fits]:  # fmt: skip
     """Rough joint fits, one family after the other; ``left`` gets own optima of those behind.
 
     Poles are paired anew by every change: each candidate is fitted from its start.
     """
-    responses, families = isinstance(problem.data, Responses), _by_name(tried)
+    responses, families = isinstance(problem.data, Responses), dict[str, list[Candidate]]()
+    for c in tried:
+        families.setdefault(c.effect.name, []).append(c)
 
     def begun(some: Sequence[Candidate]) -> list[HypothesisFit]:
         if responses:
@@ -226,7 +211,7 @@ def _leaders(
     slack, worst = 0.0, np.inf if least is None else null.neg2_log_evidence - least
     jointly, leading = partial(_jointly, problem, null), ranked[:first]
     for (own, *_), found in zip(leading, in_parallel(jointly, leading), strict=True):
-        joint = min((t.neg2_log_evidence for t in found[0]), default=np.inf)
+        joint = _best(found[0])
         slack, worst = max(slack, own.neg2_log_evidence - joint), min(worst, joint + BEHIND)
         yield found
     may = [own[0].neg2_log_evidence - slack < worst for own in ranked[first:]]
@@ -258,13 +243,9 @@ def _from_own(
 
 
 def _tried(
-    problem: UpdatingProblem,
-    null: HypothesisFit,
-    effect: Effect,
-    start: np.ndarray,
-    base: np.ndarray,
-    model: Reduced | None = None,
-) -> list[HypothesisFit]:
+    problem: UpdatingProblem, null: HypothesisFit, effect: Effect, start: np.ndarray,
+    base: np.ndarray, model: Reduced | None = None,
+) -> list[HypothesisFit]:  # fmt: skip
     """Rough fits; a second one begins at the null if the first remains worse than the null.
 
     With the effect idle a hypothesis is the null. A fit that is worse by more than its price has
@@ -283,13 +264,9 @@ def by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
     """The best hypothesis of every family, best first."""
     best: dict[str, HypothesisFit] = {}
     for t in hypotheses:
-        lead = best.get(t.effect.name, t)
-        if lead is t:
-            best[t.effect.name] = t
-        elif t.fit.neg2_log_evidence < lead.fit.neg2_log_evidence:
-            best[t.effect.name] = t.among(lead)
-        else:
-            best[t.effect.name] = lead.among(t)
+        both = best.get(t.effect.name, t), t
+        ahead, behind = sorted(both, key=lambda f: f.fit.neg2_log_evidence)
+        best[t.effect.name] = t if ahead is behind else ahead.among(behind)
     return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
 
 
@@ -297,13 +274,10 @@ def _lighter(
     problem: UpdatingProblem, hypotheses: list[HypothesisFit], whole: int
 ) -> list[HypothesisFit]:
     """All families; those far down and at rest keep their fit, not the basis made for it."""
-    out = hypotheses[:whole]
-    for t in hypotheses[whole:]:
-        if t.fit.status is Status.OUT_OF_STEPS:
-            out.append(t)
-            continue
-        out.append(on_common_basis(problem, t))
-    return out
+    moving = Status.OUT_OF_STEPS
+    return hypotheses[:whole] + [
+        t if t.fit.status is moving else on_common_basis(problem, t) for t in hypotheses[whole:]
+    ]
 
 
 def on_common_basis(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisFit:
@@ -325,29 +299,28 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
         fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
     except FAILED:
         return hypothesis
-    if fit.neg2_log_evidence < hypothesis.fit.neg2_log_evidence:
-        return replace(hypothesis, fit=fit)
-    return hypothesis
+    return replace(hypothesis, fit=min(begun, fit, key=lambda f: f.neg2_log_evidence))
 
 
 def _closer(
     problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit
 ) -> list[HypothesisFit]:
     """The leader begun anew about the place it moved to, or at a better one, while it moves."""
-    out: list[HypothesisFit] = []
-    for _ in range(3):
+    out = [lead]
+    closer = next((f.closer for f in problem.families if f.name == lead.effect.name), None)
+    for _ in range(3 if closer else 0):
+        effect, x = out[-1].effect, out[-1].fit.of(out[-1].effect)
+        context = UpdatingContext(problem, null, taken(problem, out[-1], ("calibration",)))
         try:
-            again = _again(problem, null, lead)
+            again = closer and closer(context, effect, x)
             if again is None:
                 break
-            hypothesis = problem.fitted_with(again.effect, again.start, again.base)
+            out.append(problem.fitted_with(again.effect, again.start, again.base))
         except FAILED:
             break
-        out.append(hypothesis)
-        if hypothesis.fit.neg2_log_evidence > lead.fit.neg2_log_evidence - 1:
+        if out[-1].fit.neg2_log_evidence > out[-2].fit.neg2_log_evidence - 1:
             break
-        lead = hypothesis
-    return out
+    return out[1:]
 
 
 def _of_the_same_lump(
@@ -373,15 +346,6 @@ def _of_the_same_lump(
                 near = rough.neg2_log_evidence < lead.neg2_log_evidence + BEHIND
                 out.append(_finished(problem, rough, True) if near else rough)
     return out
-
-
-def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -> Candidate | None:
-    """The leader about the place it moved to, or at a better one next to its own; None: at rest."""
-    x, base = lead.fit.of(lead.effect), taken(problem, lead, ("calibration",))
-    known = next((f for f in problem.families if f.name == lead.effect.name), None)
-    if known is None or known.closer is None:
-        return None
-    return known.closer(UpdatingContext(problem, null, base), lead.effect, x)
 
 
 def taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:

@@ -12,7 +12,7 @@
 The members of a set are compared under one error of the model's form, from the set's own state.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -25,7 +25,7 @@ from ..errors import ModelError
 from ..inference.hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from ..inference.likelihood import Responses
 from ..inference.map_fit import unknowns
-from ..progress import within
+from ..progress import Progress, silent, within
 from ..reduced.reduced_model import Reduced, evaluate
 from .candidates import candidates, repeats
 from .decision_rules import GOOD_PART, TIED
@@ -37,8 +37,6 @@ WORTH = 0.25  # of the gain due, by rough fits: a round whose best is below it i
 PAIRED = 4  # leading families that are tried in pairs
 BETTER = 1.0  # gain in -2 ln evidence from which another effect replaces a member
 ATTEMPTS = 4  # rounds that may change the set
-
-Say = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -79,7 +77,7 @@ class Search:
 
 def several(
     problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float, unfit: bool,
-    progress: Say = lambda text, share: None,
+    progress: Progress = silent,
 ) -> Search:  # fmt: skip
     """Sets of effects grown from the best one, where every member gains a good part of its price.
 
@@ -96,8 +94,8 @@ def several(
     for other in others[:1]:
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
         if simpler or (unfit and not any(s.pay for s in search.sets)):
-            say = within(progress, 0.4, 0.8)
-            search = _better(search, _begun_with(problem, other, due, say, lead, search.sets))
+            part = within(progress, 0.4, 0.8)
+            search = _better(search, _begun_with(problem, other, due, part, lead, search.sets))
     if unfit and not any(s.pay for s in search.sets):
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
@@ -128,7 +126,7 @@ def _better(one: Search, other: Search) -> Search:
 
 
 def _begun_with(
-    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say,
+    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Progress,
     best: HypothesisFit | None = None, known: Sequence[Several] = (),
 ) -> Search:  # fmt: skip
     """Sets grown from one hypothesis, until no further effect gains enough or the best is ahead.
@@ -197,17 +195,13 @@ def _holding(
 
 @dataclass(frozen=True, eq=False)
 class _More:
-    """A set with one further effect.
-
-    ``alternatives`` are hypotheses that explain as much in the place of a member.
-    ``without`` are the best fits without a member.  Both are keyed by the id of the member, as
-    far as known.  Errors of form spread from a state of the model ``about``.
-    """
+    """A set with one further effect."""
 
     hypothesis: HypothesisFit
+    # by the id of a member, as far as known: hypotheses that explain as much in its place
     alternatives: dict[int, list[HypothesisFit]]
-    without: dict[int, HypothesisFit]
-    about: Reduced
+    without: dict[int, HypothesisFit]  # the same: the best fit without it
+    about: Reduced  # from a state of which errors of form spread
 
 
 def _grown(
@@ -234,13 +228,12 @@ def _round(
     held: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], least: float
 ) -> list[HypothesisFit]:
     """A round of a search, less effects that moved onto a present effect of their own family."""
-    hypotheses = search_round(held, null, tried, lambda text, share: None, least)
-    return [t for t in hypotheses if not repeats(_moved(held, t), t.effect, t.fit.of(t.effect))]
-
-
-def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
-    """The problem with its found effects at the values of a hypothesis."""
-    return replace(held, found=tuple((e, to.fit.of(e)) for e, _ in held.found))
+    out = []
+    for t in search_round(held, null, tried, silent, least):
+        there = replace(held, found=tuple((e, t.fit.of(e)) for e, _ in held.found))
+        if not repeats(there, t.effect, t.fit.of(t.effect)):
+            out.append(t)
+    return out
 
 
 def _revised(
@@ -281,8 +274,7 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
 
 def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
     """True for another family whose fitted effect is not the member under another name."""
-    effect = hypothesis.effect
-    return member.name not in (effect.name, effect.remarks(hypothesis.fit.of(effect)).becomes)
+    return member.name not in (hypothesis.effect.name, hypothesis.remarks.becomes)
 
 
 def _preferred(best: HypothesisFit, lead: HypothesisFit, member: Effect) -> bool:
@@ -347,13 +339,10 @@ def _close(
     alternatives: Sequence[HypothesisFit], lead: HypothesisFit
 ) -> tuple[AlternativeRow, ...]:
     """Other families that explain as much as a member in its place."""
-    every = [
-        AlternativeRow(
-            t.effect.name, _gain(t, lead), t.effect.remarks(t.fit.of(t.effect)).implausible
-        )
-        for t in alternatives
-    ]
-    return tuple(alternative for alternative in every if alternative.behind < TIED)
+    close = (t for t in alternatives if _gain(t, lead) < TIED)
+    return tuple(
+        AlternativeRow(t.effect.name, _gain(t, lead), t.remarks.implausible) for t in close
+    )
 
 
 def _in_pairs(
@@ -361,18 +350,14 @@ def _in_pairs(
 ) -> list[Several]:
     """The best pair of leading families, if it beats one alone and both members gain enough."""
     base, alone = _standing(problem, singles[0])
-    data = base.data
     tries = []
     for one, other in combinations(singles, 2):
         held = problem.holding([(one.effect, one.fit.of(one.effect))])
-        held = replace(held, data=data.rebased(held.reduced.model))
-        start = other.fit.of(other.effect)
-        if repeats(held, other.effect, start):
-            continue
-        with suppress(ModelError):
-            tries.append(
-                held.fitted_with(other.effect, start, taken(held, one, ("calibration",)), ROUGH)
-            )
+        held = replace(held, data=base.data.rebased(held.reduced.model))
+        start, x = other.fit.of(other.effect), taken(held, one, ("calibration",))
+        if not repeats(held, other.effect, start):
+            with suppress(ModelError):
+                tries.append(held.fitted_with(other.effect, start, x, ROUGH))
     best = min([alone, *tries], key=lambda t: t.neg2_log_evidence)
     if _gain(alone, best) < WORTH * due:
         return []

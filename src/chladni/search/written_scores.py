@@ -26,7 +26,6 @@ from .question import Prepared, Question
 
 
 def written_Q(
-    question: Question,
     prepared: Prepared,
     model: Modelled,
     sets: tuple[np.ndarray, ...],
@@ -47,12 +46,12 @@ def written_Q(
     f_max, terms = prepared.problem.setup.f_max, list[Term]()
     if fault is not None:
         terms = [t for effect in fault.effects for t in effect.terms(fault.fit.of(effect))]
-    data, state = seen(question, prepared.score, model, f_max, of(SpinTerm, terms))
+    data, state = seen(prepared.question, prepared.score, model, f_max, of(SpinTerm, terms))
     if isinstance(data, Poles):
         return tuple(data.Q(state, use, real) for use in sets)
     n = len(data.a)
     offset = sum((change.value for change in of(ChannelChange, terms)), np.zeros(n, complex))
-    offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
+    offset = offset + gain_offset(prepared, data, replace(state, offset=offset))
     state = replace(state, offset=offset)
     return tuple(data.Q(state, use) for use in sets)
 
@@ -73,12 +72,10 @@ def equalised_deviation(
     return delta if question.gain_known else delta - delta.real.mean()
 
 
-def gain_offset(
-    question: Question, prepared: Prepared, data: Responses, state: State
-) -> np.ndarray:
+def gain_offset(prepared: Prepared, data: Responses, state: State) -> np.ndarray:
     """log10 of the unknown common gain of all channels (n_out,); zero where the gain is known."""
     none = np.zeros(len(data.a), complex)
-    if question.gain_known:
+    if prepared.question.gain_known:
         return none
     return none - data.deviation(state)[prepared.score.use].real.mean()
 

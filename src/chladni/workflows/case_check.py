@@ -346,7 +346,7 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
 def _screened(state: Case, diagnosing: bool, progress: Progress) -> tuple[str, Screening | None]:
     """A mass that deck and scales do not allow, and the findings on the recording."""
     try:
-        _, prepared, screening = ready(with_sign_of_gain(state), diagnosing, progress, fitted=False)
+        prepared, screening = ready(with_sign_of_gain(state), diagnosing, progress, fitted=False)
     except RecordingAtFault as fault:
         return "", fault.screening
     return off_the_scales(prepared.problem), screening
