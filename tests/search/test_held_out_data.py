@@ -17,7 +17,7 @@ from chladni.search.held_out_data import HeldOutChoice, of_poles, upper_part
 from chladni.search.hypotheses import Hypotheses
 from chladni.search.preparation import prepare
 from chladni.search.question import HeldOut, Question
-from chladni.search.verdict_models import scores_of
+from chladni.search.written_scores import scores_of
 from chladni_specimens.plates import plate
 
 LABELS = tuple("abcdefgh")

@@ -54,7 +54,7 @@ def test_the_spread_of_articles_is_the_slope_of_their_frequencies():
     first = identify(question.frf, (20.0, 170.0))
     s = 2 * np.pi * np.linspace(40, 150, 60) * (0.08 + 1j)
     spread = measured_spread(equalised(first, s), others, s)
-    moved = np.log10(equalised(others[0].identified, s) / equalised(first, s))
+    moved = np.log10(equalised(others[0][1], s) / equalised(first, s))
     due = np.abs(moved) / np.sqrt(2)  # two values, K - 1 = 1: |d|²/2
     assert spread.shape == due.shape
     rms = lambda x: np.sqrt((x**2).mean())  # noqa: E731

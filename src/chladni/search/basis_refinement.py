@@ -1,6 +1,6 @@
 """Renewal of a fit where the reduced model is no longer accurate."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import scipy.sparse as sp
 
@@ -21,28 +21,10 @@ from .question import Prepared, Question
 TRIES = 3  # times the basis is extended by its missing vectors
 
 
-@dataclass(frozen=True, eq=False)
-class Refinement:
-    """A hypothesis fitted again on a more accurate reduced model."""
-
-    hypothesis: HypothesisFit
-    note: str  # sentence on the error of the reduced model
-    worst: float  # largest remaining relative frequency error
-
-    @property
-    def distrust(self) -> tuple[str, ...]:
-        """Reason not to trust the result; empty where the reduced model is accurate enough."""
-        if self.worst <= LIMIT:
-            return ()
-        return (
-            "the frequencies of the reduced model differ from the full model by "
-            f"{_percent(self.worst)}, above the limit of {_percent(LIMIT)}: do not trust the "
-            "result; narrow the band, or correct the deck first",
-        )
-
-
-def refined(prepared: Prepared, hypothesis: HypothesisFit, written: bool = False) -> Refinement:
-    """Fit a hypothesis again on an accurate reduced model, and report the model's error.
+def refined(
+    prepared: Prepared, hypothesis: HypothesisFit, written: bool = False
+) -> tuple[HypothesisFit, str, tuple[str, ...]]:
+    """Fit a hypothesis again on an accurate reduced model; the model's error, reasons for distrust.
 
     Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
     computed again where the effect changes that structure. Otherwise the basis is extended by its
@@ -68,7 +50,14 @@ def refined(prepared: Prepared, hypothesis: HypothesisFit, written: bool = False
         hypothesis = replace(hypothesis, fit=made, model=model)
         found = _accuracy(problem, hypothesis)
         note = f"{_said(found)}, after {_percent(first)} before its basis was refined"
-    return Refinement(hypothesis, note, found.worst)
+    if found.worst <= LIMIT:
+        return hypothesis, note, ()
+    why = (
+        f"the frequencies of the reduced model differ from the full model by "
+        f"{_percent(found.worst)}, above the limit of {_percent(LIMIT)}: do not trust the result; "
+        "narrow the band, or correct the deck first"
+    )
+    return hypothesis, note, (why,)
 
 
 def _accuracy(problem: UpdatingProblem, hypothesis: HypothesisFit) -> Accuracy:

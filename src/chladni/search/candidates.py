@@ -39,11 +39,9 @@ WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 def candidates(
     problem: UpdatingProblem, null: HypothesisFit, most: int | None = None
 ) -> list[Candidate]:
-    """The most promising of every family, scanned about the nominal and the calibrated model.
+    """The most promising of every family, about the nominal and the calibrated model.
 
-    Parameters
-    ----------
-    most : so many of them alone, those that score best where they begin
+    With ``most``, so many of them alone: those that score best where they begin.
     """
     context = UpdatingContext(problem, null)
     every, _ = proposals(context)
@@ -130,13 +128,10 @@ class UpdatingContext:
     problem: UpdatingProblem
     null_fit: HypothesisFit  # the best without any effect
     about: np.ndarray | None = None
-    # model of an effect with parts of its own; scores of joints and of lines of shells, which
-    # several families try
-    _components: dict[str, Reduced] = field(default_factory=dict, init=False)
-    _loose: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(
-        default_factory=dict, init=False
-    )
-    _bent: dict[tuple[int, bytes], np.ndarray] = field(default_factory=dict, init=False)
+    # kept: models of effects with parts of their own, scores of joints and of lines of shells
+    _components: dict[str, Reduced] = field(default_factory=dict)
+    _loose: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(default_factory=dict)
+    _bent: dict[tuple[int, bytes], np.ndarray] = field(default_factory=dict)
 
     @property
     def where(self) -> EffectContext:
@@ -157,21 +152,14 @@ class UpdatingContext:
         nominal = self.problem.mean()
         if self.about is not None:
             return nominal, self.about
-        found = [e for e, _ in self.problem.found]
-        kinds = [
-            e.kind == "calibration" or e in found for e in self.problem.base for _ in e.parameters
-        ]
-        calibrated = np.where(kinds, self.null_fit.fit.x, nominal)
-        calibrated = calibrated if self._stands(calibrated) else self.null_fit.fit.x
-        return (calibrated,) if found else (nominal, calibrated)
-
-    def _stands(self, x: np.ndarray) -> bool:
-        """True if base parameters x are a structure."""
+        base, found = self.problem.base, [e for e, _ in self.problem.found]
+        kinds = [e.kind == "calibration" or e in found for e in base for _ in e.parameters]
+        calibrated = np.where(kinds, self.null, nominal)
         try:
-            evaluate(self.problem.reduced.model, self.problem.base, x, False)
-        except FAILED:
-            return False
-        return True
+            evaluate(self.problem.reduced.model, base, calibrated, False)
+        except FAILED:  # it is no structure
+            calibrated = self.null
+        return (calibrated,) if found else (nominal, calibrated)
 
     @property
     def null(self) -> np.ndarray:
@@ -186,10 +174,8 @@ class UpdatingContext:
     @cached_property
     def baselines(self) -> tuple[Baseline, ...]:
         """The base effects linearised at each of ``bases``."""
-        s = self.problem
-        return tuple(
-            baseline(s.reduced.model, s.base, s.data, s.mass_measurement, x) for x in self.bases
-        )
+        s, model = self.problem, self.problem.reduced.model
+        return tuple(baseline(model, s.base, s.data, s.mass_measurement, x) for x in self.bases)
 
     @property
     def weighs_more(self) -> float:
@@ -240,7 +226,7 @@ class UpdatingContext:
         """
         base, reduced, local = self.baselines[about], self.problem.reduced, None
         model = reduced.model
-        if extended and isinstance(self.problem.data, Responses):
+        if extended and self.scan is not None:
             local = LocalEffect.of(reduced, base.effects, effect, base.state, base.x, starts[0])
         if local is None:
             wider = extended or effect.release is not None
@@ -260,10 +246,8 @@ class UpdatingContext:
             except FAILED:
                 continue
             if isinstance(data, Poles):
-                prior = squared_prior(effect, start)
-                for scale_index, scale in enumerate(ways):
-                    r, _ = replace(data, scale=scale).scaled(state, False)
-                    out[scale_index, k] = r @ r + prior
+                each = (replace(data, scale=scale).scaled(state, False)[0] for scale in ways)
+                out[:, k] = [r @ r + squared_prior(effect, start) for r in each]
             else:
                 r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
@@ -284,10 +268,8 @@ class UpdatingContext:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
         base, model = self.baselines[-1], self.problem.reduced.model
         state = evaluate(model, base.effects, base.x, False)
-        terms = of(MatrixTerm, effect.terms(x))
-        return state.lam, np.array(
-            [state.phi.T @ model.operator(t.operator) @ state.phi for t in terms]
-        )
+        A = (model.operator(t.operator) for t in of(MatrixTerm, effect.terms(x)))
+        return state.lam, np.array([state.phi.T @ a @ state.phi for a in A])
 
     def optima(self, effect: Effect) -> list[np.ndarray]:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""
@@ -306,44 +288,59 @@ class UpdatingContext:
         data = self.data
         return data.deviation(self.null_fit.fit.state)[data.use.any(axis=1)]
 
+    def _at(self, about: int) -> tuple[Baseline, Reduced, Responses]:
+        """The state that is changed, the model and the data of a scan."""
+        return self.baselines[about], self.problem.reduced.model, self.data
+
     def point_scores(
         self, about: int, matrix: str, strengths: np.ndarray, places: ElementGrids | None = None
     ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
-        base, reduced = self.baselines[about], self.problem.reduced
-        rest = self.flexibility if places is None else reduced.flexibility(places)
+        rest = self.flexibility if places is None else self.problem.reduced.flexibility(places)
         places = self.where.places if places is None else places
-        return point_scores(base, reduced.model, self.data, places, matrix, strengths, rest)
+        return point_scores(*self._at(about), places, matrix, strengths, rest)
 
     def oscillator_scores(
         self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz)."""
-        base, reduced = self.baselines[about], self.problem.reduced
-        rest = reduced.flexibility(places)
-        return oscillator_scores(base, reduced.model, self.data, places, mass, hertz, rest)
+        rest = self.problem.reduced.flexibility(places)
+        return oscillator_scores(*self._at(about), places, mass, hertz, rest)
 
     def spin_scores(
         self, about: int, places: ElementGrids, sd: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best angular momentum of a spinning part at each place (k, 3), and the score (k,)."""
-        rows, model = self.where.rotations(places.grids), self.problem.reduced.model
-        return spin_scores(self.baselines[about], model, self.data, rows, sd)
+        return spin_scores(*self._at(about), self.where.rotations(places.grids), sd)
 
     def field_scores(
         self, about: int, field: str, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
-        base, model = self.baselines[about], self.problem.reduced.model
-        return direction_scores(base, field_slopes(base, model, self.data, field) @ change)
+        slopes = field_slopes(*self._at(about), field)
+        return direction_scores(self.baselines[about], slopes @ change)
 
     def effect_scores(
         self, about: int, effect: Effect, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of an effect from its nominal values, and the score."""
-        base, model = self.baselines[about], self.problem.reduced.model
-        slopes = effect_slopes(base, model, self.data, effect)
-        return direction_scores(base, slopes @ change)
+        slopes = effect_slopes(*self._at(about), effect)
+        return direction_scores(self.baselines[about], slopes @ change)
+
+    def bending_scores(
+        self, about: int, sets: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
+
+        Several families try the same lines of shells.
+        """
+        keys, known = [(about, each.tobytes()) for each in sets], self._bent
+        fresh = {key: each for key, each in zip(keys, sets, strict=True) if key not in known}
+        slopes = bending_slopes(*self._at(about), list(fresh.values()))
+        scores = direction_scores(self.baselines[about], slopes)
+        known |= zip(fresh, np.transpose(scores), strict=True)
+        amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
+        return amount, score
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
         """Score of each fastener with some of its stiffness left (n, k)."""
@@ -357,26 +354,11 @@ class UpdatingContext:
         return self._loosened_once(about, [run], left[None], (about, row, first, last))[0]
 
     def _loosened_once(
-        self, about: int, joints: Sequence[Loosened], left: np.ndarray, key: tuple[int, ...]
+        self, about: int, joints: Sequence[Loosened], left: np.ndarray, which: tuple[int, ...]
     ) -> np.ndarray:
-        """Scores (n, k) of joints that ``key`` names; several families try the same ones."""
-        known, key_too = self._loose, (key, left.tobytes())
-        if key_too not in known:
+        """Scores (n, k) of the joints ``which``; several families try the same ones."""
+        known, key = self._loose, (which, left.tobytes())
+        if key not in known:
             base, reduced = self.baselines[about], self.problem.reduced
-            known[key_too] = fastener_scores(base, reduced, self.data, joints, left)
-        return known[key_too]
-
-    def bending_scores(
-        self, about: int, sets: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
-
-        Several families try the same lines of shells.
-        """
-        base, model, known = self.baselines[about], self.problem.reduced.model, self._bent
-        keys = [(about, each.tobytes()) for each in sets]
-        fresh = {key: each for key, each in zip(keys, sets, strict=True) if key not in known}
-        slopes = bending_slopes(base, model, self.data, list(fresh.values()))
-        known |= zip(fresh, np.transpose(direction_scores(base, slopes)), strict=True)
-        amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
-        return amount, score
+            known[key] = fastener_scores(base, reduced, self.data, joints, left)
+        return known[key]

@@ -66,11 +66,19 @@ class Decision:
 
 
 def decide(case: Hypotheses) -> Decision:
-    """Return the decision."""
+    """Return the decision; too few data list the explanations near the best, with calibration."""
     decision = _decided(case)
     answer = _with_ties(case, decision)
     alone = case.contradicted and decision.named and len(answer.one_of) < 2
-    return answer if case.enough or alone else _too_few(case, decision)
+    if case.enough or alone:
+        return answer
+    gains = {ALONE: 0.0} | {h.name: case.gain(h) for h in decision.order}
+    least = max(gains.values()) - RULES.tied
+    one_of = tuple(name for name, gain in gains.items() if gain >= least)
+    return decision.then(
+        words.too_few(case, one_of),
+        verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,
+    )  # fmt: skip
 
 
 def _decided(case: Hypotheses) -> Decision:
@@ -228,17 +236,6 @@ def _alternatives_tested(case: Hypotheses, refused: Decision) -> Decision:
             why = Reason.DAMPING
         over = (*over, (one, why))
     return refused.then(passed_over=over)
-
-
-def _too_few(case: Hypotheses, decision: Decision) -> Decision:
-    """Name nothing; list the explanations within ``RULES.tied`` of the best, with calibration."""
-    gains = {ALONE: 0.0} | {h.name: case.gain(h) for h in decision.order}
-    least = max(gains.values()) - RULES.tied
-    one_of = tuple(name for name, gain in gains.items() if gain >= least)
-    return decision.then(
-        words.too_few(case, one_of),
-        verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,
-    )  # fmt: skip
 
 
 def _with_ties(case: Hypotheses, decision: Decision) -> Decision:

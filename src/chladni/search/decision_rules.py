@@ -5,9 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 TIED = 10.0  # in -2 ln evidence (odds of e^5): explanations within this gap are tied
-GOOD_PART = (
-    0.5  # of the required gain, which fitted responses must bring if held-out data add the rest
-)
+GOOD_PART = 0.5  # of the required gain, from fitted responses if held-out data add the rest
 
 
 def _rule(value: float, why: str) -> Any:

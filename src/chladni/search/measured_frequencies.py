@@ -27,7 +27,7 @@ def frequencies(
         sd = np.where(np.isnan(sd), 1e-3 * f, sd)
         note = "no FRF exists: natural frequencies were compared"
         return f, sd, np.ones(len(f)), None, () if question.shapes is not None else (note,)
-    band, use = band_of(question, frf), counted(frf, question.exclude)
+    band, use = band_of(question, frf), kept(frf.frequency, question.exclude)
     found = identify(frf, widened(frf, band), use=use, progress=progress)
     f, keep = found.frequency, _prominent(found, band)
     why = ["the gain is unknown"] * (not question.gain_known)
@@ -46,14 +46,14 @@ def frequencies(
 def listed(question: Question, above: float = 0.0) -> np.ndarray:
     """Positions of the given poles in the band and above a frequency [Hz], in increasing order."""
     f = np.asarray(question.frequency, float)
-    inside = (f >= question.band[0]) & (f <= question.band[1]) & _kept(f, question.exclude)
+    inside = (f >= question.band[0]) & (f <= question.band[1]) & kept(f, question.exclude)
     if not inside.any():
         raise FileError(
             f"none of the {len(f)} poles, {f.min():g} to {f.max():g} Hz, lies in the band "
             f"{question.band[0]:g}-{question.band[1]:g} Hz"
         )
-    kept = np.flatnonzero(inside & (f > above))
-    return kept[np.argsort(f[kept])]
+    found = np.flatnonzero(inside & (f > above))
+    return found[np.argsort(f[found])]
 
 
 LEAST_DELTA_CHI2 = 3.0  # least drop of χ² over the penalty of a pole for it to count as a mode
@@ -109,17 +109,12 @@ def widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
 
     The lower end moves by a fifth of itself at most, whatever the width of the band.
     """
-    width = 0.04 * (band[1] - band[0])
-    low = max(float(frf.frequency[0]), band[0] - min(width, 0.2 * band[0]))
-    return low, min(float(frf.frequency[-1]), band[1] + width)
+    (low, high), width = band, 0.04 * (band[1] - band[0])
+    low = max(float(frf.frequency[0]), low - min(width, 0.2 * low))
+    return low, min(float(frf.frequency[-1]), high + width)
 
 
-def counted(frf: FRF, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Lines of the recording outside the excluded intervals (n_f,) bool."""
-    return _kept(frf.frequency, exclude)
-
-
-def _kept(f: np.ndarray, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
+def kept(f: np.ndarray, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
     """Frequencies outside the excluded intervals (n,) bool."""
     use = np.ones(len(f), bool)
     for a, b in exclude:

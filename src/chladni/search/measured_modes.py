@@ -100,9 +100,9 @@ def frequency_rows(
         modes = test.near(model)
         at, value = _paired(prepared, model, modes, test, real)
         for k in np.flatnonzero(at >= 0):
-            mac = None if np.isnan(value[k]) else float(value[k])
             found: dict[str, Any] = {f"{name}_hz": float(modes.frequency[at[k]])}
-            rows[k] = replace(rows[k], **found, **{f"mac_{name}": mac})
+            found[f"mac_{name}"] = None if np.isnan(value[k]) else float(value[k])
+            rows[k] = replace(rows[k], **found)
     return tuple(rows)
 
 

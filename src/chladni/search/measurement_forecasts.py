@@ -217,20 +217,14 @@ def measurements(
                  for r, s in zip(rivals, states, strict=True)],
             )  # fmt: skip
     if "band" in kinds:
-        yield _wider_band(rivals)
+        top, ratio = float(data.s.imag.max()), data.s[-1].real / data.s[-1].imag
+        wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
+        hertz, cost = ABOVE * top / (2 * np.pi), COSTS["band"]
+        test = FurtherTest("band", f"lines up to {hertz:.4g} Hz", cost=cost, amount=hertz)
+        yield test, [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals]
     if "weighing" in kinds:
         what = f"a weighing to {1e3 * WEIGHED:.2g} g"
         yield FurtherTest("weighing", what, cost=COSTS["weighing"]), [r.weight() for r in rivals]
-
-
-def _wider_band(rivals: Sequence[Rival]) -> tuple[FurtherTest, Seen]:
-    """Lines above the highest one, up to ``ABOVE`` times it."""
-    data = rivals[0].data
-    top, ratio = float(data.s.imag.max()), data.s[-1].real / data.s[-1].imag
-    wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
-    hertz = ABOVE * top / (2 * np.pi)
-    found = FurtherTest("band", f"lines up to {hertz:.4g} Hz", cost=COSTS["band"], amount=hertz)
-    return found, [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals]
 
 
 def _placed(kind: str, what: str, places: ElementGrids, k: int, amount: float = 0.0) -> FurtherTest:

@@ -1,9 +1,7 @@
 """Measurements that would tell tied explanations apart, with the information expected of each.
 
-Every explanation predicts the data of a further measurement with its own unknowns: its parameters
-and errors of form, as the recording left them (linear about its fit).  Candidates are sensors at
-further grids, drives at further grids, a known mass put on at a grid, lines above the fitted band,
-and a weighing (:mod:`..inference.expected_information`).
+Candidates are sensors at further grids, drives at further grids, a known mass put on at a grid,
+lines above the fitted band, and a weighing (:mod:`..inference.expected_information`).
 """
 
 import zipfile

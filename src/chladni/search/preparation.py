@@ -40,8 +40,8 @@ from .base_effects import freed_by, measured_on, mesh_hidden, nuisances, setup_o
 from .held_out_data import HeldOutChoice, held_out_sensors, of_poles, upper_part
 from .measured_frequencies import (
     band_of,
-    counted,
     frequencies,
+    kept,
     listed,
     significant,
     suspended_below,
@@ -89,7 +89,7 @@ def _by_responses(
     held_band = question.held_band or upper_part(low, high)
     fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
-    use, f_max = counted(frf, question.exclude), reach[1]
+    use, f_max = kept(frf.frequency, question.exclude), reach[1]
     use = use if lines_used is None else use & lines_used
     found = identify(frf, widened(frf, reach), use=use, progress=within(progress, 0.0, 0.3))
     if question.held_band is None and not significant(found, low, fit_max).any():
@@ -122,13 +122,11 @@ def _by_responses(
     reduced = ready_for_responses(question, nominal, f_max)
     left_out = HeldOutChoice(held_out_sensors(question), held_band, (low, fit_max), reach)
     others, said = others_identified(question, reach, within(progress, 0.8, 1.0))
-    data, spreads = [], []
+    data = []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
-        s = 2 * np.pi * f * (zeta + 1j)
-        use = left_out.training(f)
+        s, use = 2 * np.pi * f * (zeta + 1j), left_out.training(f)
         H = equalised(found, s)
         noise, spread = sample_noise(found, frf, s), measured_spread(H, others, s)
-        spreads.append(spread)
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
@@ -145,7 +143,6 @@ def _by_responses(
         data = [d.only(left_out.training(f)) for d, f in zip(data, lines, strict=True)]
         problem = replace(problem, data=data[0])
     unseen, held = (left_out.samples(d) for d in data)
-    labels = question.outputs.labels
     firm = int((found.firm & (found.frequency >= low) & (found.frequency <= f_max)).sum())
     notes = [
         f"FRFs were compared: {firm} modes identified between {low:g} and {f_max:g} Hz, "
@@ -163,7 +160,7 @@ def _by_responses(
         )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
-    what, chosen_on = (left_out.in_words(labels, reporting) for reporting in (True, False))
+    what, chosen_on = (left_out.in_words(question.outputs.labels, r) for r in (True, False))
     if unseen.choosing.any():
         notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
     notes.append(_sensor_note(question))
@@ -173,10 +170,10 @@ def _by_responses(
     problem = replace(problem, damping=known, coupling=coupling, setup=setup)
     own = AtLevel(question.level, frf, found, question.control)
     studied = level_study([own, *levels(others)])
-    notes += [*said, *spread_note(spreads[1], data[1].use, others), *level_notes(studied)]
-    floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
-    if spreads[1] is not None:
-        floor = np.maximum(floor, spreads[1] ** 2)
+    notes += [*said, *spread_note(data[1], others), *level_notes(studied)]
+    floor = equalised_noise(found, frf, data[1].s, kept(frf.frequency, question.exclude))
+    if (spread := data[1].spread) is not None:
+        floor = np.maximum(floor, spread**2)
     supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
     size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
@@ -199,9 +196,7 @@ def equalised_lines(
 ) -> np.ndarray:
     """Lines three quarters of a half-bandwidth apart, f_{k+1} = f_k (1 + 0.75 ζ), gaps left out."""
     f = band[0] * np.exp(np.arange(0.0, np.log(band[1] / band[0]), 0.75 * zeta))
-    for a, b in exclude:
-        f = f[(f < a) | (f > b)]
-    return f
+    return f[kept(f, exclude)]
 
 
 def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: bool) -> Prepared:
@@ -242,7 +237,10 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     left_out = of_poles(held)
     n = int(left_out.reporting.sum())
     what = f"{n} of {len(held)} frequencies" if n else "nothing"
-    notes = (*notes, *_unscored(question), *_mass_note(question, problem), *suspension_note(above))
+    if question.others:
+        names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
+        notes = (*notes, f"not used, because natural frequencies are compared: {names}")
+    notes = (*notes, *_mass_note(question, problem), *suspension_note(above))
     few = _few(problem, len(frequency), 0 if shapes is None else shapes.values.shape[1] - 1)
     return Prepared(
         question, problem, data, left_out, left_out, what, notes, nominal, None, found, *few,
@@ -259,14 +257,6 @@ def _few(problem: UpdatingProblem, modes: int, channels: int) -> tuple[str, floa
     countable = isinstance(problem.data, Poles) or given < NUMBERS
     taken = effective_number(problem) if countable else TAKEN
     return too_little(modes, channels, taken), given - taken
-
-
-def _unscored(question: Question) -> list[str]:
-    """Sentence on other recordings that are not used, as natural frequencies alone are compared."""
-    if not question.others:
-        return []
-    names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
-    return [f"not used, because natural frequencies are compared: {names}"]
 
 
 def updating_problem(

@@ -36,12 +36,7 @@ class OtherRecording:
     article: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class OtherTest:
-    """A further recording with its identified modes."""
-
-    recording: OtherRecording
-    identified: Identified
+OtherTest = tuple[OtherRecording, Identified]  # a further recording with its modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +105,6 @@ class HeldOut:
 
     choosing: np.ndarray  # whose evidence supports or refuses a name
     reporting: np.ndarray  # on which the gain of a name is reported, and nothing is decided
-
-    @property
-    def whole(self) -> np.ndarray:
-        """All samples that are held out."""
-        return np.asarray(self.choosing | self.reporting)
 
 
 @dataclass(frozen=True, eq=False)

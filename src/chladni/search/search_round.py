@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import compress
 
 import numpy as np
 
@@ -39,10 +38,7 @@ def search_round(
 ) -> list[HypothesisFit]:  # fmt: skip
     """The best hypothesis of every family, best first.
 
-    Parameters
-    ----------
-    null : the best without any of them
-    least : gain in -2 ln evidence by rough fits, below which none is followed further
+    None is followed further if all gain less by rough fits than ``least``, in -2 ln evidence.
     """
     later = least is not None  # the bases of the first round are still there
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
@@ -78,11 +74,7 @@ def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[Hyp
     unless the flank of that resonance brings more than a hundredth of the gain. If the interval of
     the tuning merely includes such values, the simpler effect leads only if it is tied. Likewise a
     tied row with physically possible values leads one without (a sealant as stiff as steel).
-
-    Parameters
-    ----------
-    hypotheses : best first
-    null : -2 ln evidence without any of them
+    ``null`` is -2 ln evidence without any of them.
     """
     for k, row in enumerate(hypotheses[1:], 1):
         lead, known = hypotheses[0], hypotheses[0].remarks
@@ -197,11 +189,6 @@ def _leaders(
 
     The linear base may hide as much of one family as it hid of the leading ones. The most that a
     joint fit of these gained over its own optimum is the slack of all others.
-
-    Parameters
-    ----------
-    families : own optima of each, as :func:`_own_optima` gives them
-    least : gain in -2 ln evidence that a hypothesis must reach
     """
     first, ranked = FIRST if least is None else LATER, list[list[HypothesisFit]]()
     for optima in (each for each in families if each):
@@ -214,11 +201,13 @@ def _leaders(
         joint = _best(found[0])
         slack, worst = max(slack, own.neg2_log_evidence - joint), min(worst, joint + BEHIND)
         yield found
-    may = [own[0].neg2_log_evidence - slack < worst for own in ranked[first:]]
-    for chance, (own, *others) in zip(may, ranked[first:], strict=True):
-        if not chance:
-            left.append(own.knowing([t.own for t in others]))
-    yield from in_parallel(jointly, compress(ranked[first:], may))
+    may = list[list[HypothesisFit]]()
+    for each in ranked[first:]:
+        if each[0].neg2_log_evidence - slack < worst:
+            may.append(each)
+        else:
+            left.append(each[0].knowing([t.own for t in each[1:]]))
+    yield from in_parallel(jointly, may)
 
 
 def _jointly(

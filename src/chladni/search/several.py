@@ -81,13 +81,9 @@ def several(
 ) -> Search:  # fmt: skip
     """Sets of effects grown from the best one, where every member gains a good part of its price.
 
-    Sets that :attr:`Several.pay` can be named. The members of the others may be present too.
-
-    Parameters
-    ----------
-    singles : the best hypothesis of every family alone, best first; a set must be ahead of them
-    due : gain in -2 ln evidence that one effect needs to be named
-    unfit : whether the best of them does not fit
+    Sets that :attr:`Several.pay` can be named. The members of the others may be present too. A set
+    must be ahead of the best effect alone, which is first of ``singles``; ``unfit``: it does not
+    fit. One effect needs the gain ``due`` in -2 ln evidence to be named.
     """
     lead, *others = singles
     search = _begun_with(problem, lead, due, within(progress, 0.0, 0.4))
@@ -141,19 +137,16 @@ def _begun_with(
             break
         try:
             more, note = _grown(problem, current, price(due, size))
-            if more is None:
-                break
-            if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
+            if more is None or (best and _gain(best, _as_alone(problem, more.hypothesis)) < 0):
                 break
             found, paid = _revised(problem, more, current.effects, price(due, size))
         except ModelError as error:  # the fit reached an impossible structure
             note = f"the residual of {current.name} could not be searched: {error}"
             break
-        again = any(_same(problem, found.own, other.own) for other in known)
-        if again or {id(e) for e in found.own.effects} in seen:
+        current, members = found.own, {id(e) for e in found.own.effects}
+        if members in seen or any(_same(problem, current, other.own) for other in known):
             break
-        seen.append({id(e) for e in found.own.effects})
-        current = found.own
+        seen.append(members)
         out += [s for s in (paid, found) if s is not None and len(s.gains) > 1]
     return Search(tuple(out), note)
 
@@ -174,14 +167,18 @@ def _standing(
 ) -> tuple[UpdatingProblem, HypothesisFit]:
     """The problem with a hypothesis in its base and model errors from its state; its fit there."""
     held = problem.holding([(e, lead.fit.of(e)) for e in lead.effects])
-    model, x = held.reduced.model, np.concatenate([lead.fit.of(e) for e in held.base])
     if isinstance(lead.data, Responses) and lead.data.error is not None:
-        state = evaluate(model, held.base, x, False)
+        x = np.concatenate([lead.fit.of(e) for e in held.base])
+        state = evaluate(held.reduced.model, held.base, x, False)
         held = held.allowing_errors(state, lead.data.error.delta)
-    fit = fitted(model, held.base, held.data, held.mass_measurement, x)
-    found = tuple((e, fit.of(e)) for e, _ in held.found)
-    assert isinstance(fit.data, Responses)
-    return replace(held, found=found, data=fit.data), replace(lead, fit=fit, model=model)
+    null = _in_order(held, lead)
+    assert isinstance(null.data, Responses)
+    return replace(_moved(held, null), data=null.data), null
+
+
+def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
+    """The problem with its found effects at the values of a hypothesis."""
+    return replace(held, found=tuple((e, to.fit.of(e)) for e, _ in held.found))
 
 
 def _holding(
@@ -228,12 +225,8 @@ def _round(
     held: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], least: float
 ) -> list[HypothesisFit]:
     """A round of a search, less effects that moved onto a present effect of their own family."""
-    out = []
-    for t in search_round(held, null, tried, silent, least):
-        there = replace(held, found=tuple((e, t.fit.of(e)) for e, _ in held.found))
-        if not repeats(there, t.effect, t.fit.of(t.effect)):
-            out.append(t)
-    return out
+    hypotheses = search_round(held, null, tried, silent, least)
+    return [t for t in hypotheses if not repeats(_moved(held, t), t.effect, t.fit.of(t.effect))]
 
 
 def _revised(
@@ -254,22 +247,24 @@ def _revised(
 
 
 def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
-    """The set with one member replaced by the effect that explains most; it may be the same."""
+    """The set with one member replaced by an effect that is better, or simpler and tied."""
     lead = more.hypothesis
     rest = _without(problem, lead, member)
     held = _holding(problem, rest, rest.effects)
-    null = _in_order(held, rest)
+    null = _in_order(held, rest, ROUGH)
     itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("calibration", "nuisance")))
     found = _round(held, null, [itself, *candidates(held, null, FITTED)], 0.0)
     if not found:
         return more
-    best = found[0]
-    if not _preferred(best, lead, member):
-        known, others = {**more.without, id(member): rest}, [t for t in found if _other(t, member)]
-        return replace(more, alternatives={**more.alternatives, id(member): others}, without=known)
-    new = id(best.effect)
-    alternatives = {**more.alternatives, new: [t for t in found[1:] if _other(t, best.effect)]}
-    return replace(more, hypothesis=best, alternatives=alternatives, without={new: rest})
+    best, known = found[0], member.remarks(lead.fit.of(member))
+    simpler = known.becomes == best.effect.name or bool(known.implausible)
+    tied = simpler and best.effect.name != member.name and _gain(lead, best) > -TIED
+    kept = not (tied or _gain(lead, best) > BETTER)
+    member = member if kept else best.effect
+    others = {**more.alternatives, id(member): [t for t in found if _other(t, member)]}
+    if kept:
+        return replace(more, alternatives=others, without={**more.without, id(member): rest})
+    return replace(more, hypothesis=best, alternatives=others, without={id(member): rest})
 
 
 def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
@@ -277,19 +272,10 @@ def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
     return member.name not in (hypothesis.effect.name, hypothesis.remarks.becomes)
 
 
-def _preferred(best: HypothesisFit, lead: HypothesisFit, member: Effect) -> bool:
-    """True where another effect replaces a member: it is better, or simpler and tied."""
-    ahead, x = _gain(lead, best), lead.fit.of(member)
-    known = member.remarks(x)
-    simpler = known.becomes == best.effect.name or bool(known.implausible)
-    return ahead > BETTER or (simpler and best.effect.name != member.name and ahead > -TIED)
-
-
-def _in_order(held: UpdatingProblem, fit: HypothesisFit) -> HypothesisFit:
+def _in_order(held: UpdatingProblem, fit: HypothesisFit, steps: int = 30) -> HypothesisFit:
     """A fit of the base of a problem, repeated with its parameters in the order of that base."""
-    x = np.concatenate([fit.fit.of(e) for e in held.base])
-    model, data = held.reduced.model, held.data
-    again = fitted(model, held.base, data, held.mass_measurement, x, ROUGH)
+    x, model = np.concatenate([fit.fit.of(e) for e in held.base]), held.reduced.model
+    again = fitted(model, held.base, held.data, held.mass_measurement, x, steps)
     return replace(fit, fit=again, model=model)
 
 

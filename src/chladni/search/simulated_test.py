@@ -34,13 +34,7 @@ from .candidates import candidates
 from .diagnosis import without_effects
 from .measurement_forecasts import COSTS, WEIGHED, outlook
 from .next_measurement import FurtherTest, Outlook
-from .preparation import (
-    SOLVED,
-    ZETA,
-    equalised_lines,
-    ready_for_responses,
-    updating_problem,
-)
+from .preparation import SOLVED, ZETA, equalised_lines, ready_for_responses, updating_problem
 from .question import Question
 from .search_round import search_round
 

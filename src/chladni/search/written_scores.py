@@ -1,4 +1,4 @@
-"""Q of decks as written, without mesh error, scatter or gain errors.
+"""Q of states, and of decks as written: without mesh error, scatter or gain errors.
 
 The response of a structure at its sensors comes from Rayleigh-Ritz on its own modes and static
 responses.  The static loads are unit loads at sensors and shakers, as in the reduced model of a
@@ -26,22 +26,14 @@ from .question import Prepared, Question
 
 
 def written_Q(
-    prepared: Prepared,
-    model: Modelled,
-    sets: tuple[np.ndarray, ...],
-    real: np.ndarray | None = None,
-    fault: HypothesisFit | None = None,
-) -> tuple[float, ...]:
-    """Q of a structure on each of these sets of samples.
+    prepared: Prepared, model: Modelled, sets: tuple[np.ndarray, ...],
+    real: np.ndarray | None = None, fault: HypothesisFit | None = None,
+) -> tuple[float, ...]:  # fmt: skip
+    """Q of a structure on each of these sets of samples; ``real`` poles alone are modes.
 
-    Parameters
-    ----------
-    sets : of samples, in the shape of ``prepared.score.use``
-    real : (n,) bool       poles of the test that are modes
-    fault : the named effects; faults of channels among them are removed from the recording before
-        it is compared, and spinning parts are added to the structure
-
-    Where the gain is unknown, the mean level over the fitted samples is removed as well.
+    Faults of channels among the named effects, ``fault``, are removed from the recording before it
+    is compared, and spinning parts are added to the structure. Where the gain is unknown, the mean
+    level over the fitted samples is removed as well.
     """
     f_max, terms = prepared.problem.setup.f_max, list[Term]()
     if fault is not None:
@@ -127,3 +119,38 @@ def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None)
         variance = prepared.noise[use]
     Q = float(variance.mean()) if variance.size else np.inf
     return Q if Q < LN10**-2 else None
+
+
+def scores_of(
+    prepared: Prepared, winner: HypothesisFit, stages: Sequence[tuple[HypothesisFit, State]],
+    held: np.ndarray,
+) -> list[list[float]]:  # fmt: skip
+    """Q of some states, one list for the fitted data and one for the held-out data ``held``."""
+    real = real_poles(prepared, winner)
+    return [
+        [prepared.score.rebased(fit.model).Q(state, use, real) for fit, state in stages]
+        for use in (prepared.score.use, of_channels(prepared, winner, held))
+    ]
+
+
+def of_channels(prepared: Prepared, winner: HypothesisFit, held: np.ndarray) -> np.ndarray:
+    """Held-out samples; for a fault of one channel, those of that channel alone."""
+    if not winner.channels or held.ndim < 2:
+        return held
+    mine = np.isin(prepared.problem.labels, winner.channels)
+    own = held & mine
+    return own if own.any() else held
+
+
+def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
+    """Poles of the test that are modes (n,) bool: those listed, or with a partner in the winner."""
+    if not isinstance(prepared.score, Poles):
+        return None
+    data = prepared.score.rebased(winner.model)
+    if data.listed:
+        return np.ones(len(data.frequency), bool)
+    fitted = winner.fit.data
+    wide = Poles(**{**vars(data), "scale": max(3 * getattr(fitted, "scale", 0.01), 0.02)})
+    real = np.zeros(len(data.frequency), bool)
+    real[wide.pairs(winner.fit.state, np.ones(len(real), bool))[0]] = True
+    return real

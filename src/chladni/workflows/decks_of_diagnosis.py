@@ -20,7 +20,7 @@ from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..search.decision_rules import RULES, odds_of_something_else
-from ..search.diagnosis import Diagnosis
+from ..search.diagnosis import Diagnosis, assemblies
 from ..search.measured_modes import (
     MeasuredModes,
     frequency_error,
@@ -41,8 +41,7 @@ from ..search.result_parts import (
     remainder,
     values_kept,
 )
-from ..search.verdict_models import assemblies, of_channels, real_poles, scores_of
-from ..search.written_scores import noise_Q, written_Q
+from ..search.written_scores import noise_Q, of_channels, real_poles, scores_of, written_Q
 from .case_model import DAMPING, model_frf
 from .deck_comments import with_mended, with_remarks
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
@@ -58,7 +57,7 @@ def updated_models(
     """
     question = prepared.question
     nominal = as_it_is(question, prepared.nominal)
-    plain, named = assemblies(question, found)
+    plain, named = assemblies(question.assembly, found)
     calibrated, lost = _deck(case, question, nominal, plain)
     final = calibrated
     if named is not plain:
@@ -83,7 +82,7 @@ def on_preferred_mesh(
         return stages, result
     question, (plain, *named) = prepared.question, found.halved
     found = replace(found, plain=plain, written=named[0] if named else None)
-    before, after = assemblies(question, found)
+    before, after = assemblies(question.assembly, found)
 
     def deck(changed: Assembly) -> ChangedDeck:
         source = exported_deck(halved(changed), case.units)

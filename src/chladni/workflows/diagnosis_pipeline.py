@@ -106,11 +106,9 @@ def _searched(
     if diagnosing:
         found = compared(prepared.problem, stage)
         return Explained(case, prepared, found, screening, earlier=earlier)
-    made = calibration(prepared.problem, stage, settings)
-    articles = articles_together(prepared, made.diagnosis.null)
-    study = replace(made.study, articles=articles)
-    prepared = replace(prepared, problem=made.problem)
-    return Explained(case, prepared, made.diagnosis, screening, study)
+    problem, found, study = calibration(prepared.problem, stage, settings)
+    study = replace(study, articles=articles_together(prepared, found.null))
+    return Explained(case, replace(prepared, problem=problem), found, screening, study)
 
 
 def explained(
@@ -241,8 +239,8 @@ def _apply_held_out(
     if diagnosing:
         rivals = open_explanations(case, decision, found)
         ahead = outlook(prepared.problem, *rivals, allowed=prepared.question.further)
-    plain = refined(prepared, found.plain, written=True)
-    found = replace(found, plain=plain.hypothesis)
+    plain, note, doubts = refined(prepared, found.plain, written=True)
+    found = replace(found, plain=plain)
     if found.found is not None:
         return found, distrust, ahead
-    return replace(found, notes=(*found.notes, plain.note)), (*plain.distrust, *distrust), ahead
+    return replace(found, notes=(*found.notes, note)), (*doubts, *distrust), ahead
