@@ -12,20 +12,10 @@ from ..effects.effect_context import EffectContext, ElementGrids
 from ..effects.family import Family
 from ..effects.joints import Connection
 from ..effects.search_context import Candidate
+from ..inference import scan as scans
 from ..inference.hypothesis_fit import FAILED, HypothesisFit, UpdatingProblem
 from ..inference.likelihood import Responses
 from ..inference.pole_data import Poles
-from ..inference.scan import (
-    Baseline,
-    baseline,
-    bending_slopes,
-    direction_scores,
-    effect_slopes,
-    field_slopes,
-    oscillator_scores,
-    point_scores,
-    spin_scores,
-)
 from ..parallel import in_parallel
 from ..reduced.local_effect import LocalEffect
 from ..reduced.reduced_model import Reduced, evaluate
@@ -172,10 +162,12 @@ class UpdatingContext:
         return np.inf if self.scan is None else self.null_fit.neg2_log_evidence
 
     @cached_property
-    def baselines(self) -> tuple[Baseline, ...]:
+    def baselines(self) -> tuple[scans.Baseline, ...]:
         """The base effects linearised at each of ``bases``."""
         s, model = self.problem, self.problem.reduced.model
-        return tuple(baseline(model, s.base, s.data, s.mass_measurement, x) for x in self.bases)
+        return tuple(
+            scans.baseline(model, s.base, s.data, s.mass_measurement, x) for x in self.bases
+        )
 
     @property
     def weighs_more(self) -> float:
@@ -288,7 +280,7 @@ class UpdatingContext:
         data = self.data
         return data.deviation(self.null_fit.fit.state)[data.use.any(axis=1)]
 
-    def _at(self, about: int) -> tuple[Baseline, Reduced, Responses]:
+    def _at(self, about: int) -> tuple[scans.Baseline, Reduced, Responses]:
         """The state that is changed, the model and the data of a scan."""
         return self.baselines[about], self.problem.reduced.model, self.data
 
@@ -298,34 +290,34 @@ class UpdatingContext:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
         rest = self.flexibility if places is None else self.problem.reduced.flexibility(places)
         places = self.where.places if places is None else places
-        return point_scores(*self._at(about), places, matrix, strengths, rest)
+        return scans.point_scores(*self._at(about), places, matrix, strengths, rest)
 
     def oscillator_scores(
         self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz)."""
         rest = self.problem.reduced.flexibility(places)
-        return oscillator_scores(*self._at(about), places, mass, hertz, rest)
+        return scans.oscillator_scores(*self._at(about), places, mass, hertz, rest)
 
     def spin_scores(
         self, about: int, places: ElementGrids, sd: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best angular momentum of a spinning part at each place (k, 3), and the score (k,)."""
-        return spin_scores(*self._at(about), self.where.rotations(places.grids), sd)
+        return scans.spin_scores(*self._at(about), self.where.rotations(places.grids), sd)
 
     def field_scores(
         self, about: int, field: str, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
-        slopes = field_slopes(*self._at(about), field)
-        return direction_scores(self.baselines[about], slopes @ change)
+        slopes = scans.field_slopes(*self._at(about), field)
+        return scans.direction_scores(self.baselines[about], slopes @ change)
 
     def effect_scores(
         self, about: int, effect: Effect, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of an effect from its nominal values, and the score."""
-        slopes = effect_slopes(*self._at(about), effect)
-        return direction_scores(self.baselines[about], slopes @ change)
+        slopes = scans.effect_slopes(*self._at(about), effect)
+        return scans.direction_scores(self.baselines[about], slopes @ change)
 
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
@@ -336,8 +328,8 @@ class UpdatingContext:
         """
         keys, known = [(about, each.tobytes()) for each in sets], self._bent
         fresh = {key: each for key, each in zip(keys, sets, strict=True) if key not in known}
-        slopes = bending_slopes(*self._at(about), list(fresh.values()))
-        scores = direction_scores(self.baselines[about], slopes)
+        slopes = scans.bending_slopes(*self._at(about), list(fresh.values()))
+        scores = scans.direction_scores(self.baselines[about], slopes)
         known |= zip(fresh, np.transpose(scores), strict=True)
         amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
         return amount, score

@@ -1,4 +1,4 @@
-"""What the frequencies of a written deck show: parts to free, their damping, soft folds.
+"""Reading of the frequencies of a written deck: parts to free, their damping, soft folds.
 
 With the share s_pr of part p in the strain energy of mode r, d ln f_r = ½ Σ_p s_pr d ln K_p
 (Rayleigh).  Deviations e_r = ln(f_model / f_test) in proportion to the shares of a part vanish with

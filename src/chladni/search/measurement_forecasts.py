@@ -128,7 +128,7 @@ def outlook(
 ) -> Outlook | None:  # fmt: skip
     """Forecast every candidate measurement under each hypothesis; None without responses.
 
-    Of one hypothesis alone, its least known quantity is forecast.
+    One hypothesis alone has its least known quantity forecast.
     """
     if not hypotheses or not isinstance(problem.data, Responses):
         return None
