@@ -30,7 +30,7 @@ from ..inference.written_hypothesis import as_written
 from ..parallel import in_parallel
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
-from .diagnosis import Diagnosis, best_base_fit, without_effects
+from .diagnosis import Diagnosis, best_base_fit, restarted, without_effects
 from .posterior import (
     bands,
     gaussian_draws,
@@ -168,14 +168,11 @@ def _ends(
 
 def _restarted(problem: UpdatingProblem, null: HypothesisFit, ends: Sequence[Fit]) -> HypothesisFit:
     """The null, or the fit from the best start where that is better."""
-    best = min(ends, key=lambda f: f.neg2_log_evidence, default=null.fit)
+    best = min((null.fit, *ends), key=lambda f: f.neg2_log_evidence)
     if isinstance(null.data, Poles):
-        again = replace(null, fit=best)
-    elif best.neg2_log_evidence > null.fit.neg2_log_evidence - SAME:
-        return null
-    else:
-        again = best_base_fit(problem, problem.base, [best.x])
-    return min((null, again), key=lambda t: t.neg2_log_evidence)
+        return replace(null, fit=best)
+    better = best.neg2_log_evidence <= null.fit.neg2_log_evidence - SAME
+    return restarted(problem, null, [best.x] if better else [])
 
 
 def _end_of(problem: UpdatingProblem, null: HypothesisFit) -> Fit:
@@ -232,10 +229,8 @@ def profiles_of_the_best(
     """The profiles, and the null, fitted again from a place on them that lies below it."""
     for _ in range(LOWER):
         found, lower = profiles(problem, null)
-        if lower is None:
-            break
-        again = best_base_fit(problem, null.fit.effects, [lower])
-        if again.neg2_log_evidence >= null.neg2_log_evidence:
+        again = null if lower is None else restarted(problem, null, [lower])
+        if again is null:
             break
         null = again
     return found, null

@@ -21,7 +21,7 @@ import numpy as np
 from ..inference.hypothesis_fit import HypothesisFit
 from . import decision_in_words as words
 from .decision_in_words import BEYOND, Reason
-from .decision_rules import RULES, TIED, fits
+from .decision_rules import RULES, fits
 from .diagnosis import Diagnosis
 from .hypotheses import ALONE, Explanation, Hypotheses
 
@@ -264,7 +264,7 @@ def tied(best: Explanation, rows: Sequence[Explanation]) -> tuple[str, ...]:
         for r in rows
         if best.fit.effect.name not in (r.fit.remarks.becomes, r.fit.remarks.nearly)
     }
-    return tuple(n for n, b in behind.items() if b < TIED or n == best.fit.remarks.nearly)
+    return tuple(n for n, b in behind.items() if b < RULES.tied or n == best.fit.remarks.nearly)
 
 
 def _with_doubt(case: Hypotheses, decision: Decision) -> Decision:

@@ -130,7 +130,8 @@ def diagnose(problem: UpdatingProblem, progress: Progress = silent) -> Diagnosis
     give_back_freed_memory()
     hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
     notes = (*unasked(problem), *could_not_be_evaluated(tried, lost, hypotheses))
-    null = _restarted(problem, null, hypotheses)
+    starts = [taken(problem, lead, ("calibration", "nuisance")) for lead in hypotheses[:2]]
+    null = restarted(problem, null, starts)
     progress("verdict", 0.95)
     plain = as_written(null, problem.mass_measurement)
     finer = preferred_mesh(null, plain, problem.mass_measurement)
@@ -266,14 +267,13 @@ def _null_starts(problem: UpdatingProblem) -> list[np.ndarray]:
     return [mean] if np.array_equal(best, mean) else [mean, best]
 
 
-def _restarted(
-    problem: UpdatingProblem, null: HypothesisFit, hypotheses: list[HypothesisFit]
+def restarted(
+    problem: UpdatingProblem, null: HypothesisFit, starts: Sequence[np.ndarray]
 ) -> HypothesisFit:
-    """The null again, from the base parameters of the leaders: it must not lose by a bad start."""
+    """The null again, from where other fits ended: it must not lose by a bad start."""
     tries = [null]
-    for lead in hypotheses[:2]:
+    for start in starts:
         with suppress(ModelError):
-            start = taken(problem, lead, ("calibration", "nuisance"))
             tries.append(best_base_fit(problem, problem.base, [start]))
     return min(tries, key=lambda t: t.neg2_log_evidence)
 

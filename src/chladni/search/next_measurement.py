@@ -23,11 +23,11 @@ from ..inference.expected_information import (
 )
 from ..inference.result import NextMeasurement
 from ..results import ShownBriefly
-from .decision_rules import TIED
+from .decision_rules import RULES
 
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
-ODDS = float(round(np.exp(TIED / 2)))  # that settle: beyond them a diagnosis ties nothing
+ODDS = float(round(np.exp(RULES.tied / 2)))  # that settle: beyond them a diagnosis ties nothing
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ..inference.result import (
     Remainder,
     Scores,
 )
-from .decision_rules import RULES, TIED
+from .decision_rules import RULES
 from .diagnosis import Diagnosis
 from .question import Prepared
 from .written_scores import real_poles
@@ -159,7 +159,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
     if hypothesis.effect.name in diagnosis.one_of:
         return (
             f"these data do not distinguish it from {best.name}: 2 ln B = {2 * gap:.1f}, and "
-            f"{TIED:.0f} are required to separate two explanations"
+            f"{RULES.tied:.0f} are required to separate two explanations"
         )
     return (
         f"{evidence_in_words(gap)} for {best.name} compared with it; its weighted sum of squares "
@@ -293,7 +293,7 @@ def _meaning(diagnosis: Diagnosis, far: bool) -> str:
     if diagnosis.unexplained:
         return "no effect tried accounts for it, nor do mesh error and scatter in the parts"
     lead = diagnosis.hypotheses[0]
-    if diagnosis.two_log_bayes_factor(lead) > TIED:
+    if diagnosis.two_log_bayes_factor(lead) > RULES.tied:
         return f"{lead.effect.name} accounts for more of it than mesh error and scatter"
     return "no effect tried accounts for more of it than mesh error and scatter within the parts"
 

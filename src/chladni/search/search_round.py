@@ -22,7 +22,7 @@ from ..progress import Progress
 from ..reduced.reduced_model import Reduced
 from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
-from .decision_rules import TIED
+from .decision_rules import RULES
 
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 FIRST = 5  # families that are fitted jointly, whatever they promise; ``LATER`` in later rounds
@@ -81,8 +81,8 @@ def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[Hyp
         behind = row.neg2_log_evidence - lead.neg2_log_evidence
         foot = FOOT * (null - lead.neg2_log_evidence)
         sounder = bool(known.implausible) and not row.remarks.implausible
-        near = behind < TIED and (sounder or row.name == known.nearly)
-        if near or (row.name == known.becomes and behind < max(TIED, foot)):
+        near = behind < RULES.tied and (sounder or row.name == known.nearly)
+        if near or (row.name == known.becomes and behind < max(RULES.tied, foot)):
             return [row, *hypotheses[:k], *hypotheses[k + 1 :]]
     return list(hypotheses)
 
@@ -94,7 +94,7 @@ def _best(hypotheses: Sequence[HypothesisFit], none: float = np.inf) -> float:
 
 def _in_the_running(hypotheses: Sequence[HypothesisFit]) -> int:
     """How many are one answer with the best of them by rough fits."""
-    return sum(t.neg2_log_evidence < _best(hypotheses) + TIED for t in hypotheses)
+    return sum(t.neg2_log_evidence < _best(hypotheses) + RULES.tied for t in hypotheses)
 
 
 @dataclass(frozen=True, eq=False)

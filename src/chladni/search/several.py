@@ -28,7 +28,7 @@ from ..inference.map_fit import unknowns
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import Reduced, evaluate
 from .candidates import candidates, repeats
-from .decision_rules import GOOD_PART, TIED
+from .decision_rules import RULES
 from .search_round import search_round, taken
 
 MOST_EFFECTS = 3  # effects in one answer
@@ -98,7 +98,7 @@ def several(
             pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
             search = replace(search, sets=(*search.sets, *pairs))
     sets = (replace(s, ahead=_gain(lead, s.hypothesis)) for s in search.sets)
-    return replace(search, sets=tuple(s for s in sets if s.ahead > GOOD_PART * s.due))
+    return replace(search, sets=tuple(s for s in sets if s.ahead > RULES.good_part * s.due))
 
 
 def _gain(without: HypothesisFit, hypothesis: HypothesisFit) -> float:
@@ -214,7 +214,7 @@ def _grown(
         f"with {current.name} in place the best further effect, {found[0].effect.name}, gains "
         f"{gain:.1f} in -2 ln evidence; {due:.0f} are required"
     )
-    if gain <= GOOD_PART * due:
+    if gain <= RULES.good_part * due:
         return None, note
     newest = id(found[0].effect)
     others = [t for t in found[1:] if _other(t, found[0].effect)]
@@ -238,7 +238,7 @@ def _revised(
     """
     for member in members:
         more = _sought_anew(problem, more, member)
-    found = _paying(problem, more, due, GOOD_PART)
+    found = _paying(problem, more, due, RULES.good_part)
     if found.pay or len(found.gains) < 2:
         return found, None
     known = {id(e): t for e, t in zip(found.own.effects, found.without, strict=True)}
@@ -258,7 +258,7 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
         return more
     best, known = found[0], member.remarks(lead.fit.of(member))
     simpler = known.becomes == best.effect.name or bool(known.implausible)
-    tied = simpler and best.effect.name != member.name and _gain(lead, best) > -TIED
+    tied = simpler and best.effect.name != member.name and _gain(lead, best) > -RULES.tied
     kept = not (tied or _gain(lead, best) > BETTER)
     member = member if kept else best.effect
     others = {**more.alternatives, id(member): [t for t in found if _other(t, member)]}
@@ -325,7 +325,7 @@ def _close(
     alternatives: Sequence[HypothesisFit], lead: HypothesisFit
 ) -> tuple[AlternativeRow, ...]:
     """Other families that explain as much as a member in its place."""
-    close = (t for t in alternatives if _gain(t, lead) < TIED)
+    close = (t for t in alternatives if _gain(t, lead) < RULES.tied)
     return tuple(
         AlternativeRow(t.effect.name, _gain(t, lead), t.remarks.implausible) for t in close
     )

@@ -36,7 +36,7 @@ def refuse_silent(model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs) 
         what, own, other, said = "sensor", sensors, inputs, "with no drive"
     else:
         return
-    at = sides[what].only(own)
+    at = sides[what].only(np.asarray(own))
     said = f"move{'s' * (len(at.labels) == 1)} {said}"
     ways = [axis for axis, n in AXES if not _silent(model, _along(at, n), other).all()]
     theirs: list[str] = []
