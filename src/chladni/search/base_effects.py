@@ -1,7 +1,5 @@
 """Base effects of every fit: calibration parameters, freed by the user or by default; nuisances."""
 
-import scipy.sparse as sp
-
 from ..effects.calibration_parameters import defaults, random_field
 from ..effects.effect import Effect
 from ..effects.effect_context import EffectContext, Setup
@@ -17,7 +15,6 @@ from ..effects.user_parameters import (
 )
 from ..effects.weld_patch import PATCHES, weld_patch
 from ..errors import FileError
-from ..fem.assemble import Structure
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled
 from ..model.free_parameter import FreeParameter
@@ -71,15 +68,6 @@ def _freed(question: Question, reduced: ReducedProblem, p: FreeParameter) -> Eff
             "sensor-mass sensors on the structure, shaker-restraint one to three drive points"
         )
     return freed_effect(found[0], p.name)
-
-
-def measured_on(question: Question) -> Places:
-    """Rows of outputs and inputs on any mesh of the structure."""
-
-    def rows(built: Structure) -> sp.csr_array:
-        return sp.csr_array(sp.vstack([question.outputs.rows(built), question.inputs.rows(built)]))
-
-    return rows
 
 
 def mesh_hidden(model: Modelled, f_max: float, measured: Places | None = None) -> list[MeshError]:

@@ -14,7 +14,7 @@ from ..inference.map_fit import fit
 from ..inference.pole_data import Poles
 from ..reduced.accuracy import LIMIT, Accuracy, accuracy
 from ..reduced.reduced_problem import reduced_problem
-from .base_effects import measured_on, mesh_hidden, nuisances
+from .base_effects import mesh_hidden, nuisances
 from .preparation import SOLVED, updating_problem
 from .question import Prepared, Question
 
@@ -97,7 +97,7 @@ def _on_new_structure(
     model = modelled(changed.searched(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     seen = rows or (isinstance(data, Poles) and data.shapes is not None)
-    mesh = mesh_hidden(model, f_max, measured_on(changed) if seen else None)
+    mesh = mesh_hidden(model, f_max, changed.rows if seen else None)
     reduced = reduced_problem(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,

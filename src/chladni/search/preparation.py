@@ -36,7 +36,7 @@ from ..progress import Progress, silent, within
 from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
 from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
-from .base_effects import freed_by, measured_on, mesh_hidden, nuisances, setup_of
+from .base_effects import freed_by, mesh_hidden, nuisances, setup_of
 from .held_out_data import HeldOutChoice, held_out_sensors, of_poles, upper_part
 from .measured_frequencies import (
     band_of,
@@ -117,7 +117,7 @@ def _by_responses(
     test = question.outputs, question.inputs, built, question.accuracy
     wrong = sensor_errors(*test)
     progress("the error of its mesh", 0.5)
-    mesh = mesh_hidden(nominal, f_max, measured_on(question)) if fitted else []
+    mesh = mesh_hidden(nominal, f_max, question.rows) if fitted else []
     progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
     left_out = HeldOutChoice(held_out_sensors(question), held_band, (low, fit_max), reach)
@@ -214,7 +214,7 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
         damping = None if question.damping is None else question.damping[at]
         shapes, said = shape_data(question, at, nominal)
         notes = (*notes, *said)
-    seen = None if shapes is None else measured_on(question)
+    seen = None if shapes is None else question.rows
     mesh = mesh_hidden(nominal, f_max, seen) if fitted else []
     reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
     reduced = carrying(reduced, freed_by(question, reduced))
@@ -276,7 +276,7 @@ def updating_problem(
 def ready_for_responses(question: Question, nominal: Modelled, f_max: float) -> ReducedProblem:
     """The reduced problem over a basis for measured dofs, free parameters and all joints."""
     built = nominal.structure
-    reduced = reduced_problem(nominal, f_max, measured_on(question)(built), base=question.base)
+    reduced = reduced_problem(nominal, f_max, question.rows(built), base=question.base)
     return carrying(reduced, [*freed_by(question, reduced), *joint_nuisances(built)])
 
 

@@ -81,6 +81,10 @@ class Question:
         """The tested article with springs in its rigid ties, stiff enough to act as rigid."""
         return on_firm_springs(self.tested(assembly))
 
+    def rows(self, built: Structure) -> sp.csr_array:
+        """Rows of outputs and inputs on any mesh of the structure."""
+        return sp.csr_array(sp.vstack([self.outputs.rows(built), self.inputs.rows(built)]))
+
     @property
     def base(self) -> np.ndarray | None:
         """Directions (k, 3) in which the supports were moved; None where forces were applied."""

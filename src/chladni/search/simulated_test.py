@@ -10,7 +10,6 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..effects.effect import Effect
 from ..effects.family import Article
@@ -29,7 +28,7 @@ from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
-from .base_effects import measured_on, mesh_hidden, nuisances
+from .base_effects import mesh_hidden, nuisances
 from .candidates import candidates
 from .diagnosis import without_effects
 from .measurement_forecasts import COSTS, WEIGHED, outlook
@@ -50,7 +49,7 @@ def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
     built = nominal.structure
     rows = question.outputs.rows(built), question.inputs.rows(built)
     test = question.outputs, question.inputs, built, question.accuracy
-    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    mesh = mesh_hidden(nominal, f_max, question.rows)
     reduced = ready_for_responses(question, nominal, f_max)
     f = equalised_lines((low, f_max), question.exclude, ZETA)
     s = 2 * np.pi * f * (ZETA + 1j)
@@ -194,7 +193,7 @@ def recorded(
     f_max = problem.reduced.f_max
     solved = modelled(question.searched(article.assembly), SOLVED * f_max)
     rows = question.outputs.rows(solved.structure), question.inputs.rows(solved.structure)
-    reduced = reduced_problem(solved, f_max, sp.csr_array(sp.vstack(rows)))
+    reduced = reduced_problem(solved, f_max, question.rows(solved.structure))
     data = problem.data
     assert isinstance(data, Responses)
     own = replace(data, outputs=rows[0], inputs=rows[1], sensors=None).rebased(reduced.model)
