@@ -192,36 +192,34 @@ def measurements(
     few = places.only(places.spread(MASSES))
     lines = data.s[np.unique(np.linspace(0, len(data.s) - 1, LINES).astype(int))]
     if "sensor" in kinds and allowed is not None and allowed.fixed.labels:
-        fixed, structure = allowed.fixed, problem.reduced.structure
-        sensors = [_new(r, rivals[0], lines, fixed.rows(structure), data.inputs) for r in rivals]
+        fixed = allowed.fixed
+        sensors = _new(rivals, lines, fixed.rows(problem.reduced.structure), data.inputs)
         for k, label in enumerate(fixed.labels):
             test = _at("sensor", f"a sensor at {label}", label, fixed.points[k])
             yield replace(test, fixed=True), [each.alone(2, k) for each in sensors]
     if "sensor" in kinds:
-        sensors = [_new(r, rivals[0], lines, places.rows, data.inputs) for r in rivals]
+        sensors = _new(rivals, lines, places.rows, data.inputs)
         for k in range(len(places)):
             test = _placed("sensor", "a sensor at", places, k)
             test = replace(test, cost=test.cost * price.get(int(places.grids[k]), 1.0))
             yield test, [each.alone(2, k) for each in sensors]
     if "drive" in kinds and not np.any(data.direct):
-        drives = [_new(r, rivals[0], lines[::FEW], data.outputs, few.rows) for r in rivals]
+        drives = _new(rivals, lines[::FEW], data.outputs, few.rows)
         for k in range(len(few)):
             yield _placed("drive", "a drive at", few, k), [each.alone(3, k) for each in drives]
     heavy = SHARE * problem.setup.weight
     for k in range(len(few) if "mass" in kinds else 0):
-        states = [r.with_mass(few, k, heavy) for r in rivals]
-        if None not in states:
-            yield (
-                _placed("mass", f"{1e3 * heavy:.3g} g put on at", few, k, heavy),
-                [_new(r, rivals[0], lines[::FEW], data.outputs, data.inputs, s, states[0]).seen
-                 for r, s in zip(rivals, states, strict=True)],
-            )  # fmt: skip
+        states = [s for r in rivals if (s := r.with_mass(few, k, heavy)) is not None]
+        if len(states) == len(rivals):
+            test = _placed("mass", f"{1e3 * heavy:.3g} g put on at", few, k, heavy)
+            loaded = _new(rivals, lines[::FEW], data.outputs, data.inputs, states)
+            yield test, [each.seen for each in loaded]
     if "band" in kinds:
         top, ratio = float(data.s.imag.max()), data.s[-1].real / data.s[-1].imag
         wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
         hertz, cost = ABOVE * top / (2 * np.pi), COSTS["band"]
         test = FurtherTest("band", f"lines up to {hertz:.4g} Hz", cost=cost, amount=hertz)
-        yield test, [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals]
+        yield test, [each.seen for each in _new(rivals, wider, data.outputs, data.inputs)]
     if "weighing" in kinds:
         what = f"a weighing to {1e3 * WEIGHED:.2g} g"
         yield FurtherTest("weighing", what, cost=COSTS["weighing"]), [r.weight() for r in rivals]
@@ -263,20 +261,21 @@ class NewChannels:
 
 
 def _new(
-    rival: Rival, first: Rival, lines: np.ndarray, outputs: Any, inputs: Any,
-    state: State | None = None, about: State | None = None,
-) -> NewChannels:  # fmt: skip
-    """Responses on some lines under a rival, compared with those of the first rival."""
-    given = _responses(first, lines, outputs, inputs)
-    about = elsewhere(first.state if about is None else about)
+    rivals: Sequence[Rival], lines: np.ndarray, outputs: Any, inputs: Any,
+    states: Sequence[State] | None = None,
+) -> list[NewChannels]:  # fmt: skip
+    """Responses on some lines under each rival in a state, compared with those of the first."""
+    states, out = [r.state for r in rivals] if states is None else states, []
+    given, about = _responses(rivals[0], lines, outputs, inputs), elsewhere(states[0])
     values = given.model(about)
     given = replace(given, values=values, level=np.abs(values).max(axis=0))
-    given = replace(given, bent=curvature(given, about))
-    rows = replace(given, a=rival.model.rows(outputs, keep=False),
-                   b=rival.model.rows(inputs, keep=False))  # fmt: skip
-    mean, F = rival.predicted(rows, elsewhere(rival.state if state is None else state))
-    shape = (2, *values.shape)
-    return NewChannels(mean.reshape(shape), F.reshape(*shape, -1), GAIN / LN10 / given.std())
+    given, shape = replace(given, bent=curvature(given, about)), (2, *values.shape)
+    gain = GAIN / LN10 / given.std()
+    for rival, state in zip(rivals, states, strict=True):
+        a, b = (rival.model.rows(at, keep=False) for at in (outputs, inputs))
+        mean, F = rival.predicted(replace(given, a=a, b=b), elsewhere(state))
+        out.append(NewChannels(mean.reshape(shape), F.reshape(*shape, -1), gain))
+    return out
 
 
 def elsewhere(state: State) -> State:
