@@ -137,5 +137,5 @@ def _answer(prepared):
     case = Hypotheses(prepared, found)
     decision = decide(case)
     said = concluded(case, decision)[0]
-    decks = [(h, h.fit.state) for h in (said.plain, said.as_deck or said.plain)]
-    return found.null, decision, scores_of(prepared, decks[-1][0], decks, prepared.held.reporting)
+    decks = said.plain, said.as_deck or said.plain
+    return found.null, decision, scores_of(prepared, decks[-1], decks, prepared.held.reporting)

@@ -111,8 +111,7 @@ class Explanation:
         Both have the mesh that the data prefer: an effect may be smaller than the error of a mesh.
         """
         prepared, decks = self.case.prepared, self.halved or (self.case.found.plain, self.written)
-        stages = [(deck, deck.fit.state) for deck in decks]
-        scores = scores_of(prepared, self.fit, stages, prepared.held.choosing)
+        scores = scores_of(prepared, self.fit, decks, prepared.held.choosing)
         return tuple((calibrated, own) for calibrated, own in scores)
 
     @property

@@ -122,13 +122,12 @@ def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None)
 
 
 def scores_of(
-    prepared: Prepared, winner: HypothesisFit, stages: Sequence[tuple[HypothesisFit, State]],
-    held: np.ndarray,
-) -> list[list[float]]:  # fmt: skip
-    """Q of some states, one list for the fitted data and one for the held-out data ``held``."""
+    prepared: Prepared, winner: HypothesisFit, fits: Sequence[HypothesisFit], held: np.ndarray
+) -> list[list[float]]:
+    """Q of some fits, one list for the fitted data and one for the held-out data ``held``."""
     real = real_poles(prepared, winner)
     return [
-        [prepared.score.rebased(fit.model).Q(state, use, real) for fit, state in stages]
+        [prepared.score.rebased(one.model).Q(one.fit.state, use, real) for one in fits]
         for use in (prepared.score.use, of_channels(prepared, winner, held))
     ]
 
@@ -137,8 +136,7 @@ def of_channels(prepared: Prepared, winner: HypothesisFit, held: np.ndarray) -> 
     """Held-out samples; for a fault of one channel, those of that channel alone."""
     if not winner.channels or held.ndim < 2:
         return held
-    mine = np.isin(prepared.problem.labels, winner.channels)
-    own = held & mine
+    own = held & np.isin(prepared.problem.labels, winner.channels)
     return own if own.any() else held
 
 
@@ -149,8 +147,7 @@ def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
     data = prepared.score.rebased(winner.model)
     if data.listed:
         return np.ones(len(data.frequency), bool)
-    fitted = winner.fit.data
-    wide = Poles(**{**vars(data), "scale": max(3 * getattr(fitted, "scale", 0.01), 0.02)})
+    wide = replace(data, scale=max(3 * getattr(winner.fit.data, "scale", 0.01), 0.02))
     real = np.zeros(len(data.frequency), bool)
     real[wide.pairs(winner.fit.state, np.ones(len(real), bool))[0]] = True
     return real

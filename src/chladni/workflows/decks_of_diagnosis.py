@@ -246,7 +246,7 @@ def _scores(
         final = calibrated = written_Q(prepared, stages.calibrated.model, sets, real)
     if named is not None or stages.final is not stages.calibrated:
         final = written_Q(prepared, stages.final.model, sets, real, named)
-    known = scores_of(prepared, winner, [(winner, winner.fit.state)], prepared.held.reporting)
+    known = scores_of(prepared, winner, [winner], prepared.held.reporting)
     first, second = (
         (*decks, noise_Q(prepared, use, real), *nuisances)
         for *decks, use, nuisances in zip(nominal, calibrated, final, sets, known, strict=True)
