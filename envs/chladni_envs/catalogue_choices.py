@@ -12,7 +12,8 @@ from chladni.inference.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.inference.likelihood import Responses
 from chladni.reduced.reduced_model import evaluate
 from chladni.search.candidates import candidates
-from chladni.search.diagnosis import threshold, without_effects
+from chladni.search.decision_rules import required_gain
+from chladni.search.diagnosis import without_effects
 from chladni.search.question import Prepared
 from chladni.search.search_round import taken
 from chladni.search.several import price
@@ -88,7 +89,8 @@ class CatalogueChoices:
 
     def beyond_price(self, hypothesis: HypothesisFit) -> float:
         """Gain of a hypothesis over the null, less the price of each of its effects."""
-        due = threshold(self.null.data, len({c.effect.name for c in self.candidates}))
+        poles = not isinstance(self.null.data, Responses)
+        due = required_gain(poles, len({c.effect.name for c in self.candidates}))
         prices = sum(price(due, size) for size in range(1, len(hypothesis.effects) + 1))
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence - prices
 

@@ -116,7 +116,7 @@ def outlooks(
     tests = before_any_test(source, effects, sensors, further=further, **words).open
     if not tests:
         raise ShapeError("the planned test leaves nothing open; give fewer sensors")
-    return with_common_candidates([t.outlook for t in tests])
+    return with_common_candidates([t.forecasts() for t in tests])
 
 
 class Recorded:

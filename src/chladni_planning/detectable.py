@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.effects.registry import families
 from chladni.inference.likelihood import Responses
 from chladni.inference.residual_localisation import bumps
 from chladni.inference.scan import baseline, field_slopes, point_scores
 from chladni.reduced.reduced_model import evaluate
-from chladni.search.diagnosis import threshold
+from chladni.search.decision_rules import required_gain
 from chladni.search.question import Question
 from chladni.search.simulated_test import NOISE, unmeasured
 
@@ -63,7 +64,7 @@ def detectable(question: Question, noise: float = NOISE) -> Detectable:
     data = data.allowing_errors(evaluate(reduced.model, problem.base, x))
     base = baseline(reduced.model, problem.base, data, problem.mass_measurement, x)
     places, weight = problem.where.places, problem.setup.weight
-    due = threshold(data) + 2 * float(np.log(len(places)))
+    due = required_gain(False, len(families())) + 2 * float(np.log(len(places)))
     score = point_scores(
         base, reduced.model, data, places, "M", weight * MASSES, reduced.flexibility(places)
     )

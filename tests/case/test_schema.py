@@ -256,7 +256,11 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
     tried = [family.name for family in problem.families]
     known = (problem.mass_measurement, problem.setup.hangers, problem.setup.sensors, tried)
     mark.update(repr(known).encode())
-    mark.update(repr((ready.held.whole.tolist(), ready.what, ready.notes)).encode())
+    mark.update(
+        repr(
+            ((ready.held.choosing | ready.held.reporting).tolist(), ready.what, ready.notes)
+        ).encode()
+    )
     mark.update(repr([case.said(c) for c in COMMANDS]).encode())
     rules = with_places_of(case, PlanSettings()).rules(case.assembly, surface(case.assembly))
     for array in (rules.allowed, rules.cost, rules.fixed.grids, rules.fixed.directions):

@@ -22,7 +22,7 @@ from chladni.model.assembly import picked
 from chladni.model.free_parameter import FreeParameter
 from chladni.reduced.accuracy import products
 from chladni.reduced.reduced_problem import reduced_problem
-from chladni.search.freed_parameters import freed_by
+from chladni.search.base_effects import freed_by
 from chladni.search.question import Question
 
 T, AWAY = 1.2, 6.5  # [mm] of the sheet, and of the stiffener from its middle
@@ -131,7 +131,7 @@ def test_a_fit_has_it_by_default(model):
     reduced = reduced_problem(model.assembly, 200.0, groups=2)
     nowhere = MeasuredDofs.__new__(MeasuredDofs)
     question = Question(model.assembly, nowhere, nowhere)
-    assert freed_by(question, reduced, 200.0)[-1].text == "offset of PBAR 2"
+    assert freed_by(question, reduced)[-1].text == "offset of PBAR 2"
     own = FreeParameter("e", "offset", positions=(model.assembly.part(2),))
-    (freed,) = freed_by(replace(question, parameters=(own,)), reduced, 200.0)
+    (freed,) = freed_by(replace(question, parameters=(own,)), reduced)
     assert freed.parameters[0].sd == pytest.approx(T / 2 / AWAY)

@@ -23,8 +23,8 @@ from chladni.model.assembly import Assembly
 from chladni.reduced.real_modes import flexible
 from chladni.reduced.reduced_model import Reduced, evaluate
 from chladni.reduced.reduced_problem import ReducedProblem, reduced_problem
+from chladni.search.base_effects import mesh_hidden, nuisances
 from chladni.search.fastener_scan import loosened_rows, singles
-from chladni.search.nuisances import mesh_hidden, nuisances
 from chladni.search.preparation import carrying
 from chladni_specimens import (
     TailgateDesign,

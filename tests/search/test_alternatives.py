@@ -11,10 +11,11 @@ from chladni.effects.joint_stiffness import ModelFamily
 from chladni.effects.masses import LocalResonator
 from chladni.effects.registry import families
 from chladni.inference.adequacy import FitTest
-from chladni.search.decision_rules import TIED
+from chladni.search.decision_rules import RULES
 from chladni.search.diagnosis import Diagnosis
 from chladni.search.result_parts import laid_on_sheets, remainder, why_not
 
+TIED = RULES.tied
 ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
 
 

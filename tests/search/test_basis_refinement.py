@@ -25,9 +25,9 @@ def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effec
     remade = SimpleNamespace(structure="remade")
     monkeypatch.setattr(basis_refinement, "_accuracy", lambda problem, hypothesis: found)
     monkeypatch.setattr(basis_refinement, "_on_new_structure", lambda *given: (None, remade))
-    prepared = SimpleNamespace(problem=SimpleNamespace())
+    prepared = SimpleNamespace(question=None, problem=SimpleNamespace())
     begun = SimpleNamespace(effects=(Effect(), effect), structure="deck")
-    assert basis_refinement.refined(None, prepared, begun).hypothesis.structure == structure
+    assert basis_refinement.refined(prepared, begun)[0].structure == structure
 
 
 PREPARED = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
@@ -58,10 +58,10 @@ def errors(monkeypatch):
 def test_is_fitted_again_only_beyond_the_limit(errors, error, model):
     """0.05 % is the limit: under it the hypothesis stays, above it a wider basis carries it."""
     errors(error, error, error, error)
-    done = basis_refinement.refined(None, PREPARED, NARROW)
-    assert done.hypothesis.model == model
-    assert f"{100 * error:.2f} %" in done.note
-    assert bool(done.distrust) == (model == "wide")
+    done, note, distrust = basis_refinement.refined(PREPARED, NARROW)
+    assert done.model == model
+    assert f"{100 * error:.2f} %" in note
+    assert bool(distrust) == (model == "wide")
 
 
 @pytest.mark.parametrize("written", [True, False])
@@ -69,17 +69,17 @@ def test_the_form_of_a_deck_keeps_the_learned_error(errors, monkeypatch, written
     """It is fitted as it was written; any other form learns the error of the model again."""
     fits, kept = errors(2e-3, 2e-4), []
     monkeypatch.setattr(basis_refinement, "fit", lambda *given: kept.append(given) or FIT)
-    basis_refinement.refined(None, PREPARED, NARROW, written)
+    basis_refinement.refined(PREPARED, NARROW, written)
     assert (len(kept), len(fits)) == ((1, 0) if written else (0, 1))
 
 
 def test_is_widened_until_it_serves(errors):
     """Two times too narrow, then wide enough: fitted twice, and trusted."""
     fits = errors(2e-2, 2e-3, 2e-4)
-    done = basis_refinement.refined(None, PREPARED, NARROW)
+    _, note, distrust = basis_refinement.refined(PREPARED, NARROW)
     assert len(fits) == 2
-    assert done.worst == 2e-4
-    assert done.distrust == ()
+    assert "at most 0.02 %" in note
+    assert distrust == ()
 
 
 def test_a_basis_that_bears_the_fit_no_longer_is_said_and_not_trusted(errors, monkeypatch):
@@ -90,7 +90,7 @@ def test_a_basis_that_bears_the_fit_no_longer_is_said_and_not_trusted(errors, mo
         raise ModelError("an effect left negative stiffness")
 
     monkeypatch.setattr(basis_refinement, "fitted", refuse)
-    done = basis_refinement.refined(None, PREPARED, NARROW)
-    assert done.hypothesis.model == "narrow"
-    assert "negative stiffness" in done.note
-    assert done.distrust
+    done, note, distrust = basis_refinement.refined(PREPARED, NARROW)
+    assert done.model == "narrow"
+    assert "negative stiffness" in note
+    assert distrust

@@ -29,7 +29,7 @@ def test_each_set_is_scored_once_about_each_base(context, reduced, responses, mo
         asked.extend(sets)
         return bending_slopes(base, model, data, sets)
 
-    monkeypatch.setattr(candidates, "bending_slopes", counted)
+    monkeypatch.setattr(candidates.scans, "bending_slopes", counted)
     sets = [np.array([3, 4, 5]), np.array([10, 11]), np.array([20, 21])]
     for about, base in enumerate(context.baselines):
         due = direction_scores(base, bending_slopes(base, reduced.model, responses, sets))

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from chladni.effects.identified_damping import SCATTER
 from chladni.fem.energy import part_energies
 from chladni.fem.modelled import modelled
-from chladni.search.damping_by_part import damping_by_part, loss_factors
+from chladni.search.left_frequencies import damping_by_part, loss_factors
 from chladni_specimens import folded_panel
 
 

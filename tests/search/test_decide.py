@@ -10,13 +10,14 @@ from numpy.testing import assert_allclose
 
 from chladni.search.decide import decide, tied
 from chladni.search.decision_in_words import BEYOND, Reason
-from chladni.search.decision_rules import RULES, TIED, fits, gain_due, odds_of_something_else
+from chladni.search.decision_rules import RULES, fits, gain_due, odds_of_something_else
 from chladni.search.hypotheses import ALONE, Explanation
 from chladni.search.search_round import simplest_first
 from chladni.search.several import AlternativeRow
 
 from .decision_tables import FOR, SERVES, Row, named, over, row, table, together
 
+TIED = RULES.tied
 DUE = gain_due(1, RULES.chance_of_responses)  # of one family
 FOUR = gain_due(4, RULES.chance_of_responses)
 NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"

@@ -2,8 +2,7 @@
 
 import pytest
 
-from chladni.search.conclusion import _doubts
-from chladni.search.decide import decide
+from chladni.search.decide import _doubts, decide
 from chladni.search.decision_in_words import UNEXPLAINED, refusal
 from chladni.search.decision_rules import gain_due
 from chladni.search.several import AlternativeRow

@@ -11,14 +11,13 @@ from chladni.fem.modelled import modelled
 from chladni.inference.likelihood import Responses
 from chladni.inference.map_fit import MassMeasurement
 from chladni.model.point_masses import with_masses
-from chladni.search.conclusion import concluded
-from chladni.search.decide import decide
+from chladni.search.decide import concluded, decide
 from chladni.search.diagnosis import diagnose
 from chladni.search.held_out_data import HeldOutChoice, of_poles, upper_part
 from chladni.search.hypotheses import Hypotheses
 from chladni.search.preparation import prepare
 from chladni.search.question import HeldOut, Question
-from chladni.search.verdict_models import scores_of
+from chladni.search.written_scores import scores_of
 from chladni_specimens.plates import plate
 
 LABELS = tuple("abcdefgh")
@@ -69,7 +68,7 @@ def test_held_out_data_are_described_by_their_use():
 def test_every_third_held_out_frequency_reports(n):
     held = np.arange(9) >= 9 - n
     made = of_poles(held)
-    np.testing.assert_array_equal(made.whole, held)
+    np.testing.assert_array_equal(made.choosing | made.reporting, held)
     assert not (made.choosing & made.reporting).any()
     assert made.reporting.sum() == -(-n // 3)
     assert made.reporting[-1] == (n > 0)
@@ -96,7 +95,7 @@ def question() -> Question:
 def answered(question):
     """The question made ready, the null of its search, and what is answered."""
     ready = prepare(question)
-    return ready, *_answer(question, ready)
+    return ready, *_answer(ready)
 
 
 def test_no_decision_uses_data_that_report(question, answered):
@@ -106,7 +105,7 @@ def test_no_decision_uses_data_that_report(question, answered):
         ready, score=_spoilt(ready.score, ready.held.reporting),
         problem=replace(ready.problem, data=_spoilt(ready.problem.data, ready.unseen.reporting)),
     )  # fmt: skip
-    _, again, worse = _answer(question, spoilt)
+    _, again, worse = _answer(spoilt)
     assert decision.named
     assert (again.verdict, again.news) == (decision.verdict, decision.news)
     assert [h.fit.neg2_log_evidence for h in again.order] == [
@@ -125,7 +124,7 @@ def test_data_that_choose_speak_against_a_name(question, answered):
     foretold = problem.data.rebased(null.model).model(null.fit.state)
     data = replace(problem.data, values=np.where(at, foretold, problem.data.values))
     spoilt = replace(ready, problem=replace(problem, data=data))
-    opposed = _answer(question, spoilt)[1]
+    opposed = _answer(spoilt)[1]
     assert opposed.news < 0 < decision.news
 
 
@@ -133,10 +132,10 @@ def _spoilt(data: Responses, at: np.ndarray) -> Responses:
     return replace(data, values=np.where(at[..., None], 7.0 + 3.0j, data.values))
 
 
-def _answer(question, prepared):
+def _answer(prepared):
     found = diagnose(prepared.problem)
-    case = Hypotheses(question, prepared, found)
+    case = Hypotheses(prepared, found)
     decision = decide(case)
     said = concluded(case, decision)[0]
-    decks = [(h, h.fit.state) for h in (said.plain, said.as_deck or said.plain)]
-    return found.null, decision, scores_of(prepared, decks[-1][0], decks, prepared.held.reporting)
+    decks = said.plain, said.as_deck or said.plain
+    return found.null, decision, scores_of(prepared, decks[-1], decks, prepared.held.reporting)

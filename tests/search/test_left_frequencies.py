@@ -10,8 +10,8 @@ from chladni.fem.modelled import Modelled, modelled
 from chladni.geometry.folds import share_at_folds
 from chladni.inference.result import FrequencyRow
 from chladni.io.nastran import assembly, read_deck
-from chladni.search.frequency_table import frequency_error
 from chladni.search.left_frequencies import fold_shares, left_frequencies
+from chladni.search.measured_modes import frequency_error
 from chladni.units import UNITS
 
 RATIO = 0.3

@@ -16,7 +16,7 @@ from chladni.inference.likelihood import LN10
 from chladni.output import run_folder, write_npz
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import measurement_forecasts
-from chladni.search.conclusion import open_explanations
+from chladni.search.decide import open_explanations
 from chladni.search.decision_in_words import BEYOND
 from chladni.search.hypotheses import ALONE
 from chladni.search.measurement_forecasts import (
@@ -111,7 +111,7 @@ def test_what_was_measured_tells_less_a_second_time(problem, tied, reduced):
 def test_terms_of_second_order_are_noise_as_in_a_fit(tied, problem):
     """Near a zero of H the first order says nothing: a fit counts the rest, and so do forecasts."""
     rival, data = Rival(problem, tied[0]), tied[0].data
-    new = _new(rival, rival, data.s, data.outputs, data.inputs)
+    (new,) = _new([rival], data.s, data.outputs, data.inputs)
     values = data.model(rival.state)
     plain = replace(data, values=values, level=np.abs(values).max(axis=0), bent=None)
     bent = data.allowing_errors(rival.state).bent
@@ -141,7 +141,8 @@ def test_a_mass_put_on_is_that_of_the_changed_structure(problem, tied):
     loaded = rival.with_mass(places, 3, 0.05)
     assert (loaded.lam[6:] <= rival.state.lam[6:] * (1 + 1e-9)).all()
     data = tied[0].data
-    mean, F = _new(rival, rival, data.s[:4], data.outputs, data.inputs, loaded, rival.state).seen
+    (new,) = _new([rival, rival], data.s[:4], data.outputs, data.inputs, [rival.state, loaded])[1:]
+    mean, F = new.seen
     assert np.abs(mean).max() > 1.0
     assert F.shape[0] == len(mean)
 

@@ -54,7 +54,7 @@ def test_the_spread_of_articles_is_the_slope_of_their_frequencies():
     first = identify(question.frf, (20.0, 170.0))
     s = 2 * np.pi * np.linspace(40, 150, 60) * (0.08 + 1j)
     spread = measured_spread(equalised(first, s), others, s)
-    moved = np.log10(equalised(others[0].identified, s) / equalised(first, s))
+    moved = np.log10(equalised(others[0][1], s) / equalised(first, s))
     due = np.abs(moved) / np.sqrt(2)  # two values, K - 1 = 1: |d|²/2
     assert spread.shape == due.shape
     rms = lambda x: np.sqrt((x**2).mean())  # noqa: E731
@@ -87,9 +87,8 @@ def test_the_fit_is_not_asked_to_go_below_the_spread_and_others_are_scored():
     assert np.all(ready.problem.data.noise >= alone.problem.data.noise)
     assert ready.problem.data.noise.mean() > 2 * alone.problem.data.noise.mean()
     assert any("B and the recording that is fitted differ by" in note for note in ready.notes)
-    question = asked(OtherRecording("B", "article", recorded(article, 3)))
     heavy = modelled(article, ready.nominal.band)
-    (row,) = scored_others(question, ready, [ready.nominal, ready.nominal, heavy])
+    (row,) = scored_others(ready, [ready.nominal, ready.nominal, heavy])
     assert (row.name, row.relation) == ("B", "article")
     assert_allclose(row.nominal, row.apart, rtol=0.2)  # the deck is the first article
     assert row.with_effect < 0.1 * row.nominal

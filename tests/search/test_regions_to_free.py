@@ -15,7 +15,7 @@ from chladni.inference.calibration_result import (
 )
 from chladni.inference.result import FrequencyRow
 from chladni.model.assembly import Assembly
-from chladni.search.regions_to_free import regions_to_free, stiffness_for, worst_modes
+from chladni.search.left_frequencies import regions_to_free, stiffness_for, worst_modes
 from chladni_specimens.plates import plate
 
 SOFTER = np.log(0.8)

@@ -14,7 +14,7 @@ from chladni.effects.effect import Effect
 from chladni.effects.effect_context import Setup
 from chladni.effects.masses import LocalResonator, PointMass
 from chladni.effects.masses import sensor_mass as masses_of_sensors
-from chladni.effects.registry import catalogue
+from chladni.effects.registry import catalogue, families
 from chladni.effects.search_context import Candidate
 from chladni.effects.sheets import MassPatch
 from chladni.effects.springs import ExtraSupport
@@ -27,7 +27,8 @@ from chladni.inference.written_hypothesis import as_written
 from chladni.reduced.reduced_model import evaluate
 from chladni.search import diagnosis as diagnosing
 from chladni.search.candidates import UpdatingContext, candidates, proposals, repeats
-from chladni.search.diagnosis import Diagnosis, FitChances, could_not_be_evaluated, threshold
+from chladni.search.decision_rules import required_gain
+from chladni.search.diagnosis import Diagnosis, FitChances, could_not_be_evaluated
 from chladni.search.hypotheses import Hypotheses
 from chladni.search.search_round import _of_the_same_lump, on_common_basis, search_round
 from chladni.search.several import _begun_with, _More, _paying, _revised, _same, several
@@ -101,7 +102,7 @@ def places(hypothesis):
 
 
 HERE, THERE = (0.1, 0.05), (0.3, 0.25)
-DUE = threshold(object.__new__(Responses))
+DUE = required_gain(False, len(families()))
 
 
 @pytest.fixture(scope="module")
@@ -211,7 +212,7 @@ def test_a_rival_has_a_basis_of_its_own_again(two, found):
         alternative.data.scaled(alternative.fit.state, False)
     null = null_of(two)
     diagnosis = Diagnosis(null, null, null, (lead, alternative))
-    rival = Hypotheses(None, SimpleNamespace(problem=two), diagnosis).singles[1]
+    rival = Hypotheses(SimpleNamespace(problem=two), diagnosis).singles[1]
     again = rival.whole
     assert rival.chances.test is not None
     assert again.data.scaled(again.fit.state, False)[0].size

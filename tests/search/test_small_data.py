@@ -196,7 +196,7 @@ def test_a_known_modulus_takes_no_number_from_two_modes(tmp_path: Path, sd, take
     folder = with_poles(tmp_path, bar_deck(), *flexible)
     with (folder / "case.toml").open("a") as case:
         case.write(KNOWN.replace("0.01", str(sd)))
-    prepared = ready(load_case(folder), True, silent)[1]
+    prepared = ready(load_case(folder), True, silent)[0]
     assert 2 - prepared.numbers == pytest.approx(taken, abs=0.06)
     assert f"take {2 - prepared.numbers:.2g} in effect" in prepared.too_little
 

@@ -12,9 +12,9 @@ from chladni.fem.modelled import modelled
 from chladni.io.nastran import write_assembly
 from chladni.model.ground_springs import with_springs
 from chladni.reduced.reduced_model import evaluate
+from chladni.search.measured_frequencies import suspended_below
 from chladni.search.preparation import prepare
 from chladni.search.question import Question
-from chladni.search.suspension_range import suspended_below
 
 CORNERS = at(DECK, [(0, 0), (0.3, 0), (0, 0.22), (0.3, 0.22)])
 CORDS = with_springs(DECK, CORNERS, np.tile([0.0, 0.0, 1.0], (4, 1)), 20.0)  # 2 to 4 Hz

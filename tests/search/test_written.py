@@ -23,8 +23,7 @@ from chladni.inference.map_fit import fit, prior_residuals
 from chladni.inference.result import Agreement, Scores
 from chladni.inference.written_hypothesis import as_written
 from chladni.reduced.reduced_model import evaluate
-from chladni.search import verdict_models
-from chladni.search.diagnosis import Diagnosis
+from chladni.search.diagnosis import Diagnosis, applied
 from chladni.search.hypotheses import Explanation
 from chladni.search.result_parts import calibrated, foretells_worse
 
@@ -184,7 +183,7 @@ def test_what_makes_another_material_is_written_before_what_divides_a_part(reduc
     def written(*order):
         fit = SimpleNamespace(effects=order, of=lambda e: x[id(e)])
         named = HypothesisFit(order[0], fit, None, tuple(order[1:]))
-        return verdict_models.applied(reduced.structure.assembly, named)
+        return applied(reduced.structure.assembly, named)
 
     one, other = written(sheet, patch), written(patch, sheet)
     assert len(one.parts) == len(other.parts) > 1

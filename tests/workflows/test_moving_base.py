@@ -130,7 +130,7 @@ def test_what_is_compared_is_the_full_structures_transmissibility(heavy):
     still = replace(data, s=2j * np.pi * np.array([1e-3]), values=np.ones((1, len(SENSORS), 1)))
     assert_allclose(still.model(state), 1.0, atol=1e-6)  # the base carries everything along
     assert drawn.direct.shape == (len(SENSORS), 1)
-    (Q,) = written_Q(asked, ready, ready.nominal, (ready.score.use,))
+    (Q,) = written_Q(ready, ready.nominal, (ready.score.use,))
     assert pytest.approx(data.Q(state, data.use)) == Q
 
 
@@ -146,7 +146,7 @@ def test_the_page_and_the_deck(heavy, diagnosed, tmp_path):
     (out / "case.toml").write_text(heavy.path.read_text())
     asked = question_of(chladni.load_case(out))
     ready = prepare(asked)
-    (Q,) = written_Q(asked, ready, ready.nominal, (ready.score.use,))
+    (Q,) = written_Q(ready, ready.nominal, (ready.score.use,))
     assert pytest.approx(told["fit"]["Q_with_effect"], rel=1e-6) == Q
 
 

@@ -25,7 +25,7 @@ from chladni.output import plain
 from chladni.report.diagnosis_json import diagnosis_json, from_json
 from chladni.report.level_blocks import level_section
 from chladni.report.typed_fields import made
-from chladni.search.question import Prepared, Question
+from chladni.search.question import Prepared
 from chladni.workflows.diagnosis_result import DiagnosisResult, UpdatedModels
 from chladni.workflows.over_levels import over_levels
 from chladni_specimens.plates import plate
@@ -178,8 +178,8 @@ def test_a_table_holds_every_mode_at_every_level(identified):
 
 def at_levels(study, found, diagnosing=True):
     """The result of the fitted level with what other levels say; nothing else is asked."""
-    none = cast(Question, None), cast(Prepared, SimpleNamespace(levels=study))
-    return over_levels(*none, cast(UpdatedModels, None), found, diagnosing)
+    prepared = SimpleNamespace(levels=study, question=SimpleNamespace(level=None))
+    return over_levels(cast(Prepared, prepared), cast(UpdatedModels, None), found, diagnosing)
 
 
 def test_linear_recordings_are_not_called_nonlinear(tmp_path):

@@ -181,7 +181,7 @@ def test_decks_of_several_states_have_the_shared_values_alone(verdict):
     fit = SimpleNamespace(neg2_log_evidence=0.0)
     found = Diagnosis(fit, fit, fit, (fit,), verdict, halved=(fit, fit))
     joint = SimpleNamespace()
-    one = _with(Explained(None, None, None, found), joint, changed=True).found
+    one = _with(Explained(None, None, found), joint, changed=True).found
     assert one.shared
     assert one.halved == ()
     assert joint in (one.written, one.plain)

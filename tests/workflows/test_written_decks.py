@@ -42,7 +42,7 @@ def test_a_deck_put_back_has_the_Q_that_was_promised(
     asked = question_of(chladni.load_case(again))
     prepared = prepare(asked)
     sets = prepared.score.use, prepared.held.reporting
-    now = written_Q(asked, prepared, prepared.nominal, sets)
+    now = written_Q(prepared, prepared.nominal, sets)
     due = diagnosed.agreement
     then = [getattr(q, score) for q in (due.fitted, due.held_out)]
     np.testing.assert_allclose(now, then, rtol=1e-6)
@@ -89,9 +89,7 @@ def test_a_mesh_too_coarse_for_the_change_is_halved(tmp_path, monkeypatch):
         prepared = prepare(asked)
         sets = prepared.score.use, prepared.held.reporting
         then = [getattr(q, score) for q in (result.agreement.fitted, held)]
-        np.testing.assert_allclose(
-            written_Q(asked, prepared, prepared.nominal, sets), then, rtol=1e-6
-        )
+        np.testing.assert_allclose(written_Q(prepared, prepared.nominal, sets), then, rtol=1e-6)
 
 
 def test_Q_is_that_of_the_full_matrices(case):
@@ -111,7 +109,7 @@ def test_Q_is_that_of_the_full_matrices(case):
     exact = np.array([s**2 * (out @ x) for s, x in zip(data.s[some], u, strict=True)])[..., None]
     apart = np.abs(np.log(data.model(state)[some] / exact)) / LN10
     assert apart.max() < LIMIT / (ZETA_Q * LN10)
-    (Q,) = written_Q(asked, prepared, prepared.nominal, (prepared.score.use,))
+    (Q,) = written_Q(prepared, prepared.nominal, (prepared.score.use,))
     assert Q == pytest.approx(data.Q(state, data.use))
 
 
@@ -131,7 +129,7 @@ def test_an_unknown_gain_is_no_hidden_parameter(case):
     found = []
     for q in (asked, twice):
         prepared = prepare(q)
-        found.append(written_Q(q, prepared, prepared.nominal, (prepared.score.use,))[0])
+        found.append(written_Q(prepared, prepared.nominal, (prepared.score.use,))[0])
     assert found[1] == pytest.approx(found[0], rel=1e-3)
 
 

@@ -20,71 +20,55 @@ from ..inference.identifiability import calibration_positions
 from ..inference.joint_fit import of_the_object
 from ..inference.likelihood import LN10, Responses
 from ..inference.map_fit import unknowns
-from ..inference.unit_spread import KNOWN, unit_spread
-from ..reduced.effect_dofs import slices
+from ..inference.unit_spread import KNOWN, UnitSpread, unit_spread
 from ..reduced.reduced_model import evaluate
+from .other_recordings import ALIKE
 from .posterior import values_at, with_frozen
-from .question import Prepared, Question
+from .question import Prepared
 
 Tests = dict[str, list[tuple[np.ndarray, np.ndarray]]]  # article: ln H over the first's, its noise
 
 
-def articles_together(
-    question: Question, prepared: Prepared, null: HypothesisFit
-) -> tuple[ArticleParameter, ...]:
+def articles_together(prepared: Prepared, null: HypothesisFit) -> tuple[ArticleParameter, ...]:
     """Fit all articles of a case together; empty where it has one, or no responses.
 
-    Parameters
-    ----------
-    null : the fit of the first, which may hold parameters that are free in the prepared problem
+    The null of the first may hold parameters that are free in the prepared problem.
     """
     data = null.data
     if not isinstance(data, Responses) or prepared.identified is None:
         return ()
-    tests = _tests(question, prepared, data, prepared.identified)
+    tests = _tests(prepared, data, prepared.identified)
     if len(tests) < 2:
         return ()
     logs = np.array([np.mean([log for log, _ in each], axis=0) for each in tests.values()])
-    noise = np.sqrt(np.mean([(sd**2).mean(axis=0) / len(sd) for sd in map(_sd, tests.values())], 0))
+    variances = ([sd**2 for _, sd in each] for each in tests.values())
+    noise = np.sqrt(np.mean([np.mean(v, axis=0) / len(v) for v in variances], axis=0))
     apart = (logs - logs.mean(axis=0)) / LN10
     plain = data.exactly()
     plain = replace(plain, values=plain.values * np.exp(logs.mean(axis=0)), spread=None)
     mean = _mean_fit(prepared.problem, null, replace(plain, noise=noise / np.sqrt(len(logs))))
-    effects = mean.fit.effects
     J, y = _differences(mean, replace(plain, noise=noise), apart)
-    own = _of_one_article(effects)
-    group, sd = _groups(effects)[own], np.array([p.sd for p in unknowns(effects)])[own]
-    found = unit_spread(J[:, own], y, group, sd)
-    away = np.zeros((len(logs), len(mean.fit.x)))
-    away[:, own] = found.away
-    width = np.zeros(len(mean.fit.x))
-    width[own] = np.diag(found.covariance)
-    tau, low, high = (_by_parameter(v, group, own, len(width)) for v in
-                      (found.tau, found.low, found.high))  # fmt: skip
-    return _summary(mean, tuple(tests), away, width, (tau, low, high))
+    own, group = _of_one_article(mean.fit.effects), _groups(mean.fit.effects)
+    sd = np.array([p.sd for p in unknowns(mean.fit.effects)])
+    found = unit_spread(J[:, own], y, group[own], sd[own])
+    return _summary(mean, tuple(tests), found, own, group)
 
 
-def _tests(
-    question: Question, prepared: Prepared, data: Responses, identified: Identified
-) -> Tests:
+def _tests(prepared: Prepared, data: Responses, identified: Identified) -> Tests:
     """The tests of every article at the level of the first: ln of H over the first's, and noise."""
+    question = prepared.question
     assert question.frf is not None
     first = equalised(identified, data.s)
     out: Tests = {
         question.article: [(np.zeros_like(first), sample_noise(identified, question.frf, data.s))]
     }
-    for test in prepared.others:
-        other = test.recording
+    for other, modes in prepared.others:
         alike = other.relation == "repeat" or other.level in (None, question.level)
-        if other.relation in ("repeat", "article") and alike:
-            pair = (np.log(equalised(test.identified, data.s) / first),
-                    sample_noise(test.identified, other.frf, data.s))  # fmt: skip
+        if other.relation in ALIKE and alike:
+            log = np.log(equalised(modes, data.s) / first)
+            pair = log, sample_noise(modes, other.frf, data.s)
             out.setdefault(other.article, []).append(pair)
     return out
-
-
-def _sd(each: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    return np.array([sd for _, sd in each])
 
 
 def _mean_fit(whole: UpdatingProblem, null: HypothesisFit, plain: Responses) -> HypothesisFit:
@@ -109,12 +93,12 @@ def _differences(
 
 
 def _of_one_article(effects: Sequence[Effect]) -> np.ndarray:
-    """Positions of what differs between articles: parameters, scatter within parts, gains."""
-    each = [
-        np.arange(at.start, at.stop) for e, at in slices(effects)
-        if e.kind == "calibration" or isinstance(e, RandomField) or not of_the_object(e)
-    ]  # fmt: skip
-    return np.concatenate([np.zeros(0, int), *each])
+    """Mask over what differs between articles: parameters, scatter within parts, gains."""
+    differs = (
+        e.kind == "calibration" or isinstance(e, RandomField) or not of_the_object(e)
+        for e in effects for _ in e.parameters
+    )  # fmt: skip
+    return np.fromiter(differs, bool)
 
 
 def _groups(effects: Sequence[Effect]) -> np.ndarray:
@@ -127,16 +111,9 @@ def _groups(effects: Sequence[Effect]) -> np.ndarray:
     )  # fmt: skip
 
 
-def _by_parameter(v: np.ndarray, group: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
-    """The value of its group for every parameter (n,); 0 for others."""
-    out = np.zeros(n)
-    out[own] = np.where(group == KNOWN, 0.0, np.append(v, 0.0)[group])
-    return out
-
-
 def _summary(
-    mean: HypothesisFit, names: tuple[str, ...], away: np.ndarray, width: np.ndarray,
-    spread: tuple[np.ndarray, np.ndarray, np.ndarray],
+    mean: HypothesisFit, names: tuple[str, ...], found: UnitSpread, own: np.ndarray,
+    group: np.ndarray,
 ) -> tuple[ArticleParameter, ...]:  # fmt: skip
     """Mean, spread and places of all parameters with 95 % intervals.
 
@@ -144,20 +121,23 @@ def _summary(
     """
     from scipy.stats import norm, t
 
-    fit, (tau, low, high) = mean.fit, spread
-    own, count = calibration_positions(fit.effects), len(names)
-    z, form = norm.ppf(0.975), np.diag(fit.covariance)
-    reach = np.sqrt(z**2 * form + t.ppf(0.975, count - 1) ** 2 * tau**2 / count)[own]
-    x, each = fit.x[own], z * np.sqrt(form + width)[own]
-    middle, least, most = (values_at(fit, own, v) for v in (x, x - reach, x + reach))
-    places = [[values_at(fit, own, x + a[own] + side) for side in (0.0, -each, each)] for a in away]
+    fit, count = mean.fit, len(names)
+    at = calibration_positions(fit.effects)
+    among = np.flatnonzero(np.isin(np.flatnonzero(own), at))  # the same among those of one article
+    tau, low, high = (v[group[at]] for v in (found.tau, found.low, found.high))
+    z, form = norm.ppf(0.975), np.diag(fit.covariance)[at]
+    reach = np.sqrt(z**2 * form + t.ppf(0.975, count - 1) ** 2 * tau**2 / count)
+    x, away, width = fit.x[at], found.away[:, among], np.diag(found.covariance)[among]
+    each = z * np.sqrt(form + width)
+    middle, least, most = (values_at(fit, at, v) for v in (x, x - reach, x + reach))
+    places = [[values_at(fit, at, x + a + side) for side in (0.0, -each, each)] for a in away]
     return tuple(
         ArticleParameter(
             middle[k].name, middle[k].unit, middle[k].value, least[k].value, most[k].value,
-            float(tau[j]), float(low[j]), float(high[j]) if np.isfinite(high[j]) else None,
-            tuple(ArticleValue(name, value[k].value, less[k].value, more[k].value, float(a[j]),
-                               float(z * np.sqrt(width[j])))
+            float(tau[k]), float(low[k]), float(high[k]) if np.isfinite(high[k]) else None,
+            tuple(ArticleValue(name, value[k].value, less[k].value, more[k].value, float(a[k]),
+                               float(z * np.sqrt(width[k])))
                   for name, (value, less, more), a in zip(names, places, away, strict=True)),
         )
-        for k, j in enumerate(own)
+        for k in range(len(at))
     )  # fmt: skip

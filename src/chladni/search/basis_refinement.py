@@ -1,6 +1,6 @@
 """Renewal of a fit where the reduced model is no longer accurate."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import scipy.sparse as sp
 
@@ -14,37 +14,17 @@ from ..inference.map_fit import fit
 from ..inference.pole_data import Poles
 from ..reduced.accuracy import LIMIT, Accuracy, accuracy
 from ..reduced.reduced_problem import reduced_problem
-from .nuisances import measured_on, mesh_hidden, nuisances
+from .base_effects import mesh_hidden, nuisances
 from .preparation import SOLVED, updating_problem
 from .question import Prepared, Question
 
 TRIES = 3  # times the basis is extended by its missing vectors
 
 
-@dataclass(frozen=True, eq=False)
-class Refinement:
-    """A hypothesis fitted again on a more accurate reduced model."""
-
-    hypothesis: HypothesisFit
-    note: str  # sentence on the error of the reduced model
-    worst: float  # largest remaining relative frequency error
-
-    @property
-    def distrust(self) -> tuple[str, ...]:
-        """Reason not to trust the result; empty where the reduced model is accurate enough."""
-        if self.worst <= LIMIT:
-            return ()
-        return (
-            "the frequencies of the reduced model differ from the full model by "
-            f"{_percent(self.worst)}, above the limit of {_percent(LIMIT)}: do not trust the "
-            "result; narrow the band, or correct the deck first",
-        )
-
-
 def refined(
-    question: Question, prepared: Prepared, hypothesis: HypothesisFit, written: bool = False
-) -> Refinement:
-    """Fit a hypothesis again on an accurate reduced model, and report the model's error.
+    prepared: Prepared, hypothesis: HypothesisFit, written: bool = False
+) -> tuple[HypothesisFit, str, tuple[str, ...]]:
+    """Fit a hypothesis again on an accurate reduced model; the model's error, reasons for distrust.
 
     Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
     computed again where the effect changes that structure. Otherwise the basis is extended by its
@@ -53,7 +33,7 @@ def refined(
     """
     problem = prepared.problem
     if any(e.traits.remakes_structure for e in hypothesis.effects):
-        problem, hypothesis = _on_new_structure(question, problem, hypothesis)
+        problem, hypothesis = _on_new_structure(prepared.question, problem, hypothesis)
     found = _accuracy(problem, hypothesis)
     note, first = _said(found), found.worst
     for _ in range(TRIES):
@@ -70,7 +50,14 @@ def refined(
         hypothesis = replace(hypothesis, fit=made, model=model)
         found = _accuracy(problem, hypothesis)
         note = f"{_said(found)}, after {_percent(first)} before its basis was refined"
-    return Refinement(hypothesis, note, found.worst)
+    if found.worst <= LIMIT:
+        return hypothesis, note, ()
+    why = (
+        f"the frequencies of the reduced model differ from the full model by "
+        f"{_percent(found.worst)}, above the limit of {_percent(LIMIT)}: do not trust the result; "
+        "narrow the band, or correct the deck first"
+    )
+    return hypothesis, note, (why,)
 
 
 def _accuracy(problem: UpdatingProblem, hypothesis: HypothesisFit) -> Accuracy:
@@ -110,18 +97,14 @@ def _on_new_structure(
     model = modelled(changed.searched(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     seen = rows or (isinstance(data, Poles) and data.shapes is not None)
-    mesh = mesh_hidden(model, f_max, measured_on(changed) if seen else None)
+    mesh = mesh_hidden(model, f_max, changed.rows if seen else None)
     reduced = reduced_problem(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,
     )  # fmt: skip
-    fresh = updating_problem(
-        changed,
-        reduced,
-        data.rebased(reduced.model),
-        [*nuisances(reduced, model, mesh, None if rows else f_max), *filter(of_test, old.nuisance)],
-        f_max,
-    )
+    own = nuisances(reduced, model, mesh, None if rows else f_max)
+    own = [*own, *filter(of_test, old.nuisance)]
+    fresh = updating_problem(changed, reduced, data.rebased(reduced.model), own)
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
     (first, start), *others = found
     fresh = fresh.holding(others)

@@ -8,11 +8,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 from scipy.special import ndtri
 
-from ..effects.effect import Effect
 from ..errors import ModelError
 from ..inference.calibration_result import (
     Basin,
@@ -30,13 +30,15 @@ from ..inference.written_hypothesis import as_written
 from ..parallel import in_parallel
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
-from .diagnosis import (
-    Diagnosis,
-    best_base_fit,
-    nominal_starts,
-    without_effects,
+from .diagnosis import Diagnosis, best_base_fit, restarted, without_effects
+from .posterior import (
+    bands,
+    gaussian_draws,
+    physical_values,
+    posterior_sample,
+    values_at,
+    with_frozen,
 )
-from .posterior import bands, gaussian_draws, physical_values, posterior_sample, with_frozen
 
 STARTS = 12  # of the Latin hypercube
 BEST = 10  # basins that are reported
@@ -47,15 +49,6 @@ PROFILE_STEPS = 6  # of a fit with one parameter held; it starts where the covar
 TOLERANCE = 0.05  # in -2 ln posterior, of a fit
 LOWER = 3  # times a fit is begun again where a profile lies below it
 SEED = 20250102
-
-
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """A calibration: the problem with its free parameters, the diagnosis without effects."""
-
-    problem: UpdatingProblem
-    diagnosis: Diagnosis
-    study: CalibrationStudy
 
 
 @dataclass(frozen=True)
@@ -74,11 +67,14 @@ FULL = CalibrationSettings()
 def calibration(
     problem: UpdatingProblem, progress: Progress = silent,
     settings: CalibrationSettings = FULL,
-) -> Calibrated:  # fmt: skip
-    """Fit the calibration parameters that the data can determine; no new physics."""
-    freeze, quick = settings.freeze, settings.quick
+) -> tuple[UpdatingProblem, Diagnosis, CalibrationStudy]:  # fmt: skip
+    """Fit the calibration parameters that the data can determine; no new physics.
+
+    The problem is that of the free parameters, the diagnosis has no effects.
+    """
+    freeze, quick, whole = settings.freeze, settings.quick, problem
     progress("identifiability", 0.0)
-    whole, known = problem, identifiability(about_nominal(problem))
+    known = identifiability(about_nominal(whole))
     problem = _without(whole, known.frozen if freeze else ())
     progress("calibration without new physics", 0.05)
     problem, null = without_effects(problem)
@@ -88,7 +84,7 @@ def calibration(
         if set(again.frozen) < set(known.frozen):  # the error of form is smaller than its prior
             known = again
             problem, null = without_effects(_without(whole, known.frozen))
-    nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
+    nominal = best_base_fit(problem, problem.nuisance, [problem.begun(problem.nuisance)])
     ends = [] if quick else list(_ends(problem, null, settings.starts, within(progress, 0.3, 0.7)))
     null = _restarted(problem, null, ends)
     progress("profiles", 0.75)
@@ -103,13 +99,14 @@ def calibration(
     plain = as_written(null, problem.mass_measurement)
     found = Diagnosis(nominal, null, plain, (), notes=notes)
     own = calibration_positions(null.fit.effects)
+    names = parameter_names([e for e in null.fit.effects if e.kind == "calibration"])
     study = CalibrationStudy(
-        known, 0 if quick else settings.starts, basins[:BEST], tuple(_names(null.fit)),
+        known, 0 if quick else settings.starts, basins[:BEST], tuple(names),
         tuple(null.fit.x[own].tolist()),
         tuple(map(tuple, null.fit.covariance[np.ix_(own, own)].tolist())),
         profiled, predicted, sample=sample,
     )  # fmt: skip
-    return Calibrated(problem, found, study)
+    return problem, found, study
 
 
 def about_nominal(problem: UpdatingProblem, delta: float | None = None) -> UpdatingProblem:
@@ -127,13 +124,9 @@ def about_nominal(problem: UpdatingProblem, delta: float | None = None) -> Updat
 
 def _without(problem: UpdatingProblem, frozen: Sequence[str]) -> UpdatingProblem:
     """The problem without the frozen parameters, which keep their prior means."""
-    kept = tuple(e for e in problem.base if not _frozen(e, frozen))
-    return replace(problem, base=kept)
-
-
-def _frozen(effect: Effect, frozen: Sequence[str]) -> bool:
-    names = parameter_names([effect])
-    return effect.kind == "calibration" and bool(names) and all(n in frozen for n in names)
+    names = [parameter_names([e]) if e.kind == "calibration" else [] for e in problem.base]
+    held = [bool(own) and set(own) <= set(frozen) for own in names]
+    return replace(problem, base=tuple(compress(problem.base, np.logical_not(held))))
 
 
 def latin_hypercube(problem: UpdatingProblem, count: int) -> list[np.ndarray]:
@@ -157,14 +150,13 @@ def _ends(
     problem: UpdatingProblem, null: HypothesisFit, count: int, progress: Progress
 ) -> Iterator[Fit]:
     """Fits from every start to the same likelihood; a start that is no structure has none."""
-    model, mass, starts = null.model, problem.mass_measurement, latin_hypercube(problem, count)
-    data = null.data
+    mass, starts = problem.mass_measurement, latin_hypercube(problem, count)
 
     def one(x: np.ndarray) -> Fit | None:
         try:
-            if isinstance(data, Poles):
-                return fitted(model, problem.base, problem.data, mass, x)
-            return fit(model, problem.base, data, mass, x).kept()
+            if isinstance(null.data, Poles):
+                return fitted(null.model, problem.base, problem.data, mass, x)
+            return fit(null.model, problem.base, null.data, mass, x).kept()
         except ModelError:
             return None
 
@@ -176,14 +168,11 @@ def _ends(
 
 def _restarted(problem: UpdatingProblem, null: HypothesisFit, ends: Sequence[Fit]) -> HypothesisFit:
     """The null, or the fit from the best start where that is better."""
-    best = min(ends, key=lambda f: f.neg2_log_evidence, default=null.fit)
+    best = min((null.fit, *ends), key=lambda f: f.neg2_log_evidence)
     if isinstance(null.data, Poles):
-        again = replace(null, fit=best)
-    elif best.neg2_log_evidence > null.fit.neg2_log_evidence - SAME:
-        return null
-    else:
-        again = best_base_fit(problem, problem.base, [best.x])
-    return min((null, again), key=lambda t: t.neg2_log_evidence)
+        return replace(null, fit=best)
+    better = best.neg2_log_evidence <= null.fit.neg2_log_evidence - SAME
+    return restarted(problem, null, [best.x] if better else [])
 
 
 def _end_of(problem: UpdatingProblem, null: HypothesisFit) -> Fit:
@@ -209,18 +198,12 @@ def _basins(null: HypothesisFit, own_end: Fit, ends: Sequence[Fit]) -> tuple[Bas
                 break
         else:
             basins.append([end])
+    least = basins[0][0].neg2_log_evidence
     return tuple(
-        Basin(
-            b[0].neg2_log_evidence - basins[0][0].neg2_log_evidence,
-            sum(end is not own_end for end in b),
-            tuple(physical_values(null.fit.effects, b[0].x)),
-        )
+        Basin(b[0].neg2_log_evidence - least, sum(end is not own_end for end in b),
+              tuple(physical_values(null.fit.effects, b[0].x)))
         for b in basins
     )  # fmt: skip
-
-
-def _names(found: Fit) -> list[str]:
-    return parameter_names([e for e in found.effects if e.kind == "calibration"])
 
 
 def _notes(
@@ -246,10 +229,8 @@ def profiles_of_the_best(
     """The profiles, and the null, fitted again from a place on them that lies below it."""
     for _ in range(LOWER):
         found, lower = profiles(problem, null)
-        if lower is None:
-            break
-        again = best_base_fit(problem, null.fit.effects, [lower])
-        if again.neg2_log_evidence >= null.neg2_log_evidence:
+        again = null if lower is None else restarted(problem, null, [lower])
+        if again is null:
             break
         null = again
     return found, null
@@ -262,11 +243,8 @@ def profiles(
 
     Raue et al. (2009), Bioinformatics 25, 1923-1929, profile the likelihood.  Here all priors
     count, that of the parameter as well: then the fit is the lowest place, and the covariance
-    predicts z² at z standard deviations.  Frozen parameters are held.
-
-    Returns
-    -------
-    The profiles above the lowest place, and that place where it lies clearly below the null.
+    predicts z² at z standard deviations.  Frozen parameters are held.  The profiles are above the
+    lowest place; it is returned too where it lies clearly below the null.
     """
     found, mass, out = null.fit, problem.mass_measurement, []
     own, count = calibration_positions(found.effects), len(PROFILED)
@@ -276,13 +254,10 @@ def profiles(
     lowest, x = min(every, key=lambda one: one[0], default=(best, found.x))
     for n, k in enumerate(own):
         away = float(np.sqrt(found.covariance[k, k])) * np.array(PROFILED)
-        at = [list(physical_values(found.effects, found.x + d * (np.arange(len(found.x)) == k)))[n]
-              for d in away]  # fmt: skip
-        costs = [cost for cost, _ in every[n * count : (n + 1) * count]]
-        out.append(LikelihoodProfile(
-            at[0].name, at[0].unit, tuple(v.value for v in at),
-            tuple(cost - min(best, lowest) for cost in costs), tuple(z**2 for z in PROFILED),
-        ))  # fmt: skip
+        at = [values_at(found, own, found.x[own] + d * (own == k))[n] for d in away]
+        costs = (cost - min(best, lowest) for cost, _ in every[n * count : (n + 1) * count])
+        values, squares = tuple(v.value for v in at), tuple(z**2 for z in PROFILED)
+        out.append(LikelihoodProfile(at[0].name, at[0].unit, values, tuple(costs), squares))
     return tuple(out), x if lowest < best - TOLERANCE else None
 
 

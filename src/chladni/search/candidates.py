@@ -1,7 +1,7 @@
 """The most promising of every family of effects, and the services by which families find them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
@@ -12,25 +12,15 @@ from ..effects.effect_context import EffectContext, ElementGrids
 from ..effects.family import Family
 from ..effects.joints import Connection
 from ..effects.search_context import Candidate
+from ..inference import scan as scans
 from ..inference.hypothesis_fit import FAILED, HypothesisFit, UpdatingProblem
 from ..inference.likelihood import Responses
 from ..inference.pole_data import Poles
-from ..inference.scan import (
-    Baseline,
-    baseline,
-    bending_slopes,
-    direction_scores,
-    effect_slopes,
-    field_slopes,
-    oscillator_scores,
-    point_scores,
-    spin_scores,
-)
 from ..parallel import in_parallel
 from ..reduced.local_effect import LocalEffect
 from ..reduced.reduced_model import Reduced, evaluate
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
-from .pole_starts import global_starts
+from .pole_starts import global_starts, squared_prior
 
 APART = 1 / 6  # of the structure's size: effects nearer to each other are one
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
@@ -39,11 +29,9 @@ WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 def candidates(
     problem: UpdatingProblem, null: HypothesisFit, most: int | None = None
 ) -> list[Candidate]:
-    """The most promising of every family, scanned about the nominal and the calibrated model.
+    """The most promising of every family, about the nominal and the calibrated model.
 
-    Parameters
-    ----------
-    most : so many of them alone, those that score best where they begin
+    With ``most``, so many of them alone: those that score best where they begin.
     """
     context = UpdatingContext(problem, null)
     every, _ = proposals(context)
@@ -103,11 +91,11 @@ def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
 
 def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> list[Candidate]:
     """Candidates with the best scores at their start, less the price of the places tried."""
-    price = [2 * float(np.log(c.effect.trials_factor)) for c in every]
     score = [
-        float(context.scores(c.effect, [c.start]).min()) + _prior(c.effect, c.start) + p
-        for c, p in zip(every, price, strict=True)
-    ]
+        float(context.scores(c.effect, [c.start]).min())
+        + squared_prior(c.effect, c.start) + 2 * float(np.log(c.effect.trials_factor))
+        for c in every
+    ]  # fmt: skip
     return [every[k] for k in np.argsort(score, kind="stable")[:most]]
 
 
@@ -130,6 +118,10 @@ class UpdatingContext:
     problem: UpdatingProblem
     null_fit: HypothesisFit  # the best without any effect
     about: np.ndarray | None = None
+    # kept: models of effects with parts of their own, scores of joints and of lines of shells
+    _components: dict[str, Reduced] = field(default_factory=dict)
+    _loose: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(default_factory=dict)
+    _bent: dict[tuple[int, bytes], np.ndarray] = field(default_factory=dict)
 
     @property
     def where(self) -> EffectContext:
@@ -150,21 +142,14 @@ class UpdatingContext:
         nominal = self.problem.mean()
         if self.about is not None:
             return nominal, self.about
-        found = [e for e, _ in self.problem.found]
-        kinds = [
-            e.kind == "calibration" or e in found for e in self.problem.base for _ in e.parameters
-        ]
-        calibrated = np.where(kinds, self.null_fit.fit.x, nominal)
-        calibrated = calibrated if self._stands(calibrated) else self.null_fit.fit.x
-        return (calibrated,) if found else (nominal, calibrated)
-
-    def _stands(self, x: np.ndarray) -> bool:
-        """True if base parameters x are a structure."""
+        base, found = self.problem.base, [e for e, _ in self.problem.found]
+        kinds = [e.kind == "calibration" or e in found for e in base for _ in e.parameters]
+        calibrated = np.where(kinds, self.null, nominal)
         try:
-            evaluate(self.problem.reduced.model, self.problem.base, x, False)
-        except FAILED:
-            return False
-        return True
+            evaluate(self.problem.reduced.model, base, calibrated, False)
+        except FAILED:  # it is no structure
+            calibrated = self.null
+        return (calibrated,) if found else (nominal, calibrated)
 
     @property
     def null(self) -> np.ndarray:
@@ -177,11 +162,11 @@ class UpdatingContext:
         return np.inf if self.scan is None else self.null_fit.neg2_log_evidence
 
     @cached_property
-    def baselines(self) -> tuple[Baseline, ...]:
+    def baselines(self) -> tuple[scans.Baseline, ...]:
         """The base effects linearised at each of ``bases``."""
-        s = self.problem
+        s, model = self.problem, self.problem.reduced.model
         return tuple(
-            baseline(s.reduced.model, s.base, s.data, s.mass_measurement, x) for x in self.bases
+            scans.baseline(model, s.base, s.data, s.mass_measurement, x) for x in self.bases
         )
 
     @property
@@ -233,7 +218,7 @@ class UpdatingContext:
         """
         base, reduced, local = self.baselines[about], self.problem.reduced, None
         model = reduced.model
-        if extended and isinstance(self.problem.data, Responses):
+        if extended and self.scan is not None:
             local = LocalEffect.of(reduced, base.effects, effect, base.state, base.x, starts[0])
         if local is None:
             wider = extended or effect.release is not None
@@ -253,18 +238,12 @@ class UpdatingContext:
             except FAILED:
                 continue
             if isinstance(data, Poles):
-                prior = _prior(effect, start)
-                for scale_index, scale in enumerate(ways):
-                    r, _ = replace(data, scale=scale).scaled(state, False)
-                    out[scale_index, k] = r @ r + prior
+                each = (replace(data, scale=scale).scaled(state, False)[0] for scale in ways)
+                out[:, k] = [r @ r + squared_prior(effect, start) for r in each]
             else:
                 r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
-
-    @cached_property
-    def _components(self) -> dict[str, Reduced]:
-        return {}
 
     def own(self, effect: Effect, start: np.ndarray) -> tuple[float, np.ndarray]:
         """-2 ln evidence at the own optimum of an effect, and the optimum; inf without one."""
@@ -281,10 +260,8 @@ class UpdatingContext:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
         base, model = self.baselines[-1], self.problem.reduced.model
         state = evaluate(model, base.effects, base.x, False)
-        terms = of(MatrixTerm, effect.terms(x))
-        return state.lam, np.array(
-            [state.phi.T @ model.operator(t.operator) @ state.phi for t in terms]
-        )
+        A = (model.operator(t.operator) for t in of(MatrixTerm, effect.terms(x)))
+        return state.lam, np.array([state.phi.T @ a @ state.phi for a in A])
 
     def optima(self, effect: Effect) -> list[np.ndarray]:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""
@@ -303,44 +280,59 @@ class UpdatingContext:
         data = self.data
         return data.deviation(self.null_fit.fit.state)[data.use.any(axis=1)]
 
+    def _at(self, about: int) -> tuple[scans.Baseline, Reduced, Responses]:
+        """The state that is changed, the model and the data of a scan."""
+        return self.baselines[about], self.problem.reduced.model, self.data
+
     def point_scores(
         self, about: int, matrix: str, strengths: np.ndarray, places: ElementGrids | None = None
     ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
-        base, reduced = self.baselines[about], self.problem.reduced
-        rest = self.flexibility if places is None else reduced.flexibility(places)
+        rest = self.flexibility if places is None else self.problem.reduced.flexibility(places)
         places = self.where.places if places is None else places
-        return point_scores(base, reduced.model, self.data, places, matrix, strengths, rest)
+        return scans.point_scores(*self._at(about), places, matrix, strengths, rest)
 
     def oscillator_scores(
         self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz)."""
-        base, reduced = self.baselines[about], self.problem.reduced
-        rest = reduced.flexibility(places)
-        return oscillator_scores(base, reduced.model, self.data, places, mass, hertz, rest)
+        rest = self.problem.reduced.flexibility(places)
+        return scans.oscillator_scores(*self._at(about), places, mass, hertz, rest)
 
     def spin_scores(
         self, about: int, places: ElementGrids, sd: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best angular momentum of a spinning part at each place (k, 3), and the score (k,)."""
-        rows, model = self.where.rotations(places.grids), self.problem.reduced.model
-        return spin_scores(self.baselines[about], model, self.data, rows, sd)
+        return scans.spin_scores(*self._at(about), self.where.rotations(places.grids), sd)
 
     def field_scores(
         self, about: int, field: str, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
-        base, model = self.baselines[about], self.problem.reduced.model
-        return direction_scores(base, field_slopes(base, model, self.data, field) @ change)
+        slopes = scans.field_slopes(*self._at(about), field)
+        return scans.direction_scores(self.baselines[about], slopes @ change)
 
     def effect_scores(
         self, about: int, effect: Effect, change: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of an effect from its nominal values, and the score."""
-        base, model = self.baselines[about], self.problem.reduced.model
-        slopes = effect_slopes(base, model, self.data, effect)
-        return direction_scores(base, slopes @ change)
+        slopes = scans.effect_slopes(*self._at(about), effect)
+        return scans.direction_scores(self.baselines[about], slopes @ change)
+
+    def bending_scores(
+        self, about: int, sets: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
+
+        Several families try the same lines of shells.
+        """
+        keys, known = [(about, each.tobytes()) for each in sets], self._bent
+        fresh = {key: each for key, each in zip(keys, sets, strict=True) if key not in known}
+        slopes = scans.bending_slopes(*self._at(about), list(fresh.values()))
+        scores = scans.direction_scores(self.baselines[about], slopes)
+        known |= zip(fresh, np.transpose(scores), strict=True)
+        amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
+        return amount, score
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
         """Score of each fastener with some of its stiffness left (n, k)."""
@@ -354,40 +346,11 @@ class UpdatingContext:
         return self._loosened_once(about, [run], left[None], (about, row, first, last))[0]
 
     def _loosened_once(
-        self, about: int, joints: Sequence[Loosened], left: np.ndarray, key: tuple[int, ...]
+        self, about: int, joints: Sequence[Loosened], left: np.ndarray, which: tuple[int, ...]
     ) -> np.ndarray:
-        """Scores (n, k) of joints that ``key`` names; several families try the same ones."""
-        known, key_too = self._loose, (key, left.tobytes())
-        if key_too not in known:
+        """Scores (n, k) of the joints ``which``; several families try the same ones."""
+        known, key = self._loose, (which, left.tobytes())
+        if key not in known:
             base, reduced = self.baselines[about], self.problem.reduced
-            known[key_too] = fastener_scores(base, reduced, self.data, joints, left)
-        return known[key_too]
-
-    @cached_property
-    def _loose(self) -> dict[tuple[tuple[int, ...], bytes], np.ndarray]:
-        return {}
-
-    def bending_scores(
-        self, about: int, sets: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
-
-        Several families try the same lines of shells.
-        """
-        base, model, known = self.baselines[about], self.problem.reduced.model, self._bent
-        keys = [(about, each.tobytes()) for each in sets]
-        fresh = {key: each for key, each in zip(keys, sets, strict=True) if key not in known}
-        slopes = bending_slopes(base, model, self.data, list(fresh.values()))
-        known |= zip(fresh, np.transpose(direction_scores(base, slopes)), strict=True)
-        amount, score = np.array([known[key] for key in keys]).reshape(-1, 2).T
-        return amount, score
-
-    @cached_property
-    def _bent(self) -> dict[tuple[int, bytes], np.ndarray]:
-        return {}
-
-
-def _prior(effect: Effect, x: np.ndarray) -> float:
-    """((x - μ)/σ)² over the effect's parameters."""
-    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
-    return float((((x - mean) / sd) ** 2).sum())
+            known[key] = fastener_scores(base, reduced, self.data, joints, left)
+        return known[key]

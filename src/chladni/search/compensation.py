@@ -8,7 +8,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..effects.effect import Effect
 from ..inference.implausible_values import implausible_values
 from ..inference.map_fit import APART, Fit, MassMeasurement
 from ..inference.residual_localisation import ResidualLocalisation
@@ -30,11 +29,8 @@ def compensating(
 ) -> tuple[str, ...]:  # fmt: skip
     """The effects that a calibration stands for, and why; empty where it does not compensate.
 
-    Parameters
-    ----------
-    fit : of the deck that is written
-    spot : where a local change would still gain
-    responses : the data have a level and places, as tables of frequencies do not
+    The fit is that of the written deck; at ``spot`` a local change would still gain. Responses
+    have a level and places, as tables of frequencies do not.
     """
     cures = CURE + OF_RESPONSES * responses
     reasons = (
@@ -63,12 +59,16 @@ def _leaves_the_scales(
 def _stands_for(fit: Fit, place: str) -> str:
     """The changes of each part in the words of mass and stiffness."""
     changes: dict[str, np.ndarray] = {}  # of ln stiffness and ln mass, and their variances
-    for effect in filter(_is_factor, fit.effects):
-        name, change = effect.parameters[0].name, _log_change(effect, fit.of(effect))
-        powers = np.array([BENDING.get(name, 0.0), float(name in ("rho", "t", "wall"))])
+    for effect in (e for e in fit.effects if e.kind == "calibration" and len(e.parameters) == 1):
+        (p,) = effect.parameters
+        if p.kind != "log":  # no factor on a value of the deck
+            continue
+        row = effect.reported(fit.of(effect), np.array([p.sd]))[0]
+        change = float(np.log(row.value / p.value(p.nominal)))
+        powers = np.array([BENDING.get(p.name, 0.0), float(p.name in ("rho", "t", "wall"))])
         where = ", ".join(effect.parts) or "the joints"
-        row = np.array([powers * change, (powers * fit.sd(effect)[0]) ** 2])
-        changes[where] = changes.get(where, 0.0) + row
+        moments = np.array([powers * change, (powers * fit.sd(effect)[0]) ** 2])
+        changes[where] = changes.get(where, 0.0) + moments
     said = [
         f"{where} {' and '.join(words)}"
         for where, row in changes.items()
@@ -87,18 +87,6 @@ def _stands_for(fit: Fit, place: str) -> str:
     )
 
 
-def _is_factor(effect: Effect) -> bool:
-    """True for one factor on a value of the deck."""
-    single = effect.kind == "calibration" and len(effect.parameters) == 1
-    return single and effect.parameters[0].kind == "log"
-
-
-def _log_change(effect: Effect, x: np.ndarray) -> float:
-    """Ln of the fitted value over the deck's."""
-    row, p = effect.reported(x, np.zeros(1) + effect.parameters[0].sd)[0], effect.parameters[0]
-    return float(np.log(row.value / p.value(p.nominal)))
-
-
 def _more(of: np.ndarray, up: str, down: str) -> Iterator[str]:
     """A change of more than half a per cent and its standard deviation in words.
 
@@ -106,10 +94,7 @@ def _more(of: np.ndarray, up: str, down: str) -> Iterator[str]:
     """
     change, variance = of
     way = up if change > 0 else down
-    if abs(change) > max(LEAST, np.sqrt(variance)):
-        far = abs(change) > np.log(2)
-        yield (
-            f"{way} by a factor of {np.exp(abs(change)):.3g}"
-            if far
-            else (f"{100 * abs(np.expm1(change)):.1f} % {way}")
-        )
+    if abs(change) > max(np.log(2), np.sqrt(variance)):
+        yield f"{way} by a factor of {np.exp(abs(change)):.3g}"
+    elif abs(change) > max(LEAST, np.sqrt(variance)):
+        yield f"{100 * abs(np.expm1(change)):.1f} % {way}"

@@ -1,4 +1,4 @@
-"""One decision: from hypotheses to a verdict with its reasons.
+"""One decision: from hypotheses to a verdict with its reasons, and the diagnosis that follows.
 
 Numbers that cost a fit are computed when they are read, so that only the fits that decide are made.
 
@@ -11,16 +11,22 @@ Numbers that cost a fit are computed when they are read, so that only the fits t
 7. Tied effects are listed together; a leader that is not named puts calibration in doubt.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from ..inference.hypothesis_fit import HypothesisFit
 from . import decision_in_words as words
 from .decision_in_words import BEYOND, Reason
-from .decision_rules import RULES, TIED, fits
+from .decision_rules import RULES, fits
+from .diagnosis import Diagnosis
 from .hypotheses import ALONE, Explanation, Hypotheses
 
+ONE = ("missing physics", "calibration only", "nothing missing")  # verdicts of one explanation
+MOST_OPEN = 3  # effects whose further measurements are forecast
 Passed = tuple[tuple[Explanation, Reason], ...]
 Step = str | Callable[[], str]
 
@@ -48,10 +54,10 @@ class Decision:
     @property
     def sentences(self) -> tuple[str, ...]:
         """One sentence for every step that has something to report."""
-        every = (step if isinstance(step, str) else step() for step in self.steps)
-        one = None if self.named or self.one_of else self.tested
-        test = None if one is None else one.chances.test
-        last = words.test_of_fit(one) if one and test and not test.passes else ""
+        every, last = (step if isinstance(step, str) else step() for step in self.steps), ""
+        if self.tested and not (self.named or self.one_of):
+            test = self.tested.chances.test
+            last = words.test_of_fit(self.tested) if test and not test.passes else ""
         return tuple(s + words.UNEXPLAINED if s == last else s for s in every if s)
 
     def then(self, *steps: Step, **changes: Any) -> "Decision":
@@ -60,11 +66,19 @@ class Decision:
 
 
 def decide(case: Hypotheses) -> Decision:
-    """Return the decision."""
+    """Return the decision; too few data list the explanations near the best, with calibration."""
     decision = _decided(case)
     answer = _with_ties(case, decision)
     alone = case.contradicted and decision.named and len(answer.one_of) < 2
-    return answer if case.enough or alone else _too_few(case, decision)
+    if case.enough or alone:
+        return answer
+    gains = {ALONE: 0.0} | {h.name: case.gain(h) for h in decision.order}
+    least = max(gains.values()) - RULES.tied
+    one_of = tuple(name for name, gain in gains.items() if gain >= least)
+    return decision.then(
+        words.too_few(case, one_of),
+        verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,
+    )  # fmt: skip
 
 
 def _decided(case: Hypotheses) -> Decision:
@@ -78,7 +92,7 @@ def _decided(case: Hypotheses) -> Decision:
         refusals.append(found)
     decision = decision.then(*refusals)
     if decision.named:
-        decision = _with_lead_refined(case, decision)
+        decision = _on_accurate_model(case, decision, decision.order[0])
     return _alternatives_tested(case, decision) if decision.refused else decision
 
 
@@ -184,14 +198,17 @@ def _perhaps_present(case: Hypotheses, named: Explanation) -> Sequence[str]:
     return tuple(part.values())
 
 
-def _with_lead_refined(case: Hypotheses, decision: Decision) -> Decision:
-    """Decide on the leader, fitted again on a refined basis, with all data."""
-    lead, *behind = decision.order
-    made = lead.refined
-    decision = decision.then(made.note, order=(made, *behind))
+def _on_accurate_model(case: Hypotheses, decision: Decision, one: Explanation) -> Decision:
+    """Decide on an explanation, fitted again on a refined basis, with all data; it is first.
+
+    The leader has passed its test of fit when the decision names it; a rival is tested here.
+    """
+    made, others = one.refined, (h for h in decision.order if h is not one)
+    decision = decision.then(made.note, order=(made, *others), due=case.due(made))
     if made.lost:
         return decision.then(verdict="not in catalogue", reason=Reason.NOT_FITTED, named=False)
-    return _apply_held_out(case, decision.then(due=case.due(made)))
+    decision = decision if decision.named else _tested(decision, made)
+    return _apply_held_out(case, decision) if decision.named else decision
 
 
 def _alternatives_tested(case: Hypotheses, refused: Decision) -> Decision:
@@ -209,7 +226,9 @@ def _alternatives_tested(case: Hypotheses, refused: Decision) -> Decision:
         gain = case.gain(alternative)
         if gain <= refused.due or case.gain(lead) - gain > refused.due:
             break
-        following = _decided_next(case, refused, alternative, over)
+        said = words.next_is(case, *over[-1], alternative)
+        begun = refused.then(said, passed_over=over, one_of=(), news=None)
+        following = _on_accurate_model(case, begun, alternative)
         one, why = following.order[0], following.reason
         if following.named:
             if fits(one.p_after(lead)):
@@ -217,33 +236,6 @@ def _alternatives_tested(case: Hypotheses, refused: Decision) -> Decision:
             why = Reason.DAMPING
         over = (*over, (one, why))
     return refused.then(passed_over=over)
-
-
-def _decided_next(
-    case: Hypotheses, refused: Decision, alternative: Explanation, over: Passed
-) -> Decision:
-    """Test a rival, placed in front of the explanations that were passed over."""
-    made = alternative.refined
-    others = (h for h in refused.order if h is not alternative)
-    led = refused.then(
-        words.next_is(case, *over[-1], made), made.note,
-        order=(made, *others), due=case.due(made), passed_over=over, one_of=(), news=None,
-    )  # fmt: skip
-    if made.lost:
-        return led.then(reason=Reason.NOT_FITTED, named=False)
-    led = _tested(led, made)
-    return _apply_held_out(case, led) if led.named else led
-
-
-def _too_few(case: Hypotheses, decision: Decision) -> Decision:
-    """Name nothing; list the explanations within ``RULES.tied`` of the best, with calibration."""
-    gains = {ALONE: 0.0} | {h.name: case.gain(h) for h in decision.order}
-    least = max(gains.values()) - RULES.tied
-    one_of = tuple(name for name, gain in gains.items() if gain >= least)
-    return decision.then(
-        words.too_few(case, one_of),
-        verdict="not in catalogue", reason=Reason.TOO_FEW, named=False, one_of=one_of,
-    )  # fmt: skip
 
 
 def _with_ties(case: Hypotheses, decision: Decision) -> Decision:
@@ -260,7 +252,7 @@ def _with_ties(case: Hypotheses, decision: Decision) -> Decision:
     return decision.then(words.tied(every, names), one_of=names)
 
 
-def tied(best: Explanation, rows: Sequence[Explanation], gap: float = TIED) -> tuple[str, ...]:
+def tied(best: Explanation, rows: Sequence[Explanation]) -> tuple[str, ...]:
     """Names of the rows that explain the data as well as the best one, whose own name is first.
 
     A row that reduces to the best one, as fitted or within its intervals, is left out. A simpler
@@ -272,7 +264,7 @@ def tied(best: Explanation, rows: Sequence[Explanation], gap: float = TIED) -> t
         for r in rows
         if best.fit.effect.name not in (r.fit.remarks.becomes, r.fit.remarks.nearly)
     }
-    return tuple(n for n, b in behind.items() if b < gap or n == best.fit.remarks.nearly)
+    return tuple(n for n, b in behind.items() if b < RULES.tied or n == best.fit.remarks.nearly)
 
 
 def _with_doubt(case: Hypotheses, decision: Decision) -> Decision:
@@ -305,3 +297,52 @@ def _with_doubt(case: Hypotheses, decision: Decision) -> Decision:
     open_ = (BEYOND,) if decision.refused or small else ()
     one_of = (*(() if unfit else (ALONE,)), *near, *open_)
     return decision.then(words.doubt(case, lead, decision.due), one_of=one_of)
+
+
+def concluded(case: Hypotheses, decision: Decision) -> tuple[Diagnosis, tuple[str, ...]]:
+    """The diagnosis that follows from a decision, and reasons not to trust it."""
+    found, tested, lead = case.found, decision.tested, next(iter(decision.order), None)
+    settled = words.settled_by(decision.one_of) if decision.named else ""
+    said = replace(
+        found, verdict=decision.verdict, notes=(*found.notes, *decision.sentences),
+        hypotheses=tuple(h.fit for h in decision.order),
+        adequacy=None if tested is None else tested.chances.test,
+        one_of=(*decision.one_of, settled) if settled else decision.one_of,
+        refused=words.refusal(case, lead, decision.reason) if lead and decision.refused else "",
+        passed_over=tuple((h.name, words.refusal(case, h, why)) for h, why in decision.passed_over),
+    )  # fmt: skip
+    if lead is None or not decision.named:
+        return said, tuple(_doubts(case, decision))
+    gains = lead.together.gains if lead.together else ()
+    fits = (lead.own, *said.hypotheses[1:])
+    said = replace(said, hypotheses=fits, written=lead.written, halved=lead.halved, gains=gains)
+    return said, lead.distrust
+
+
+def _doubts(case: Hypotheses, decision: Decision) -> Iterator[str]:
+    if not decision.refused or decision.news is None or not decision.one_of:
+        return
+    lead = decision.order[0]
+    gain = case.gain(lead) + decision.news
+    if gain > decision.due:
+        yield words.imitated(case, lead, decision.reason, gain)
+
+
+def open_explanations(
+    case: Hypotheses, decision: Decision, found: Diagnosis
+) -> tuple[list[HypothesisFit], list[str], np.ndarray]:
+    """Explanations that the data cannot separate, or the only one: fits, names, probabilities.
+
+    The probabilities are even.  Empty where no explanation stands.
+    Calibration with its errors of form stands for what the catalogue lacks as well.
+    """
+    listed = [h for h in decision.order if h.name in decision.one_of][:MOST_OPEN]
+    names = [h.name for h in listed]
+    if other := [name for name in (ALONE, BEYOND) if name in decision.one_of]:
+        listed, names = [*listed, case.null], [*names, " or ".join(other)]
+    if len(listed) < 2:
+        if found.verdict not in ONE or decision.one_of:
+            return [], [], np.zeros(0)
+        one = found.found or found.null
+        return [one], [one.name], np.ones(1)
+    return [h.whole for h in listed], names, np.full(len(listed), 1 / len(listed))

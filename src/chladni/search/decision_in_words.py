@@ -40,13 +40,9 @@ def refusal(case: Hypotheses, one: Explanation, why: Reason) -> str:
         assert one.after is not None
         return one.after.what
     if why is Reason.UNFIT:
-        return f"{why.value}: {_left_by(one)}"
+        assert one.chances.test is not None
+        return f"{why.value}: {one.chances.test.what}"
     return why.value
-
-
-def _left_by(one: Explanation) -> str:
-    test = one.chances.test
-    return "" if test is None else test.what
 
 
 def test_of_fit(one: Explanation) -> str:
@@ -118,7 +114,8 @@ def set_refused(made: Explanation, why: Reason, held_out: str = "") -> str:
     if why is Reason.NOT_SUPPORTED:
         said = f"that is too little for {held_out}"
     elif why is Reason.UNFIT:
-        said = f"the residual is not explained: {_left_by(made)}"
+        assert made.chances.test is not None
+        said = f"the residual is not explained: {made.chances.test.what}"
     elif why is Reason.NOT_FITTED:
         said = f"they could not be fitted again: {made.lost}"
     else:

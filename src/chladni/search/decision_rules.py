@@ -4,11 +4,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-TIED = 10.0  # in -2 ln evidence (odds of e^5): explanations within this gap are tied
-GOOD_PART = (
-    0.5  # of the required gain, which fitted responses must bring if held-out data add the rest
-)
-
 
 def _rule(value: float, why: str) -> Any:
     """A number and the purpose of its rule."""
@@ -26,7 +21,7 @@ class DecisionRules:
     )
     chance_of_poles: float = _rule(1e-3, "chance of a false alarm from natural frequencies")
     expected_due: float = _rule(
-        TIED, "gain required of a property that the material usually has (grain of wood)"
+        10.0, "gain required of a property that the material usually has (grain of wood)"
     )
     changed: float = _rule(6.0, "gain of E, rho and t from which the deck counts as calibrated")
     something_else: float = _rule(
@@ -34,9 +29,9 @@ class DecisionRules:
         "prior odds of a cause outside the catalogue: with p = 0.01 of the test of fit it is even",
     )
     good_part: float = _rule(
-        GOOD_PART, "part of the required gain that fitted responses bring if other data agree"
+        0.5, "part of the required gain that fitted responses bring if other data agree"
     )
-    tied: float = _rule(TIED, "gap up to which two explanations are one answer")
+    tied: float = _rule(10.0, "gap up to which two explanations are one answer")
 
 
 RULES = DecisionRules()

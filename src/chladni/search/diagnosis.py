@@ -8,7 +8,7 @@
 6. Sets of several effects (``several``), if an effect is named or nothing fits.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -20,17 +20,12 @@ from ..effects.search_context import Candidate
 from ..errors import ModelError
 from ..inference.adequacy import FitTest, adequacy
 from ..inference.discrepancy import MEDIAN
-from ..inference.hypothesis_fit import (
-    CLOSE,
-    ROUGH,
-    HypothesisFit,
-    UpdatingProblem,
-    fitted,
-)
+from ..inference.hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted
 from ..inference.likelihood import Responses
 from ..inference.local_damping_test import damping_instead_of_spin, damping_test_along_effect
 from ..inference.written_hypothesis import as_written, preferred_mesh
-from ..progress import within
+from ..model.assembly import Assembly
+from ..progress import Progress, silent, within
 from ..reduced.accuracy import accuracy
 from ..reduced.reduced_model import evaluate
 from ..sparse.freed_memory import give_back_freed_memory
@@ -41,8 +36,7 @@ from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
 
 SHIFTS = np.arange(-14, 15) / 20  # of ln E: 2.5 % of frequency apart
-
-Progress = Callable[[str, float], None]
+CAREFUL = 0.005  # least spread of ln f of careful models: a smaller error moves nothing
 
 
 @dataclass(frozen=True)
@@ -107,8 +101,7 @@ class Diagnosis:
     @property
     def due(self) -> float:
         """Gain in -2 ln evidence that is needed to name the best of the families tried."""
-        first = self.hypotheses[0] if self.hypotheses else self.null
-        return self.due_of(first)
+        return self.due_of(self.hypotheses[0] if self.hypotheses else self.null)
 
     def due_of(self, hypothesis: HypothesisFit, more: bool = False) -> float:
         """Required gain of a hypothesis; one set ``more`` than the families may have been tried."""
@@ -127,17 +120,18 @@ class Diagnosis:
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence
 
 
-def diagnose(problem: UpdatingProblem, progress: Progress = lambda text, share: None) -> Diagnosis:
+def diagnose(problem: UpdatingProblem, progress: Progress = silent) -> Diagnosis:
     """Name the missing physics, or say that none is missing."""
     progress("calibration without new physics", 0.05)
     problem, null = without_effects(problem)
-    nominal = best_base_fit(problem, problem.nuisance, nominal_starts(problem))
+    nominal = best_base_fit(problem, problem.nuisance, [problem.begun(problem.nuisance)])
     progress("scan of the catalogue", 0.2)
     tried, lost = proposals(UpdatingContext(problem, null))
     give_back_freed_memory()
     hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
     notes = (*unasked(problem), *could_not_be_evaluated(tried, lost, hypotheses))
-    null = _restarted(problem, null, hypotheses)
+    starts = [taken(problem, lead, ("calibration", "nuisance")) for lead in hypotheses[:2]]
+    null = restarted(problem, null, starts)
     progress("verdict", 0.95)
     plain = as_written(null, problem.mass_measurement)
     finer = preferred_mesh(null, plain, problem.mass_measurement)
@@ -156,11 +150,9 @@ def could_not_be_evaluated(
     tried: Sequence[Candidate], lost: Mapping[str, str], hypotheses: Sequence[HypothesisFit]
 ) -> Iterator[str]:
     """Sentences on families that failed numerically, where they were scanned or fitted."""
-    fitted_ones = {t.effect.name for t in hypotheses}
-    proposed = dict.fromkeys(c.effect.name for c in tried)
-    unfit = {name: "no start of its fit is a structure" for name in proposed}
+    unfit = dict.fromkeys((c.effect.name for c in tried), "no start of its fit is a structure")
     for name, why in {**unfit, **lost}.items():
-        if name not in fitted_ones:
+        if name not in {t.effect.name for t in hypotheses}:
             yield f"the hypothesis {name} could not be evaluated: {why}"
 
 
@@ -181,7 +173,7 @@ def _with_sets_of_effects(
     many = isinstance(data, Responses) and data.error is not None
     if not (many and alone.hypotheses) or (alone.leading is alone.null and not unfit):
         return alone
-    due = threshold(data, len(alone.hypotheses))
+    due = required_gain(False, len(alone.hypotheses))
     search = several(problem, alone.hypotheses, due, unfit, progress)
     notes = (*alone.notes, search.note) if search.note else alone.notes
     return replace(alone, sets=search.sets, notes=notes)
@@ -191,13 +183,11 @@ def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
     """Test the data against the predictions of a hypothesis."""
     alone = hypothesis.effect not in hypothesis.fit.effects  # errors spread from the null as it is
     winner = hypothesis if alone else problem.about_itself(hypothesis, ROUGH)
-    state, damping = winner.fit.state, problem.damping
-    complex_modes = state.dissipated is not None or state.spin is not None
-    damping = None if damping is None else damping.beyond(state)
-    fits = adequacy(
-        winner, problem.mass_measurement, problem.labels, damping=damping,
-        coupling=None if complex_modes else problem.coupling,
-    )  # fmt: skip
+    state, mass, labels = winner.fit.state, problem.mass_measurement, problem.labels
+    real = state.dissipated is None and state.spin is None
+    damping, coupling = problem.damping, problem.coupling if real else None
+    damping = damping and damping.beyond(state)
+    fits = adequacy(winner, mass, labels, damping=damping, coupling=coupling)
     if fits is None:
         return FitChances(None, np.nan, np.nan)
     fits = damping_instead_of_spin(fits, winner, problem)
@@ -207,8 +197,7 @@ def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
 
 def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
     """The problem with errors of the model's form as they spread from the null, and the null."""
-    model, delta = problem.reduced.model, MEDIAN
-    state = evaluate(model, problem.base, problem.mean(), False)
+    state, delta = evaluate(problem.reduced.model, problem.base, problem.mean(), False), MEDIAN
     starts = _null_starts(problem)
     for k in range(2):
         problem = problem.allowing_errors(state, delta)
@@ -220,11 +209,6 @@ def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, Hypothes
             break
         state, starts = null.fit.state, [null.fit.x]
     return on_its_basis(problem, null)
-
-
-CAREFUL = (
-    0.005  # least spread of ln f of careful models: a smaller error of the basis moves nothing
-)
 
 
 def on_its_basis(
@@ -249,16 +233,6 @@ def on_its_basis(
     return problem, fit
 
 
-def threshold(data: object, tried: int | None = None) -> float:
-    """The gain in -2 ln evidence that is needed to name anything from responses or from poles.
-
-    Parameters
-    ----------
-    tried : families that proposed something; all that are known where it is not said
-    """
-    return required_gain(not isinstance(data, Responses), tried or len(families()))
-
-
 def best_base_fit(
     problem: UpdatingProblem, effects: Sequence[Effect], starts: list[np.ndarray]
 ) -> HypothesisFit:
@@ -266,17 +240,11 @@ def best_base_fit(
     model, fits = problem.reduced.model, []
     for k, x in enumerate(starts):
         try:
-            data, mass = problem.data, problem.mass_measurement
-            fits.append(fitted(model, effects, data, mass, x))
+            fits.append(fitted(model, effects, problem.data, problem.mass_measurement, x))
         except ModelError:
             if not fits and k == len(starts) - 1:
                 raise
     return HypothesisFit(Effect(), min(fits, key=lambda f: f.neg2_log_evidence), model)
-
-
-def nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:
-    """The prior mean of the nuisances."""
-    return [np.array([p.mean for e in problem.nuisance for p in e.parameters])]
 
 
 def _null_starts(problem: UpdatingProblem) -> list[np.ndarray]:
@@ -299,13 +267,38 @@ def _null_starts(problem: UpdatingProblem) -> list[np.ndarray]:
     return [mean] if np.array_equal(best, mean) else [mean, best]
 
 
-def _restarted(
-    problem: UpdatingProblem, null: HypothesisFit, hypotheses: list[HypothesisFit]
+def restarted(
+    problem: UpdatingProblem, null: HypothesisFit, starts: Sequence[np.ndarray]
 ) -> HypothesisFit:
-    """The null again, from the base parameters of the leaders: it must not lose by a bad start."""
+    """The null again, from where other fits ended: it must not lose by a bad start."""
     tries = [null]
-    for lead in hypotheses[:2]:
+    for start in starts:
         with suppress(ModelError):
-            start = taken(problem, lead, ("calibration", "nuisance"))
             tries.append(best_base_fit(problem, problem.base, [start]))
     return min(tries, key=lambda t: t.neg2_log_evidence)
+
+
+def assemblies(given: Assembly, diagnosis: Diagnosis) -> tuple[Assembly, Assembly]:
+    """The structure calibrated without new physics, and with the effect: one if none is named."""
+    found = diagnosis.found
+    nothing = diagnosis.verdict == "nothing missing"
+    calibrated = given if nothing else applied(given, diagnosis.plain)
+    if found is None or not found.physics:
+        return calibrated, calibrated
+    return calibrated, applied(given, diagnosis.as_deck or found)
+
+
+def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
+    """The assembly with the calibrated parameters and the effects of a hypothesis in it.
+
+    Effects that change the material of a part come before effects that divide the part.
+    """
+
+    def turn(effect: Effect) -> int:
+        if effect not in hypothesis.effects:
+            return 0
+        return 1 if effect.traits.remakes_structure else 2
+
+    for effect in sorted(hypothesis.fit.effects, key=turn):
+        assembly = effect.apply(assembly, hypothesis.fit.of(effect))
+    return assembly

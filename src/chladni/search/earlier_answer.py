@@ -51,28 +51,20 @@ class KnownParameter:
 
     def of(self, p: Parameter) -> Parameter:
         """The parameter with this prior; none becomes wider than it was."""
-        if p.kind == "log":
-            return replace(p, mean=self.mean + float(np.log(self.scale / p.scale)),
-                           sd=min(self.sd, p.sd))  # fmt: skip
         size = self.scale / p.scale
+        if p.kind == "log":
+            return replace(p, mean=self.mean + float(np.log(size)), sd=min(self.sd, p.sd))
         return replace(p, mean=size * self.mean, sd=min(abs(size) * self.sd, p.sd))
 
 
 @dataclass(frozen=True)
 class KnownEffect:
-    """An effect as it was found.
-
-    Attributes
-    ----------
-    two_log_odds : 2 ln of its odds over calibration
-    text : where its parameters begin, in words
-    point_m, radius_m : its place [m], known to 95 %
-    """
+    """An effect as it was found."""
 
     name: str
-    two_log_odds: float
-    text: str
-    point_m: tuple[float, ...] | None
+    two_log_odds: float  # over calibration
+    text: str  # where its parameters begin, in words
+    point_m: tuple[float, ...] | None  # its place, known to 95 % within the radius
     radius_m: float
     parameters: tuple[KnownParameter, ...]
 
@@ -101,24 +93,14 @@ class KnownEffect:
 
 @dataclass(frozen=True, repr=False)
 class EarlierAnswer(ShownBriefly):
-    """Odds and posterior of an answer, for a later recording.
+    """Odds and posterior of an answer, for a later recording."""
 
-    Attributes
-    ----------
-    said : its verdict, and the names
-    shared : posterior of the parameters of the object
-    effects : of every family that was tried alone
-    mass : the weighed mass [kg] it used
-    data : digests of the responses it used, with their labels
-    folder : from which it was read
-    """
-
-    said: str
-    shared: Posterior
-    effects: tuple[KnownEffect, ...]
-    mass: float | None
-    data: dict[str, str]
-    folder: str = ""
+    said: str  # its verdict, and the names
+    shared: Posterior  # of the parameters of the object
+    effects: tuple[KnownEffect, ...]  # of every family that was tried alone
+    mass: float | None  # that was weighed and used [kg]
+    data: dict[str, str]  # digests of the responses it used, with their labels
+    folder: str = ""  # from which it was read
 
     def informed(self, problem: UpdatingProblem) -> UpdatingProblem:
         """The problem with the effects of all families informed."""
@@ -129,12 +111,7 @@ class EarlierAnswer(ShownBriefly):
         return replace(problem, families=families)
 
     def refuse_again(self, data: dict[str, str], path: Path) -> None:
-        """Refuse responses that the earlier answer used already.
-
-        Raises
-        ------
-        FileError
-        """
+        """Refuse responses that the earlier answer used already."""
         again = [label for digest, label in data.items() if digest in self.data]
         if again:
             more = f" and {len(again) - 1} more" if len(again) > 1 else ""
@@ -177,20 +154,16 @@ def earlier_answer(
 ) -> EarlierAnswer:  # fmt: skip
     """Odds and posterior of a diagnosis; it used the data of the answer before it as well."""
     alone = [h for h in found.hypotheses if len(h.effects) == 1]
-    effects = tuple(
-        _known(h, found.two_log_bayes_factor(h)) for h in alone if h.effect in h.fit.effects
-    )
+    effects = []
+    for h in (h for h in alone if h.effect in h.fit.effects):
+        effect, x, sd = h.effect, h.fit.of(h.effect), h.fit.sd(h.effect)
+        place, gain = effect.location(x, sd), found.two_log_bayes_factor(h)
+        each = zip(effect.parameters, x.tolist(), effect.widened(sd).tolist(), strict=True)
+        own = tuple(KnownParameter(p.name, mean, s, p.scale) for p, mean, s in each)
+        where = effect.text, place.point_m, place.radius_m or 0.0
+        effects.append(KnownEffect(effect.name, gain, *where, own))
     used = data if before is None else before.data | data
-    return EarlierAnswer(said, _mixture([found.null, *alone]), effects, mass, used)
-
-
-def _known(h: HypothesisFit, gain: float) -> KnownEffect:
-    x, sd = h.fit.of(h.effect), h.fit.sd(h.effect)
-    place, wide = h.effect.location(x, sd), h.effect.widened(sd)
-    each = zip(h.effect.parameters, x.tolist(), wide.tolist(), strict=True)
-    parameters = tuple(KnownParameter(p.name, mean, s, p.scale) for p, mean, s in each)
-    radius = place.radius_m or 0.0
-    return KnownEffect(h.effect.name, gain, h.effect.text, place.point_m, radius, parameters)
+    return EarlierAnswer(said, _mixture([found.null, *alone]), tuple(effects), mass, used)
 
 
 def _mixture(every: Sequence[HypothesisFit]) -> Posterior:
@@ -239,13 +212,7 @@ def posterior_json(known: EarlierAnswer) -> dict[str, Any]:
 
 
 def read_earlier(folder: Path) -> EarlierAnswer:
-    """Read what the answer of a run leaves.
-
-    Raises
-    ------
-    FileError
-        If the run has no such file, or it has another form.
-    """
+    """Read what the answer of a run leaves."""
     path = folder / FILE
     if not path.is_file():
         raise FileError(
@@ -266,8 +233,7 @@ def read_earlier(folder: Path) -> EarlierAnswer:
 
 def _read(rows: Sequence[dict[str, Any]]) -> Iterator[KnownEffect]:
     for row in rows:
-        point = row["point_m"]
-        if point is not None:
+        if (point := row["point_m"]) is not None:
             x, y, z = map(_finite, point)
             point = x, y, z
         yield KnownEffect(

@@ -120,14 +120,11 @@ def together(reduced: ReducedProblem, rows: Sequence[Sequence[Connection]]) -> l
     """The fasteners of each row as one, with what the sheets give between them as well."""
     every, M = [joined(row) for row in rows], reduced.structure.system.M
     static = attachments(reduced.factor, sp.csr_array(sp.vstack([one.rows for one in every])))
-    out, start = [], 0
-    for one in every:
-        stop = start + one.rows.shape[0]
-        own = static[:, start:stop]
+    out, ends = [], np.cumsum([one.rows.shape[0] for one in every])
+    for one, own in zip(every, np.split(static, ends[:-1], axis=1), strict=True):
         flexibility = one.rows @ own
         rest = _rest(np.eye(len(flexibility)) - flexibility)
         out.append(Loosened(one, rest, own.T @ (M @ own)))
-        start = stop
     return out
 
 
@@ -141,12 +138,7 @@ def fastener_scores(
     base: Baseline, reduced: ReducedProblem, data: Responses, joints: Sequence[Loosened],
     left: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Score of each fastener with each share of its stiffness left (n, k).
-
-    Parameters
-    ----------
-    left : (n, k)   f
-    """
+    """Score of each fastener with each share f of its stiffness left (n, k)."""
     state, out = base.state, np.empty(left.shape)
     for j, one in enumerate(joints):
         H = loosened_receptance(state, reduced, data, one, left[j])

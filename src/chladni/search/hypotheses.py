@@ -18,10 +18,10 @@ from ..inference.written_hypothesis import as_written, preferred_mesh
 from .basis_refinement import refined
 from .decision_rules import RULES
 from .diagnosis import Diagnosis, FitChances, fit_test
-from .question import Prepared, Question
+from .question import Prepared
 from .search_round import on_common_basis, taken
 from .several import Several
-from .verdict_models import scores_of
+from .written_scores import scores_of
 
 ALONE = "calibration alone"
 
@@ -32,7 +32,7 @@ class Explanation:
 
     case: "Hypotheses"
     fit: HypothesisFit
-    rival: bool = False  # whether it is behind the leader, and has lost the model of its own
+    rival: bool = False  # whether it has lost the model of its own: the leader alone keeps it
     together: Several | None = None  # its members and what each gains, of several effects
     known: FitChances | None = None  # its test of fit, where it was made before
     # of the refinement that made its fit
@@ -40,7 +40,6 @@ class Explanation:
     distrust: tuple[str, ...] = ()
     lost: str = ""  # why it could not be fitted again
     after: FitTest | None = None  # of the damping it leaves along the change of a leader
-    forgotten: bool = False  # whether its model is gone
 
     @property
     def name(self) -> str:
@@ -101,10 +100,9 @@ class Explanation:
 
         The hypothesis says which mesh they prefer: without a strong effect no mesh fits.
         """
-        measured = self.case.prepared.problem.mass_measurement
-        finer = preferred_mesh(self.own, self.written, measured)
-        calibrated = None if finer is None else self.case.plain_halved
-        return () if finer is None or calibrated is None else (calibrated, finer)
+        finer = preferred_mesh(self.own, self.written, self.case.prepared.problem.mass_measurement)
+        calibrated = finer and self.case.plain_halved
+        return (calibrated, finer) if finer and calibrated else ()
 
     @cached_property
     def Q(self) -> tuple[tuple[float, float], ...]:
@@ -119,10 +117,8 @@ class Explanation:
 
     def _scores(self, decks: tuple[HypothesisFit, ...]) -> tuple[tuple[float, float], ...]:
         prepared = self.case.prepared
-        stages = [(deck, deck.fit.state) for deck in decks]
-        return tuple(
-            (a, b) for a, b in scores_of(prepared, self.fit, stages, prepared.held.choosing)
-        )
+        scores = scores_of(prepared, self.fit, decks, prepared.held.choosing)
+        return tuple((calibrated, own) for calibrated, own in scores)
 
     def _is_worse(self, Q: tuple[tuple[float, float], ...]) -> bool:
         """A fault of a few channels is compared on the held-out data of these channels."""
@@ -145,12 +141,10 @@ class Explanation:
         """The hypothesis fitted again on an accurate model; a rival first gets its own basis."""
         case = self.case
         try:
-            made = refined(case.question, case.prepared, self.whole)
+            fit, note, distrust = refined(case.prepared, self.whole)
         except ModelError as error:
             return Explanation(case, self.fit, together=self.together, lost=str(error))
-        again = Explanation(
-            case, made.hypothesis, together=self.together, note=made.note, distrust=made.distrust
-        )
+        again = Explanation(case, fit, together=self.together, note=note, distrust=distrust)
         if self.rival:
             if case.spare is not None:
                 case.spare.forget_model()
@@ -160,15 +154,11 @@ class Explanation:
     @property
     def whole(self) -> HypothesisFit:
         """The fit with a model of its own: a diagnosis keeps only its leader's."""
-        if not (self.rival or self.forgotten):
+        if not self.rival:
             return self.fit
-        null, problem, effect = (
-            self.case.found.null.data,
-            self.case.prepared.problem,
-            self.fit.effect,
-        )
-        assert isinstance(null, (Responses, Poles))
-        problem = replace(problem, data=null.rebased(problem.reduced.model))
+        problem, null, effect = self.case.prepared.problem, self.case.found.null, self.fit.effect
+        assert isinstance(null.data, (Responses, Poles))
+        problem = replace(problem, data=null.data.rebased(problem.reduced.model))
         base = taken(problem, self.fit, ("calibration", "nuisance"))
         return problem.fitted_with(effect, self.fit.fit.of(effect), base)
 
@@ -186,14 +176,13 @@ class Explanation:
         self.fit = on_common_basis(self.case.prepared.problem, self.fit)
         for form in ("own", "written", "halved"):
             vars(self).pop(form, None)
-        self.forgotten = True
+        self.rival = True
 
 
 @dataclass(eq=False)
 class Hypotheses:
     """All hypotheses of a diagnosis, and the problem on which one of them is fitted again."""
 
-    question: Question
     prepared: Prepared
     found: Diagnosis
     # the last rival that was fitted again; it keeps its model, 10 to 300 MB on a tailgate, until
@@ -259,8 +248,7 @@ class Hypotheses:
         No rule of evidence keeps a deck whose natural frequencies are farther off than those of any
         model. Wide priors would charge its calibration more than it gains on few frequencies.
         """
-        deck = self.found.nominal
-        data = deck.data
+        deck, data = self.found.nominal, self.found.nominal.data
         misfits = isinstance(data, Poles) and not of_poles(data, deck.fit.state).passes
         changed = misfits or -self.found.two_log_bayes_factor(deck) > RULES.changed
         return "calibration only" if changed or self.null.strained else "nothing missing"

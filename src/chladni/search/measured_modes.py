@@ -1,6 +1,8 @@
-"""Modes of the test as decks are compared with them, and the damping they lend a model's modes."""
+"""Modes of the test, their partners in every deck, and the damping they lend a model's modes."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +13,10 @@ from ..ema.mode_pairing import LEAST_CHANNELS, ModePairs, pair
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..inference.pole_data import Poles
+from ..inference.result import FrequencyError, FrequencyRow
+from .measured_frequencies import significant
 from .question import Prepared
+from .written_scores import seen
 
 BEYOND = 2.0  # times the highest frequency of the test: as far as a partner is looked for
 _LEAST = 0.02  # of its lowest: modes below are rigid motions
@@ -70,9 +75,7 @@ def measured_modes(prepared: Prepared) -> MeasuredModes:
         return MeasuredModes(f, prepared.damping, None if shapes is None else shapes.values.T)
     found = prepared.identified
     assert found is not None
-    low, high = found.band
-    keep = (found.frequency >= low) & (found.frequency <= high) & (found.damping < 0.05)
-    keep &= found.relative_delta_chi2 > 3.0
+    keep = significant(found, *found.band) & (found.damping < 0.05)
     if found.residues.shape[1] < LEAST_CHANNELS:
         return MeasuredModes(found.frequency[keep], found.damping[keep])
     every = found.residues[keep]
@@ -81,3 +84,51 @@ def measured_modes(prepared: Prepared) -> MeasuredModes:
     turn = np.exp(-0.5j * np.angle((residues**2).sum(axis=1)))
     shapes = (residues * turn[:, None]).real.T
     return MeasuredModes(found.frequency[keep], found.damping[keep], shapes)
+
+
+def frequency_rows(
+    prepared: Prepared, test: MeasuredModes, stages: Sequence[tuple[str, Modelled]],
+    real: np.ndarray | None = None,
+) -> tuple[FrequencyRow, ...]:  # fmt: skip
+    """Identified frequencies and those of every stage ("before", "calibrated", "after")."""
+    known = np.full(len(test.frequency), np.nan) if test.damping is None else test.damping
+    rows = [
+        FrequencyRow(f, damping=None if np.isnan(zeta) else zeta)
+        for f, zeta in zip(test.frequency.tolist(), known.tolist(), strict=True)
+    ]
+    for name, model in stages if rows else ():
+        modes = test.near(model)
+        at, value = _paired(prepared, model, modes, test, real)
+        for k in np.flatnonzero(at >= 0):
+            found: dict[str, Any] = {f"{name}_hz": float(modes.frequency[at[k]])}
+            found[f"mac_{name}"] = None if np.isnan(value[k]) else float(value[k])
+            rows[k] = replace(rows[k], **found)
+    return tuple(rows)
+
+
+def _paired(
+    prepared: Prepared, model: Modelled, modes: ModalModel, test: MeasuredModes,
+    real: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Model mode of every test mode (-1: none) and their MAC (n,)."""
+    n, question = len(test.frequency), prepared.question
+    at, value = np.full(n, -1), np.full(n, np.nan)
+    if not isinstance(prepared.score, Poles) or test.shapes is not None:
+        pairs = test.pairs(question.outputs, model, modes)
+        at[pairs.test], value[pairs.test] = pairs.model, pairs.mac
+        return at, value
+    only = Modelled(model.structure, modes, model.band)
+    score, state = seen(question, prepared.score, only, prepared.problem.setup.f_max)
+    assert isinstance(score, Poles)
+    return score.forced(state, np.ones(n, bool) if real is None else real)[1], value
+
+
+def frequency_error(rows: Sequence[FrequencyRow]) -> FrequencyError:
+    """Root mean square of ln(model/test) over the paired frequencies of every deck, in per cent."""
+
+    def rms(name: str) -> float | None:
+        both = [(f, r.test_hz) for r in rows if (f := getattr(r, f"{name}_hz"))]
+        d = np.log([model / test for model, test in both])
+        return float(100 * np.sqrt(np.mean(d**2))) if both else None
+
+    return FrequencyError(*map(rms, ("before", "calibrated", "after")))

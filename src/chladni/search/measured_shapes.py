@@ -74,11 +74,8 @@ def shape_data(
 def learned_noise(unlikely: np.ndarray) -> tuple[float, np.ndarray]:
     """Most probable common noise of the shapes, and the noise of each mode (r,).
 
-    ln of the noise of a mode is N(ln of the common one, ``OF_MODES``²).
-
-    Parameters
-    ----------
-    unlikely : (noises, spreads, r)   -2 ln density of each shape
+    ln of the noise of a mode is N(ln of the common one, ``OF_MODES``²). ``unlikely`` is -2 ln
+    density of each shape (noises, spreads, r).
     """
     away = np.log(NOISES) - np.log(NOISES)[:, None]
     prior = -0.5 * (away / OF_MODES) ** 2

@@ -15,7 +15,6 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.effect_context import ElementGrids
 from ..errors import ModelError
-from ..fem.measured_dofs import MeasuredDofs
 from ..inference.discrepancy import Form, form
 from ..inference.expected_information import OpenQuantity, Predicted, Rivals
 from ..inference.hypothesis_fit import HypothesisFit, UpdatingProblem
@@ -129,12 +128,7 @@ def outlook(
 ) -> Outlook | None:  # fmt: skip
     """Forecast every candidate measurement under each hypothesis; None without responses.
 
-    Parameters
-    ----------
-    hypotheses : each with its own model; of one alone, its least known quantity is forecast
-    names, probability : of each
-    kinds : of the candidates
-    allowed : where they may be; default anywhere
+    One hypothesis alone has its least known quantity forecast.
     """
     if not hypotheses or not isinstance(problem.data, Responses):
         return None
@@ -142,12 +136,10 @@ def outlook(
     found = list(measurements(problem, rivals, kinds, allowed))
     kept = _kept([seen for _, seen in found])
     seen = tuple(
-        Predicted(
-            np.stack([mean for mean, _ in each]),
-            tuple(F @ V for (_, F), V in zip(each, kept, strict=True)),
-        ).short
+        Predicted(np.stack([mean for mean, _ in each]),
+                  tuple(F @ V for (_, F), V in zip(each, kept, strict=True))).short
         for _, each in found
-    )
+    )  # fmt: skip
     known = Rivals(np.asarray(probability) / np.sum(probability))
     unknown = _unknown(rivals[0], kept[0], seen) if len(rivals) == 1 else None
     return Outlook(tuple(names), known, tuple(c for c, _ in found), seen, unknown)
@@ -159,8 +151,7 @@ def _unknown(rival: Rival, kept: np.ndarray, seen: Sequence[Predicted]) -> OpenQ
     That is Σ |F a|²/|a|² over the candidates.  Only the parameters of a named effect count; without
     one, E, rho and t.
     """
-    fit, L = rival.hypothesis.fit, rival.posterior[1]
-    own = rival.hypothesis.effects
+    fit, own, L = rival.hypothesis.fit, rival.hypothesis.effects, rival.posterior[1]
     own = own if any(e.parameters for e in own) else fit.effects
     wanted = [e in own and (e.kind != "nuisance") for e in fit.effects for _ in e.parameters]
     names = [quantity_of(e, p.name, fit.of(e)) for e in fit.effects for p in e.parameters]
@@ -201,93 +192,67 @@ def measurements(
     few = places.only(places.spread(MASSES))
     lines = data.s[np.unique(np.linspace(0, len(data.s) - 1, LINES).astype(int))]
     if "sensor" in kinds and allowed is not None and allowed.fixed.labels:
-        yield from _fixed(problem, rivals, lines, allowed.fixed)
+        fixed = allowed.fixed
+        sensors = _new(rivals, lines, fixed.rows(problem.reduced.structure), data.inputs)
+        for k, label in enumerate(fixed.labels):
+            test = _at("sensor", f"a sensor at {label}", label, fixed.points[k])
+            yield replace(test, fixed=True), [each.alone(2, k) for each in sensors]
     if "sensor" in kinds:
-        sensors = [_new(r, rivals[0], lines, places.rows, data.inputs) for r in rivals]
+        sensors = _new(rivals, lines, places.rows, data.inputs)
         for k in range(len(places)):
-            seen = [each.of_output(k) for each in sensors]
             test = _placed("sensor", "a sensor at", places, k)
-            yield replace(test, cost=test.cost * price.get(int(places.grids[k]), 1.0)), seen
+            test = replace(test, cost=test.cost * price.get(int(places.grids[k]), 1.0))
+            yield test, [each.alone(2, k) for each in sensors]
     if "drive" in kinds and not np.any(data.direct):
-        drives = [_new(r, rivals[0], lines[::FEW], data.outputs, few.rows) for r in rivals]
+        drives = _new(rivals, lines[::FEW], data.outputs, few.rows)
         for k in range(len(few)):
-            yield _placed("drive", "a drive at", few, k), [each.of_input(k) for each in drives]
+            yield _placed("drive", "a drive at", few, k), [each.alone(3, k) for each in drives]
     heavy = SHARE * problem.setup.weight
     for k in range(len(few) if "mass" in kinds else 0):
-        states = [r.with_mass(few, k, heavy) for r in rivals]
-        if None not in states:
-            yield (
-                _placed("mass", f"{1e3 * heavy:.3g} g put on at", few, k, heavy),
-                [_new(r, rivals[0], lines[::FEW], data.outputs, data.inputs, s, states[0]).seen
-                 for r, s in zip(rivals, states, strict=True)],
-            )  # fmt: skip
+        states = [s for r in rivals if (s := r.with_mass(few, k, heavy)) is not None]
+        if len(states) == len(rivals):
+            test = _placed("mass", f"{1e3 * heavy:.3g} g put on at", few, k, heavy)
+            loaded = _new(rivals, lines[::FEW], data.outputs, data.inputs, states)
+            yield test, [each.seen for each in loaded]
     if "band" in kinds:
-        yield _wider_band(rivals)
+        top, ratio = float(data.s.imag.max()), data.s[-1].real / data.s[-1].imag
+        wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
+        hertz, cost = ABOVE * top / (2 * np.pi), COSTS["band"]
+        test = FurtherTest("band", f"lines up to {hertz:.4g} Hz", cost=cost, amount=hertz)
+        yield test, [each.seen for each in _new(rivals, wider, data.outputs, data.inputs)]
     if "weighing" in kinds:
         what = f"a weighing to {1e3 * WEIGHED:.2g} g"
         yield FurtherTest("weighing", what, cost=COSTS["weighing"]), [r.weight() for r in rivals]
 
 
-def _fixed(
-    problem: UpdatingProblem, rivals: Sequence[Rival], lines: np.ndarray, held: MeasuredDofs
-) -> Iterator[tuple[FurtherTest, Seen]]:
-    """Sensors that every further test has."""
-    rows = held.rows(problem.reduced.structure)
-    sensors = [_new(r, rivals[0], lines, rows, rivals[0].data.inputs) for r in rivals]
-    for k, (label, point) in enumerate(zip(held.labels, held.points, strict=True)):
-        x, y, z = point.tolist()
-        what = f"a sensor at {label}"
-        test = FurtherTest("sensor", what, label, (x, y, z), COSTS["sensor"], fixed=True)
-        yield test, [each.of_output(k) for each in sensors]
-
-
-def _wider_band(rivals: Sequence[Rival]) -> tuple[FurtherTest, Seen]:
-    """Lines above the highest one, up to ``ABOVE`` times it."""
-    data = rivals[0].data
-    top, ratio = float(data.s.imag.max()), data.s[-1].real / data.s[-1].imag
-    wider = np.linspace(top, ABOVE * top, LINES // FEW + 1)[1:] * (ratio + 1j)
-    hertz = ABOVE * top / (2 * np.pi)
-    found = FurtherTest("band", f"lines up to {hertz:.4g} Hz", cost=COSTS["band"], amount=hertz)
-    return found, [_new(r, rivals[0], wider, data.outputs, data.inputs).seen for r in rivals]
-
-
 def _placed(kind: str, what: str, places: ElementGrids, k: int, amount: float = 0.0) -> FurtherTest:
     """A candidate at the k-th grid, along the normal of its surface."""
-    x, y, z = places.point[k].tolist()
     label = f"{places.grids[k]}:n"
-    return FurtherTest(kind, f"{what} {label}", label, (x, y, z), COSTS[kind], amount)
+    return _at(kind, f"{what} {label}", label, places.point[k], amount)
+
+
+def _at(kind: str, what: str, label: str, point: np.ndarray, amount: float = 0.0) -> FurtherTest:
+    x, y, z = point.tolist()
+    return FurtherTest(kind, what, label, (x, y, z), COSTS[kind], amount)
 
 
 @dataclass(frozen=True, eq=False)
 class NewChannels:
-    """Responses of several channels under one rival, in units of their noise.
+    """Responses of several channels under one rival, in units of their noise."""
 
-    Attributes
-    ----------
-    mean : (2, n_f, n_out, n_in)       real and imaginary part
-    factor : (2, n_f, n_out, n_in, n_u)
-    gain : (n_f, n_out, n_in)          an error of gain of one standard deviation, real part
-    """
-
-    mean: np.ndarray
-    factor: np.ndarray
-    gain: np.ndarray
+    mean: np.ndarray  # (2, n_f, n_out, n_in), real and imaginary part
+    factor: np.ndarray  # (2, n_f, n_out, n_in, n_u)
+    gain: np.ndarray  # (n_f, n_out, n_in), an error of gain of one standard deviation, real part
 
     @property
     def seen(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean (n,) and factor (n, n_u) of channels of known gain."""
         return self.mean.ravel(), self.factor.reshape(self.mean.size, -1)
 
-    def of_output(self, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and factor of one output with a gain of its own."""
-        return self._with_gain(np.s_[:, :, k : k + 1])
-
-    def of_input(self, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and factor of one input with a gain of its own."""
-        return self._with_gain(np.s_[:, :, :, k : k + 1])
-
-    def _with_gain(self, at: tuple[slice, ...]) -> tuple[np.ndarray, np.ndarray]:
-        mean, F, gain = self.mean[at], self.factor[at], self.gain[at[1:]]
+    def alone(self, axis: int, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and factor of the k-th output (axis 2) or input (3), with a gain of its own."""
+        mean, F = self.mean.take([k], axis), self.factor.take([k], axis)
+        gain = self.gain.take([k], axis - 1)
         v = np.stack([gain, np.zeros_like(gain)]).ravel()
         size = np.sqrt(v @ v)
         v, less = v / size, 1 - 1 / np.sqrt(1 + size**2)  # C^-½ of C = I + v vᵀ
@@ -296,20 +261,21 @@ class NewChannels:
 
 
 def _new(
-    rival: Rival, first: Rival, lines: np.ndarray, outputs: Any, inputs: Any,
-    state: State | None = None, about: State | None = None,
-) -> NewChannels:  # fmt: skip
-    """Responses on some lines under a rival, compared with those of the first rival."""
-    given = _responses(first, lines, outputs, inputs)
-    about = elsewhere(first.state if about is None else about)
+    rivals: Sequence[Rival], lines: np.ndarray, outputs: Any, inputs: Any,
+    states: Sequence[State] | None = None,
+) -> list[NewChannels]:  # fmt: skip
+    """Responses on some lines under each rival in a state, compared with those of the first."""
+    states, out = [r.state for r in rivals] if states is None else states, []
+    given, about = _responses(rivals[0], lines, outputs, inputs), elsewhere(states[0])
     values = given.model(about)
     given = replace(given, values=values, level=np.abs(values).max(axis=0))
-    given = replace(given, bent=given.curvature(about))
-    rows = replace(given, a=rival.model.rows(outputs, keep=False),
-                   b=rival.model.rows(inputs, keep=False))  # fmt: skip
-    mean, F = rival.predicted(rows, elsewhere(rival.state if state is None else state))
-    shape = (2, *values.shape)
-    return NewChannels(mean.reshape(shape), F.reshape(*shape, -1), GAIN / LN10 / given.std())
+    given, shape = replace(given, bent=given.curvature(about)), (2, *values.shape)
+    gain = GAIN / LN10 / given.std()
+    for rival, state in zip(rivals, states, strict=True):
+        a, b = (rival.model.rows(at, keep=False) for at in (outputs, inputs))
+        mean, F = rival.predicted(replace(given, a=a, b=b), elsewhere(state))
+        out.append(NewChannels(mean.reshape(shape), F.reshape(*shape, -1), gain))
+    return out
 
 
 def elsewhere(state: State) -> State:

@@ -1,9 +1,7 @@
 """Measurements that would tell tied explanations apart, with the information expected of each.
 
-Every explanation predicts the data of a further measurement with its own unknowns: its parameters
-and errors of form, as the recording left them (linear about its fit).  Candidates are sensors at
-further grids, drives at further grids, a known mass put on at a grid, lines above the fitted band,
-and a weighing (:mod:`..inference.expected_information`).
+Candidates are sensors at further grids, drives at further grids, a known mass put on at a grid,
+lines above the fitted band, and a weighing (:mod:`..inference.expected_information`).
 """
 
 import zipfile
@@ -25,35 +23,24 @@ from ..inference.expected_information import (
 )
 from ..inference.result import NextMeasurement
 from ..results import ShownBriefly
-from .decision_rules import TIED
+from .decision_rules import RULES
 
 FILE = "outlook.npz"  # of a run
 ADVISED = 3  # measurements
-ODDS = float(round(np.exp(TIED / 2)))  # that settle: beyond them a diagnosis ties nothing
+ODDS = float(round(np.exp(RULES.tied / 2)))  # that settle: beyond them a diagnosis ties nothing
 
 
 @dataclass(frozen=True)
 class FurtherTest:
-    """One measurement that could be made.
+    """One measurement that could be made."""
 
-    Attributes
-    ----------
-    kind : sensor, drive, mass, band or weighing
-    what : in words
-    label : dof or grid; "" where it has no place
-    point_m : (3,) [m], where it has a place
-    cost : in units of one more sensor
-    amount : [kg] of a mass, [Hz] of the top of a band
-    fixed : of every further test
-    """
-
-    kind: str
-    what: str
-    label: str = ""
-    point_m: tuple[float, float, float] | None = None
-    cost: float = 1.0
-    amount: float = 0.0
-    fixed: bool = False
+    kind: str  # sensor, drive, mass, band or weighing
+    what: str  # in words
+    label: str = ""  # dof or grid; "" where it has no place
+    point_m: tuple[float, float, float] | None = None  # [m], where it has a place
+    cost: float = 1.0  # in units of one more sensor
+    amount: float = 0.0  # [kg] of a mass, [Hz] of the top of a band
+    fixed: bool = False  # of every further test
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,22 +54,13 @@ class FurtherPlaces:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outlook(ShownBriefly):
-    """Rival explanations, and what each candidate measurement would show of them.
+    """Rival explanations, and what each candidate measurement would show of them."""
 
-    Attributes
-    ----------
-    names : of the explanations
-    rivals : their probabilities
-    candidates : measurements
-    seen : data of each candidate, as the rivals predict them
-    unknown : the quantity to be measured, where there is one explanation
-    """
-
-    names: tuple[str, ...]
-    rivals: Rivals
+    names: tuple[str, ...]  # of the explanations
+    rivals: Rivals  # their probabilities
     candidates: tuple[FurtherTest, ...]
-    seen: tuple[Predicted, ...]
-    unknown: OpenQuantity | None = None
+    seen: tuple[Predicted, ...]  # data of each candidate, as the rivals predict them
+    unknown: OpenQuantity | None = None  # that is measured, where there is one explanation
 
     @property
     def costs(self) -> np.ndarray:
@@ -114,7 +92,10 @@ class Outlook(ShownBriefly):
 
     def without(self, barred: Sequence[str]) -> "Outlook":
         """The outlook without the candidates of some kinds or labels."""
-        kept = np.flatnonzero(~self.excluded(barred))
+        return self.of(np.flatnonzero(~self.excluded(barred)).tolist())
+
+    def of(self, kept: Sequence[int]) -> "Outlook":
+        """The outlook with some of its candidates."""
         candidates = tuple(self.candidates[k] for k in kept)
         return replace(self, candidates=candidates, seen=tuple(self.seen[k] for k in kept))
 
@@ -139,7 +120,6 @@ def advised(
     without : kinds or labels that cannot be measured
     """
     first, n = every[0], len(every)
-    costs = first.costs
     most = np.inf if first.unknown else sum(o.rivals.entropy for o in every) / n
 
     def information(measurements: Sequence[int]) -> float:
@@ -147,7 +127,7 @@ def advised(
 
     barred = first.excluded(without)
     fixed = [k for k, c in enumerate(first.candidates) if c.fixed and not barred[k]]
-    ks = chosen(information, np.where(barred, np.inf, costs), count, most, fixed)
+    ks = chosen(information, np.where(barred, np.inf, first.costs), count, most, fixed)
     return outcomes(every, ks, odds)
 
 
@@ -179,13 +159,10 @@ def with_common_candidates(every: Sequence[Outlook]) -> tuple[Outlook, ...]:
         return ()
     places = [{(c.kind, c.label): k for k, c in enumerate(o.candidates)} for o in every]
     keys = [key for key in places[0] if all(key in other for other in places)]
-    return tuple(
-        replace(
-            o, candidates=tuple(o.candidates[at[key]] for key in keys),
-            seen=tuple(o.seen[at[key]] for key in keys),
-        )
-        for o, at in zip(every, places, strict=True)
-    )  # fmt: skip
+    return tuple(o.of([at[key] for key in keys]) for o, at in zip(every, places, strict=True))
+
+
+COLUMNS = ("kind", "what", "label", "cost", "amount", "fixed")  # of the candidates, in the file
 
 
 def arrays_of(known: Outlook) -> dict[str, np.ndarray]:
@@ -197,26 +174,15 @@ def arrays_of(known: Outlook) -> dict[str, np.ndarray]:
         "mean": np.hstack([s.mean for s in known.seen]).astype(np.float32),
         **{f"factor_{j}": np.vstack([s.factors[j] for s in known.seen]).astype(np.float32)
            for j in range(len(known.names))},
-        "kind": np.array([c.kind for c in known.candidates]),
-        "what": np.array([c.what for c in known.candidates]),
-        "label": np.array([c.label for c in known.candidates]),
+        **{name: np.array([getattr(c, name) for c in known.candidates]) for name in COLUMNS},
         "point_m": np.array([c.point_m or nowhere for c in known.candidates]),
-        "cost": np.array([c.cost for c in known.candidates]),
-        "amount": np.array([c.amount for c in known.candidates]),
-        "fixed": np.array([c.fixed for c in known.candidates]),
         **({} if (x := known.unknown) is None else
            {"unknown": np.array(x.name), "along": np.append(x.along, x.rest)}),
     }  # fmt: skip
 
 
 def read_outlook(folder: Path) -> Outlook:
-    """Read the outlook of a run.
-
-    Raises
-    ------
-    FileError
-        If the run has none, or the file is no outlook.
-    """
+    """Read the outlook of a run."""
     path = folder / FILE
     if not path.is_file():
         raise FileError(f"{folder}: there is no {FILE}; a diagnosis of responses writes it")
@@ -226,14 +192,13 @@ def read_outlook(folder: Path) -> Outlook:
         for name, kind in (("amount", float), ("fixed", bool)):  # runs before there was one
             held.setdefault(name, np.zeros(len(held["cost"]), kind))
         where = [None if np.isnan(p).any() else tuple(p.tolist()) for p in held["point_m"]]
-        each = zip(*(held[k].tolist() for k in ("kind", "what", "label")), where,
-                   *(held[k].tolist() for k in ("cost", "amount", "fixed")),
-                   strict=True)  # fmt: skip
-        names, rows = tuple(held["names"].tolist()), len(held["ends"])
+        rows = zip(*(held[name].tolist() for name in COLUMNS), strict=True)
+        each = (dict(zip(COLUMNS, row, strict=True)) for row in rows)
+        candidates = tuple(FurtherTest(**c, point_m=p) for c, p in zip(each, where, strict=True))
+        names = tuple(held["names"].tolist())
         columns_ = [held["mean"].T, *(held[f"factor_{j}"] for j in range(len(names)))]
         parts = zip(*(np.split(c.astype(float), held["ends"][:-1]) for c in columns_), strict=True)
         seen = tuple(Predicted(mean.T, tuple(factors)) for mean, *factors in parts)
-        candidates = tuple(FurtherTest(*row) for row in each)
         unknown = None
         if "unknown" in held:
             *along, rest = held["along"].tolist()
@@ -242,6 +207,6 @@ def read_outlook(folder: Path) -> Outlook:
         shapes = {(len(s.mean), *(F.shape[0] - s.mean.shape[1] for F in s.factors)) for s in seen}
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise FileError(f"{path} is no outlook of a diagnosis: {error}") from error
-    if shapes != {(len(names), *len(names) * (0,))} or rows != len(candidates):
+    if shapes != {(len(names), *len(names) * (0,))} or len(seen) != len(candidates):
         raise FileError(f"{path} is no outlook of a diagnosis: its matrices have another size")
     return found

@@ -16,7 +16,7 @@ from ..fem.modelled import Modelled
 from ..inference.likelihood import LN10, Responses
 from ..inference.result import RecordingScore
 from ..progress import Progress, silent, within
-from .measured_frequencies import counted, widened
+from .measured_frequencies import kept, widened
 from .question import OtherTest, Prepared, Question
 from .written_scores import gain_offset, seen
 
@@ -28,27 +28,21 @@ def others_identified(
     question: Question, band: tuple[float, float], progress: Progress = silent
 ) -> tuple[list[OtherTest], list[str]]:
     """Modes of the recordings that are not fitted, and a sentence on each without modes."""
-    found, notes = [], []
-    n = len(question.others)
+    found, notes, n = list[OtherTest](), list[str](), len(question.others)
     for k, other in enumerate(question.others):
-        frf, use = other.frf, counted(other.frf, question.exclude)
+        frf, use = other.frf, kept(other.frf.frequency, question.exclude)
         part = within(progress, k / n, (k + 1) / n)
         try:
-            modes = identify(frf, widened(frf, band), use=use, progress=part)
+            found.append((other, identify(frf, widened(frf, band), use=use, progress=part)))
         except ChladniError as error:
             notes.append(f"{other.name} ({other.relation}) is not used: {error}")
-            continue
-        found.append(OtherTest(other, modes))
     return found, notes
 
 
 def levels(others: Sequence[OtherTest]) -> list[AtLevel]:
     """Recordings at another level of excitation, or repeats at the same level."""
-    alike = [o for o in others if o.recording.relation in ("level", "repeat")]
-    return [
-        AtLevel(o.recording.level, o.recording.frf, o.identified, o.recording.control)
-        for o in alike
-    ]
+    alike = (other for other in others if other[0].relation in ("level", "repeat"))
+    return [AtLevel(r.level, r.frf, modes, r.control) for r, modes in alike]
 
 
 def measured_spread(
@@ -60,18 +54,13 @@ def measured_spread(
     averaged over neighbouring lines. Recordings are few, so it is half each channel's own and half
     the mean of all channels. None without repeats or articles.
     """
-    alike = [equalised(o.identified, s) for o in others if o.recording.relation in ALIKE]
+    alike = [equalised(modes, s) for other, modes in others if other.relation in ALIKE]
     if not alike:
         return None
-    delta = np.array([np.zeros(values.shape), *(_apart(values, H) for H in alike)])
+    delta = np.array([np.zeros(values.shape), *(np.log(H / values) / LN10 for H in alike)])
     variance = (np.abs(delta - delta.mean(axis=0)) ** 2).sum(axis=0) / len(alike)
     own = _averaged(variance)
     return np.sqrt((own + own.mean(axis=(1, 2), keepdims=True)) / 2)
-
-
-def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """log10(b / a), phase wrapped."""
-    return np.log(b / a) / LN10
 
 
 def _averaged(x: np.ndarray) -> np.ndarray:
@@ -82,41 +71,36 @@ def _averaged(x: np.ndarray) -> np.ndarray:
     return (total[high] - total[low]) / (high - low)[:, None, None]
 
 
-def spread_note(
-    spread: np.ndarray | None, use: np.ndarray, others: Sequence[OtherTest]
-) -> list[str]:
+def spread_note(data: Responses, others: Sequence[OtherTest]) -> list[str]:
     """Sentence on the measured spread over the samples in use; empty without a spread."""
-    names = [o.recording.name for o in others if o.recording.relation in ALIKE]
-    if spread is None:
+    if data.spread is None:
         return []
-    rms = float(np.sqrt((spread[use] ** 2).mean()))
+    names = [other.name for other, _ in others if other.relation in ALIKE]
+    rms = float(np.sqrt((data.spread[data.use] ** 2).mean()))
     return [
         f"{', '.join(names)} and the recording that is fitted differ by {rms:.2g} decades rms "
         "(one standard deviation): the fit need not be closer than that"
     ]
 
 
-def scored_others(
-    question: Question, prepared: Prepared, stages: Sequence[Modelled]
-) -> tuple[RecordingScore, ...]:
+def scored_others(prepared: Prepared, stages: Sequence[Modelled]) -> tuple[RecordingScore, ...]:
     """Q of the nominal, calibrated and updated deck on every recording that was not fitted."""
     score = prepared.score
     if not isinstance(score, Responses) or not prepared.others:
         return ()
-    use = score.use | prepared.held.whole
-    f_max = prepared.problem.setup.f_max
-    own = {id(m): seen(question, score, m, f_max) for m in stages}
+    held, f_max = prepared.held, prepared.problem.setup.f_max
+    use = score.use | held.choosing | held.reporting
+    own = {id(m): seen(prepared.question, score, m, f_max) for m in stages}
     out = []
-    for other in prepared.others:
-        values = equalised(other.identified, score.s)
-        apart = float((np.abs(_apart(score.values, values)[use]) ** 2).mean())
+    for other, modes in prepared.others:
+        values = equalised(modes, score.s)
+        apart = float((np.abs((np.log(values / score.values) / LN10)[use]) ** 2).mean())
         Q = []
         for model in stages:
             data, state = own[id(model)]
             assert isinstance(data, Responses)
             there = replace(data, values=values)
-            offset = gain_offset(question, prepared, there, state)
+            offset = gain_offset(prepared, there, state)
             Q.append(there.Q(replace(state, offset=offset), use))
-        name, relation = other.recording.name, other.recording.relation
-        out.append(RecordingScore(name, relation, apart, *Q))
+        out.append(RecordingScore(other.name, other.relation, apart, *Q))
     return tuple(out)

@@ -20,6 +20,7 @@ from ..inference.likelihood import Responses
 from ..inference.map_fit import Fit, fit, posterior, unknowns
 from ..inference.posterior_samples import WALKERS, Chains, sampled
 from ..progress import Progress
+from ..reduced.effect_dofs import slices
 from ..reduced.reduced_model import evaluate
 
 BANDS, DRAWS = 4, 60  # channels whose predicted response is kept, and draws of the posterior
@@ -31,9 +32,11 @@ SEED = 20250102
 Draws = tuple[tuple[Effect, ...], np.ndarray]  # effects, and their x (draws, n)
 
 
-def frozen_effects(whole: UpdatingProblem, null: HypothesisFit) -> list[Effect]:
-    """Calibration parameters of the whole problem that the fit holds."""
-    return [e for e in whole.base if e not in null.fit.effects]
+def _all_free(whole: UpdatingProblem, null: HypothesisFit) -> tuple[list[Effect], np.ndarray]:
+    """The effects of a fit, then those that it holds at their prior mean, and x of all."""
+    frozen = [e for e in whole.base if e not in null.fit.effects]
+    x = np.concatenate([null.fit.x, [p.mean for p in unknowns(frozen)]])
+    return [*null.fit.effects, *frozen], x
 
 
 def with_frozen(whole: UpdatingProblem, null: HypothesisFit) -> Fit:
@@ -43,17 +46,13 @@ def with_frozen(whole: UpdatingProblem, null: HypothesisFit) -> Fit:
     the fit by -G z, G = H_ff⁻¹ H_fz.  With their prior covariance P, C = H_ff⁻¹ + G P Gᵀ
     (Tapley, Schutz and Born 2004, Statistical Orbit Determination, ch. 6: consider covariance).
     """
-    found, frozen = null.fit, frozen_effects(whole, null)
-    if not frozen:
+    found, (effects, x), n = null.fit, _all_free(whole, null), len(null.fit.x)
+    if len(x) == n:
         return found
-    effects = [*found.effects, *frozen]
-    z = unknowns(frozen)
-    x = np.concatenate([found.x, [p.mean for p in z]])
     there = posterior(null.model, effects, found.data, whole.mass_measurement, x)
     H = there.sloped()[0].information
-    n = len(found.x)
     moved = np.linalg.solve(H[:n, :n], H[:n, n:])
-    spread = moved * [p.sd for p in z]
+    spread = moved * [p.sd for p in unknowns(effects)[n:]]
     return replace(found, covariance=found.covariance + spread @ spread.T)
 
 
@@ -64,14 +63,8 @@ def posterior_sample(
 
     The form error of the model has the size that the fit learned.  The Gaussian is that of the
     Hessian JᵀJ at the most probable x, all unknowns free.
-
-    Raises
-    ------
-    FileError
-        If the sampler is not installed.
     """
-    effects = [*null.fit.effects, *frozen_effects(whole, null)]
-    start = np.concatenate([null.fit.x, [p.mean for p in unknowns(effects)[len(null.fit.x) :]]])
+    effects, start = _all_free(whole, null)
     mass, data, model = whole.mass_measurement, null.data, null.model
     best = fit(model, effects, data, mass, start).kept()
 
@@ -153,18 +146,11 @@ def bands(problem: UpdatingProblem, null: HypothesisFit, every: Draws) -> Iterat
 def physical_values(effects: Sequence[Effect], x: np.ndarray) -> Iterator[NamedValue]:
     """Physical values of the calibration parameters."""
     names = iter(parameter_names([e for e in effects if e.kind == "calibration"]))
-    at = 0
-    for effect in effects:
-        own = x[at : at + len(effect.parameters)]
-        at += len(effect.parameters)
-        if effect.kind != "calibration":
-            continue
-        rows = effect.reported(own, np.array([p.sd for p in effect.parameters]))
-        for k, p in enumerate(effect.parameters):
-            value, unit = (
-                (rows[k].value, rows[k].unit) if k < len(rows) else (p.value(own[k]), p.unit)
-            )
-            yield NamedValue(next(names), float(value), unit, float(own[k]))
+    for effect, at in (each for each in slices(effects) if each[0].kind == "calibration"):
+        rows = effect.reported(x[at], np.array([p.sd for p in effect.parameters]))
+        for k, (p, v) in enumerate(zip(effect.parameters, x[at].tolist(), strict=True)):
+            value, unit = (rows[k].value, rows[k].unit) if k < len(rows) else (p.value(v), p.unit)
+            yield NamedValue(next(names), float(value), unit, v)
 
 
 def values_at(found: Fit, own: np.ndarray, x: np.ndarray) -> list[NamedValue]:

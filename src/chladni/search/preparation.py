@@ -15,7 +15,7 @@ from ..effects.effect import Effect
 from ..effects.joint_stiffness import joint_nuisances
 from ..effects.registry import catalogue
 from ..effects.unknown_cords import unknown_cords
-from ..ema.identification import Identified, equalised, identify
+from ..ema.identification import equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
 from ..ema.level_words import level_notes
@@ -37,22 +37,22 @@ from ..progress import Progress, silent, within
 from ..reduced.pole_assignment import SPURIOUS_LISTED, share_spurious
 from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
-from .freed_parameters import freed_by, setup_of
+from .base_effects import freed_by, mesh_hidden, nuisances, setup_of
 from .held_out_data import HeldOutChoice, held_out_sensors, of_poles, upper_part
 from .measured_frequencies import (
-    LEAST_DELTA_CHI2,
     band_of,
-    counted,
     frequencies,
+    kept,
     listed,
+    significant,
+    suspended_below,
+    suspension_note,
     widened,
 )
 from .measured_shapes import shape_data
-from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .question import Prepared, Question
 from .silent_dofs import refuse_silent
-from .suspension_range import suspended_below, suspension_note
 
 ZETA = 0.08  # equalised damping for comparing hypotheses: it widens the basins of convergence
 ZETA_Q = 0.02  # equalised damping for the reported Q
@@ -67,11 +67,8 @@ def prepare(
 ) -> Prepared:  # fmt: skip
     """Identify, decide how to compare, choose the held-out data, build the reduced problem.
 
-    Parameters
-    ----------
-    lines : (n_f,) bool, of the recording from which its modes are identified, default all
-    fitted : False if nothing will be fitted; the error of the mesh, which refuses nothing and
-        takes the most time, is then left out
+    Modes are identified from some ``lines`` (n_f,) bool of the recording, default all. Without a
+    fit the error of the mesh is left out: it refuses nothing and takes the most time.
     """
     uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
@@ -81,8 +78,7 @@ def prepare(
 
 def _place_sd(question: Question) -> float:
     """Largest standard deviation of the place of a sensor or shaker [m]."""
-    places = (question.outputs, question.inputs)
-    return max(float(p.sd.max(initial=0.0)) for p in places)
+    return max(float(p.sd.max(initial=0.0)) for p in (question.outputs, question.inputs))
 
 
 def _by_responses(
@@ -94,13 +90,12 @@ def _by_responses(
     held_band = question.held_band or upper_part(low, high)
     fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
-    use, seen_to = counted(frf, question.exclude), within(progress, 0.0, 0.3)
+    use, f_max = kept(frf.frequency, question.exclude), reach[1]
     use = use if lines_used is None else use & lines_used
-    found = identify(frf, widened(frf, reach), use=use, progress=seen_to)
-    f_max = reach[1]
-    if question.held_band is None and not _modes_seen(found, low, fit_max):
+    found = identify(frf, widened(frf, reach), use=use, progress=within(progress, 0.0, 0.3))
+    if question.held_band is None and not significant(found, low, fit_max).any():
         held_band, fit_max = (high, high), high  # all modes lie in the band that was to be held out
-    seen = _modes_seen(found, low, fit_max)
+    seen = int(significant(found, low, fit_max).sum())
     if not seen:
         raise FileError(
             f"no mode is above the noise of the recording between {low:g} and {fit_max:g} Hz, so "
@@ -117,25 +112,23 @@ def _by_responses(
     built = nominal.structure
     slow = strong_modes(found).frequency
     above = suspended_below(question, nominal, slow, fit_max)
-    question = replace(question, exclude=(*question.exclude, (0.0, above)))
+    asked, question = question, replace(question, exclude=(*question.exclude, (0.0, above)))
     lines, low = [f[f > above] for f in lines], max(low, above)
     refuse_silent(nominal, question.outputs, question.inputs)
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     test = question.outputs, question.inputs, built, question.accuracy
     wrong = sensor_errors(*test)
     progress("the error of its mesh", 0.5)
-    mesh = mesh_hidden(nominal, f_max, measured_on(question)) if fitted else []
+    mesh = mesh_hidden(nominal, f_max, question.rows) if fitted else []
     progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
     left_out = HeldOutChoice(held_out_sensors(question), held_band, (low, fit_max), reach)
     others, said = others_identified(question, reach, within(progress, 0.8, 1.0))
-    data, spreads = [], []
+    data = []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
-        s = 2 * np.pi * f * (zeta + 1j)
-        use = left_out.training(f)
+        s, use = 2 * np.pi * f * (zeta + 1j), left_out.training(f)
         H = equalised(found, s)
         noise, spread = sample_noise(found, frf, s), measured_spread(H, others, s)
-        spreads.append(spread)
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread), spread=spread,
@@ -148,13 +141,12 @@ def _by_responses(
     nuisance += unknown_cords(built, slow[slow < above], both)
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
-    problem = updating_problem(question, reduced, data[0], nuisance, f_max)
+    problem = updating_problem(question, reduced, data[0], nuisance)
     if not isinstance(question.held_sensors, tuple):
         left_out = left_out.without_faults(problem)
         data = [d.only(left_out.training(f)) for d, f in zip(data, lines, strict=True)]
         problem = replace(problem, data=data[0])
     unseen, held = (left_out.samples(d) for d in data)
-    labels = question.outputs.labels
     firm = int((found.firm & (found.frequency >= low) & (found.frequency <= f_max)).sum())
     notes = [
         f"FRFs were compared: {firm} modes identified between {low:g} and {f_max:g} Hz, "
@@ -172,7 +164,7 @@ def _by_responses(
         )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
-    what, chosen_on = (left_out.in_words(labels, reporting) for reporting in (True, False))
+    what, chosen_on = (left_out.in_words(question.outputs.labels, r) for r in (True, False))
     if unseen.choosing.any():
         notes.append(f"held out to choose a name, and not to report its gain: {chosen_on}")
     notes.append(_sensor_note(question))
@@ -182,22 +174,16 @@ def _by_responses(
     problem = replace(problem, damping=known, coupling=coupling, setup=setup)
     own = AtLevel(question.level, frf, found, question.control)
     studied = level_study([own, *levels(others)])
-    notes += [*said, *spread_note(spreads[1], data[1].use, others), *level_notes(studied)]
-    floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
-    if spreads[1] is not None:
-        floor = np.maximum(floor, spreads[1] ** 2)
+    notes += [*said, *spread_note(data[1], others), *level_notes(studied)]
+    floor = equalised_noise(found, frf, data[1].s, kept(frf.frequency, question.exclude))
+    if (spread := data[1].spread) is not None:
+        floor = np.maximum(floor, spread**2)
     supporting = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
     size = supporting, int(data[0].use.any(axis=0).sum())
     return Prepared(
-        problem, data[1], held, unseen, what, tuple(notes), nominal, floor, found,
+        asked, problem, data[1], held, unseen, what, tuple(notes), nominal, floor, found,
         *_few(problem, *size), others=tuple(others), levels=studied, above=above,
     )  # fmt: skip
-
-
-def _modes_seen(found: Identified, low: float, high: float) -> int:
-    """Number of significant poles between two frequencies [Hz]."""
-    inside = (found.frequency >= low) & (found.frequency <= high)
-    return int((inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2)).sum())
 
 
 NEAR_BAND = 1.3  # factor on the band within which a mode of the deck may be a measured one
@@ -214,9 +200,7 @@ def equalised_lines(
 ) -> np.ndarray:
     """Lines three quarters of a half-bandwidth apart, f_{k+1} = f_k (1 + 0.75 ζ), gaps left out."""
     f = band[0] * np.exp(np.arange(0.0, np.log(band[1] / band[0]), 0.75 * zeta))
-    for a, b in exclude:
-        f = f[(f < a) | (f > b)]
-    return f
+    return f[kept(f, exclude)]
 
 
 def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: bool) -> Prepared:
@@ -228,17 +212,16 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
     frequency, sd, strength = (v[frequency > above] for v in (frequency, sd, strength))
     if question.frf is not None:
         refuse_silent(nominal, question.outputs, question.inputs)
-    built, shapes = nominal.structure, None
-    damping = None
+    built, shapes, damping = nominal.structure, None, None
     if question.frf is None:
         at = listed(question, above)
         damping = None if question.damping is None else question.damping[at]
         shapes, said = shape_data(question, at, nominal)
         notes = (*notes, *said)
-    seen = None if shapes is None else measured_on(question)
+    seen = None if shapes is None else question.rows
     mesh = mesh_hidden(nominal, f_max, seen) if fitted else []
     reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
-    reduced = carrying(reduced, freed_by(question, reduced, f_max))
+    reduced = carrying(reduced, freed_by(question, reduced))
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -254,15 +237,19 @@ def _by_poles(question: Question, uncertain: bool, progress: Progress, fitted: b
         shapes=shapes,
     ).rebased(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, mesh, f_max)
-    problem = updating_problem(question, reduced, data, nuisance, f_max)
+    problem = updating_problem(question, reduced, data, nuisance)
     left_out = of_poles(held)
     n = int(left_out.reporting.sum())
     what = f"{n} of {len(held)} frequencies" if n else "nothing"
-    notes = (*notes, *_unscored(question), *_mass_note(question, problem), *suspension_note(above))
+    if question.others:
+        names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
+        notes = (*notes, f"not used, because natural frequencies are compared: {names}")
+    notes = (*notes, *_mass_note(question, problem), *suspension_note(above))
     few = _few(problem, len(frequency), 0 if shapes is None else shapes.values.shape[1] - 1)
     return Prepared(
-        problem, data, left_out, left_out, what, notes, nominal, None, found, *few, damping=damping
-    )
+        question, problem, data, left_out, left_out, what, notes, nominal, None, found, *few,
+        damping=damping,
+    )  # fmt: skip
 
 
 def _few(problem: UpdatingProblem, modes: int, channels: int) -> tuple[str, float]:
@@ -276,36 +263,25 @@ def _few(problem: UpdatingProblem, modes: int, channels: int) -> tuple[str, floa
     return too_little(modes, channels, taken), given - taken
 
 
-def _unscored(question: Question) -> list[str]:
-    """Sentence on other recordings that are not used, as natural frequencies alone are compared."""
-    if not question.others:
-        return []
-    names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
-    return [f"not used, because natural frequencies are compared: {names}"]
-
-
 def updating_problem(
-    question: Question,
-    reduced: ReducedProblem,
-    data: Responses | Poles,
-    nuisance: list[Effect],
-    f_max: float,
+    question: Question, reduced: ReducedProblem, data: Responses | Poles, nuisance: list[Effect]
 ) -> UpdatingProblem:
     """The updating problem: calibration parameters, and the nuisances that they do not replace."""
-    own = freed_by(question, reduced, f_max)
+    own = freed_by(question, reduced)
     gone = {name for e in own for name in e.replaces}
     base = [*own, *(e for e in nuisance if e.text not in gone)]
     return UpdatingProblem(
         reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
-        setup_of(question, f_max), question.outputs.labels, families=catalogue(question.effects),
+        setup_of(question, reduced.f_max), question.outputs.labels,
+        families=catalogue(question.effects),
     )  # fmt: skip
 
 
 def ready_for_responses(question: Question, nominal: Modelled, f_max: float) -> ReducedProblem:
     """The reduced problem over a basis for measured dofs, free parameters and all joints."""
     built = nominal.structure
-    reduced = reduced_problem(nominal, f_max, measured_on(question)(built), base=question.base)
-    return carrying(reduced, [*freed_by(question, reduced, f_max), *joint_nuisances(built)])
+    reduced = reduced_problem(nominal, f_max, question.rows(built), base=question.base)
+    return carrying(reduced, [*freed_by(question, reduced), *joint_nuisances(built)])
 
 
 def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProblem:
@@ -321,11 +297,11 @@ def _sensor_note(question: Question) -> str:
     """Sentence on the errors of sensors and gauges that the model need not explain."""
     known, sd = question.accuracy, _place_sd(question)
     stated = f", at most {1e3 * sd:.2g} mm where the table of sensors states it" if sd else ""
-    place = f"{1e3 * known.position:.2g} mm in place{stated}"
     return (
         f"sensors and force gauges may be off by {known.gain:.2g} of their gain, "
-        f"{np.degrees(known.direction):.2g}° in direction, {place} (standard deviations); above "
-        f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies are compared instead"
+        f"{np.degrees(known.direction):.2g}° in direction, {1e3 * known.position:.2g} mm in "
+        f"place{stated} (standard deviations); above {1e3 * POSITION_UNCERTAIN:g} mm natural "
+        "frequencies are compared instead"
     )
 
 
@@ -333,8 +309,6 @@ NOT_WEIGHED = (
     "no weighed mass was given: E and rho cannot be distinguished, so both stay near the deck's "
     "values"
 )
-
-
 ANOTHER_MASS = "check that the article is the one of the deck, without trim and sensors"
 
 

@@ -36,12 +36,7 @@ class OtherRecording:
     article: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class OtherTest:
-    """A further recording with its identified modes."""
-
-    recording: OtherRecording
-    identified: Identified
+OtherTest = tuple[OtherRecording, Identified]  # a further recording with its modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +81,10 @@ class Question:
         """The tested article with springs in its rigid ties, stiff enough to act as rigid."""
         return on_firm_springs(self.tested(assembly))
 
+    def rows(self, built: Structure) -> sp.csr_array:
+        """Rows of outputs and inputs on any mesh of the structure."""
+        return sp.csr_array(sp.vstack([self.outputs.rows(built), self.inputs.rows(built)]))
+
     @property
     def base(self) -> np.ndarray | None:
         """Directions (k, 3) in which the supports were moved; None where forces were applied."""
@@ -111,16 +110,12 @@ class HeldOut:
     choosing: np.ndarray  # whose evidence supports or refuses a name
     reporting: np.ndarray  # on which the gain of a name is reported, and nothing is decided
 
-    @property
-    def whole(self) -> np.ndarray:
-        """All samples that are held out."""
-        return np.asarray(self.choosing | self.reporting)
-
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """An updating problem and the data that score it."""
 
+    question: Question
     problem: UpdatingProblem
     score: Responses | Poles  # Q is reported on it, over the same basis; ``use``: fitted samples
     # samples held out, of ``score`` and of ``problem.data``

@@ -1,6 +1,6 @@
 """Parts of a diagnosis report: effects, alternatives, calibrated values, the remainder."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -24,10 +24,10 @@ from ..inference.result import (
     Remainder,
     Scores,
 )
-from .decision_rules import RULES, TIED
+from .decision_rules import RULES
 from .diagnosis import Diagnosis
 from .question import Prepared
-from .verdict_models import real_poles
+from .written_scores import real_poles
 
 STRUCTURED = 5.0  # times the standard deviation of the recording: more than that is not noise
 BLIND_SHARE = 0.05  # of the shells and beams that the test cannot see: more is said
@@ -36,27 +36,16 @@ HEAVIER = 0.02  # of the deck's mass: paint and sealant, which no deck of sheets
 
 def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
     """The named effects with place and size, largest gain first."""
-    found = diagnosis.found
-    if found is None:
+    found, deck, out = diagnosis.found, diagnosis.as_deck, list[NamedEffect]()
+    if found is None or deck is None:
         return ()
     gains = diagnosis.gains or (diagnosis.two_log_bayes_factor(found),)
-    each = zip(found.effects, gains, strict=True)
-    return tuple(_named(found, e, g, diagnosis.as_deck or found) for e, g in each)
-
-
-def _named(
-    hypothesis: HypothesisFit, effect: Effect, gain: float, deck: HypothesisFit
-) -> NamedEffect:
-    written = effect.reported(deck.fit.of(effect), deck.fit.sd(effect))
-    return NamedEffect(
-        effect.name,
-        effect.claim,
-        -hypothesis.neg2_log_evidence / 2,
-        _located(hypothesis, effect),
-        _reported(hypothesis, effect),
-        gain,
-        tuple(row.value for row in written) if effect.traits.writable else (),
-    )
+    for effect, gain in zip(found.effects, gains, strict=True):
+        rows = effect.reported(deck.fit.of(effect), deck.fit.sd(effect))
+        written = tuple(row.value for row in rows) if effect.traits.writable else ()
+        size = _located(found, effect), _reported(found, effect), gain, written
+        out.append(NamedEffect(effect.name, effect.claim, -found.neg2_log_evidence / 2, *size))
+    return tuple(out)
 
 
 def _located(hypothesis: HypothesisFit, effect: Effect) -> Location:
@@ -78,17 +67,13 @@ def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]
     rows = effect.reported(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
     if effect is not hypothesis.effect:
         return rows
-    others = [r for v in hypothesis.nearly for r in v.effect.reported(v.x, v.sd)]
-    return tuple(
-        replace(row, low=_reach(min, (r.low for r in (row, *others) if r.name == row.name)),
-                high=_reach(max, (r.high for r in (row, *others) if r.name == row.name)))
-        for row in rows
-    )  # fmt: skip
-
-
-def _reach(pick: Callable[[list[float]], float], values: Iterable[float | None]) -> float | None:
-    known = [v for v in values if v is not None]
-    return pick(known) if known else None
+    others, out = [r for v in hypothesis.nearly for r in v.effect.reported(v.x, v.sd)], []
+    for row in rows:
+        same = [row, *(r for r in others if r.name == row.name)]
+        low = min((r.low for r in same if r.low is not None), default=None)
+        high = max((r.high for r in same if r.high is not None), default=None)
+        out.append(replace(row, low=low, high=high))
+    return tuple(out)
 
 
 def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -129,15 +114,10 @@ def _values_apart(rows: tuple[Estimate, ...], optimum: LocalOptimum) -> str:
 
 
 def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> tuple[str, ...]:
-    """Sentence on a difference between weighed mass and deck, where no effect is named.
-
-    Parameters
-    ----------
-    weighed, deck : mass of the article and of the deck as it was given [kg]
-    """
-    if weighed is None or diagnosis.found is not None or abs(weighed / deck - 1) < HEAVIER:
+    """Sentence on a weighed mass [kg] far from the given deck's, where no effect is named."""
+    off = 0.0 if weighed is None else weighed / deck - 1
+    if diagnosis.found is not None or abs(off) < HEAVIER:
         return ()
-    off = weighed / deck - 1
     return (
         f"the article weighs {100 * abs(off):.1f} % {'more' if off > 0 else 'less'} than the deck, "
         "so calibration changes density and thickness; trim or mastic on a whole sheet has the "
@@ -150,16 +130,10 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
     found = diagnosis.found
     best = found if found is not None else diagnosis.null
     named = () if found is None else tuple(e.name for e in found.effects)
-    out = [
-        Alternative(
-            hypothesis.effect.name,
-            -hypothesis.neg2_log_evidence / 2,
-            why_not(diagnosis, hypothesis, best),
-            _located(hypothesis, hypothesis.effect),
-        )
-        for hypothesis in diagnosis.hypotheses
-        if hypothesis is not found and hypothesis.effect.name not in named
-    ]
+    out = []
+    for h in (h for h in diagnosis.hypotheses if h.effect.name not in named):
+        why, place = why_not(diagnosis, h, best), _located(h, h.effect)
+        out.append(Alternative(h.effect.name, -h.neg2_log_evidence / 2, why, place))
     if found is not None:
         gap = (diagnosis.null.neg2_log_evidence - best.neg2_log_evidence) / 2
         reason = f"{evidence_in_words(gap)} compared with E, rho and t alone"
@@ -185,7 +159,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
     if hypothesis.effect.name in diagnosis.one_of:
         return (
             f"these data do not distinguish it from {best.name}: 2 ln B = {2 * gap:.1f}, and "
-            f"{TIED:.0f} are required to separate two explanations"
+            f"{RULES.tied:.0f} are required to separate two explanations"
         )
     return (
         f"{evidence_in_words(gap)} for {best.name} compared with it; its weighted sum of squares "
@@ -201,15 +175,9 @@ def agreement(
     last, what = found or diagnosis.null, prepared.what
     if last.channels:
         what = f"channel {', '.join(last.channels)} on the held-out lines of {what}"
-    factors = [diagnosis.two_log_bayes_factor(hypothesis) for hypothesis in diagnosis.hypotheses]
-    return Agreement(
-        fitted,
-        held_out,
-        what,
-        None if found is None else diagnosis.two_log_bayes_factor(found),
-        max(factors, default=None),
-        diagnosis.due,
-    )
+    gain = None if found is None else diagnosis.two_log_bayes_factor(found)
+    largest = max(map(diagnosis.two_log_bayes_factor, diagnosis.hypotheses), default=None)
+    return Agreement(fitted, held_out, what, gain, largest, diagnosis.due)
 
 
 def foretells_worse(agreement: Agreement | None, named: bool = False) -> tuple[str, ...]:
@@ -251,21 +219,20 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
     out = []
     for effect in (e for e in deck.effects if e.kind == "calibration"):
         fit = whole if effect in whole.effects else deck
-        found = deck if diagnosis.shared else fit
-        rows = effect.reported(found.of(effect), fit.sd(effect))
+        numbers = _numbers(effect, (deck if diagnosis.shared else fit).of(effect), fit)
         written = effect.reported(deck.of(effect), fit.sd(effect))
-        each = zip(parameter_names([effect]), rows, written, _given(effect, fit), strict=True)
-        for where, row, other, given in each:
+        for (where, row, given), other in zip(numbers, written, strict=True):
             called = getattr(effect, "called", "")  # the user's name of the parameter
             where = f"{called}: {where}" if called not in ("", row.name) else where
             out.append(CalibratedParameter(where, row, given, other.value if changed else given))
     return tuple(out)
 
 
-def _given(effect: Effect, fit: Fit) -> list[float]:
-    """The deck's values of the numbers that an effect reports."""
+def _numbers(effect: Effect, x: np.ndarray, fit: Fit) -> Iterator[tuple[str, Estimate, float]]:
+    """Name, value at x and value of the deck of every number that an effect reports."""
     nominal = np.array([p.nominal for p in effect.parameters])
-    return [row.value for row in effect.reported(nominal, fit.sd(effect))]
+    rows, given = (effect.reported(at, fit.sd(effect)) for at in (x, nominal))
+    return zip(parameter_names([effect]), rows, (row.value for row in given), strict=True)
 
 
 def values_kept(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -284,9 +251,7 @@ def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
     seen: dict[tuple[str, str], CalibratedParameter] = {}
     for one in joint.fits:
         for effect in (e for e in one.fit.effects if e.kind == "calibration"):
-            rows = effect.reported(one.fit.of(effect), one.fit.sd(effect))
-            each = zip(parameter_names([effect]), rows, _given(effect, one.fit), strict=True)
-            for where, row, given in each:
+            for where, row, given in _numbers(effect, one.fit.of(effect), one.fit):
                 seen.setdefault((where, row.name), CalibratedParameter(where, row, given))
     return tuple(seen.values())
 
@@ -308,33 +273,27 @@ def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:
         left = float(np.sqrt(data.Q(plain.fit.state, prepared.score.use)))
         chi = 1.0 if prepared.identified is None else prepared.identified.chi
         known = 0.01 * chi / LN10
-        text = (
-            f"{left:.2g} decades rms, and the standard deviation of the recording is about "
-            f"{known:.1g}"
-        )
+        text = f"{left:.2g} decades rms, and the standard deviation of the recording is about "
+        text += f"{known:.1g}"
     far = left > STRUCTURED * known
-    structured = bool(far and diagnosis.found is not None)
-    sentence = (
-        f"after calibration alone the residual is {text}: {_meaning(diagnosis, far, structured)}"
-    )
-    return Remainder(structured, left, known, sentence)
+    sentence = f"after calibration alone the residual is {text}: {_meaning(diagnosis, far)}"
+    return Remainder(bool(far and diagnosis.found is not None), left, known, sentence)
 
 
-def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
-    if structured:
-        return "it is structured, not noise"
+def _meaning(diagnosis: Diagnosis, far: bool) -> str:
     if not far:
         return "it contains no further information"
+    if diagnosis.found is not None:
+        return "it is structured, not noise"
     if not diagnosis.hypotheses:
         return "it exceeds the noise; a diagnosis shows whether physics is missing"
     if diagnosis.unexplained and diagnosis.one_of:
-        return "mesh error and scatter do not account for it, and one of these may: " + ", ".join(
-            diagnosis.one_of
-        )
+        open_ = ", ".join(diagnosis.one_of)
+        return f"mesh error and scatter do not account for it, and one of these may: {open_}"
     if diagnosis.unexplained:
         return "no effect tried accounts for it, nor do mesh error and scatter in the parts"
     lead = diagnosis.hypotheses[0]
-    if diagnosis.two_log_bayes_factor(lead) > TIED:
+    if diagnosis.two_log_bayes_factor(lead) > RULES.tied:
         return f"{lead.effect.name} accounts for more of it than mesh error and scatter"
     return "no effect tried accounts for more of it than mesh error and scatter within the parts"
 

@@ -4,31 +4,25 @@ The base of the round contains the effects found before it. A later round theref
 of an effect in addition to the others.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import compress
 
 import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
-from ..inference.hypothesis_fit import (
-    FAILED,
-    ROUGH,
-    HypothesisFit,
-    UpdatingProblem,
-    fitted,
-)
+from ..inference.hypothesis_fit import FAILED, ROUGH, HypothesisFit, UpdatingProblem, fitted
 from ..inference.likelihood import Responses
 from ..inference.map_fit import Status
 from ..inference.own_optimum import LocalOptimum, distinct
 from ..parallel import in_parallel
+from ..progress import Progress
 from ..reduced.reduced_model import Reduced
 from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
-from .decision_rules import TIED
+from .decision_rules import RULES
 
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 FIRST = 5  # families that are fitted jointly, whatever they promise; ``LATER`` in later rounds
@@ -37,19 +31,14 @@ LATER = 2  # of them in later rounds
 WHOLE = 6  # that keep their model, 10 to 300 MB each on a tailgate
 FOOT = 0.01  # of the gain (a tenth of the amplitude), by which a simpler effect may fall behind
 
-Say = Callable[[str, float], None]
-
 
 def search_round(
-    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Progress,
     least: float | None = None,
 ) -> list[HypothesisFit]:  # fmt: skip
     """The best hypothesis of every family, best first.
 
-    Parameters
-    ----------
-    null : the best without any of them
-    least : gain in -2 ln evidence by rough fits, below which none is followed further
+    None is followed further if all gain less by rough fits than ``least``, in -2 ln evidence.
     """
     later = least is not None  # the bases of the first round are still there
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
@@ -60,10 +49,10 @@ def search_round(
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
         others |= {t.effect.name: behind for t in fits}
         give_back_freed_memory()
-    worst = BEHIND + min((t.neg2_log_evidence for t in hypotheses), default=0.0)
+    worst = BEHIND + _best(hypotheses, 0.0)
     more = in_parallel(lambda t: others[t.effect.name].tried(problem, null, t, worst), hypotheses)
     hypotheses = _lighter(problem, by_family([t for fits in more for t in fits]), whole)
-    if least is not None and not _gained(null, hypotheses, least):
+    if least is not None and null.neg2_log_evidence - _best(hypotheses) <= least:
         return simplest_first(by_family([*hypotheses, *left]), null.neg2_log_evidence)
     progress("refining the place", 0.8)
     running = running if later else max(running, _in_the_running(hypotheses[:whole]))
@@ -85,41 +74,27 @@ def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[Hyp
     unless the flank of that resonance brings more than a hundredth of the gain. If the interval of
     the tuning merely includes such values, the simpler effect leads only if it is tied. Likewise a
     tied row with physically possible values leads one without (a sealant as stiff as steel).
-
-    Parameters
-    ----------
-    hypotheses : best first
-    null : -2 ln evidence without any of them
+    ``null`` is -2 ln evidence without any of them.
     """
     for k, row in enumerate(hypotheses[1:], 1):
         lead, known = hypotheses[0], hypotheses[0].remarks
         behind = row.neg2_log_evidence - lead.neg2_log_evidence
         foot = FOOT * (null - lead.neg2_log_evidence)
         sounder = bool(known.implausible) and not row.remarks.implausible
-        near = behind < TIED and (sounder or row.name == known.nearly)
-        if near or (row.name == known.becomes and behind < max(TIED, foot)):
+        near = behind < RULES.tied and (sounder or row.name == known.nearly)
+        if near or (row.name == known.becomes and behind < max(RULES.tied, foot)):
             return [row, *hypotheses[:k], *hypotheses[k + 1 :]]
     return list(hypotheses)
 
 
+def _best(hypotheses: Sequence[HypothesisFit], none: float = np.inf) -> float:
+    """The least -2 ln evidence."""
+    return min((t.neg2_log_evidence for t in hypotheses), default=none)
+
+
 def _in_the_running(hypotheses: Sequence[HypothesisFit]) -> int:
     """How many are one answer with the best of them by rough fits."""
-    least = min((t.neg2_log_evidence for t in hypotheses), default=0.0)
-    return sum(t.neg2_log_evidence < least + TIED for t in hypotheses)
-
-
-def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: float) -> bool:
-    """True if the best hypothesis gains at least this much over the null."""
-    best = min((t.neg2_log_evidence for t in hypotheses), default=np.inf)
-    return bool(null.neg2_log_evidence - best > least)
-
-
-def _by_name(tried: Sequence[Candidate]) -> dict[str, list[Candidate]]:
-    """Candidates of each family."""
-    out: dict[str, list[Candidate]] = {}
-    for c in tried:
-        out.setdefault(c.effect.name, []).append(c)
-    return out
+    return sum(t.neg2_log_evidence < _best(hypotheses) + RULES.tied for t in hypotheses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +131,16 @@ Fits = tuple[list[HypothesisFit], _Others]
 
 
 def _family_fits(
-    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Progress,
     least: float | None, left: list[HypothesisFit],
 ) -> Iterator[Fits]:  # fmt: skip
     """Rough joint fits, one family after the other; ``left`` gets own optima of those behind.
 
     Poles are paired anew by every change: each candidate is fitted from its start.
     """
-    responses, families = isinstance(problem.data, Responses), _by_name(tried)
+    responses, families = isinstance(problem.data, Responses), dict[str, list[Candidate]]()
+    for c in tried:
+        families.setdefault(c.effect.name, []).append(c)
 
     def begun(some: Sequence[Candidate]) -> list[HypothesisFit]:
         if responses:
@@ -212,11 +189,6 @@ def _leaders(
 
     The linear base may hide as much of one family as it hid of the leading ones. The most that a
     joint fit of these gained over its own optimum is the slack of all others.
-
-    Parameters
-    ----------
-    families : own optima of each, as :func:`_own_optima` gives them
-    least : gain in -2 ln evidence that a hypothesis must reach
     """
     first, ranked = FIRST if least is None else LATER, list[list[HypothesisFit]]()
     for optima in (each for each in families if each):
@@ -226,14 +198,16 @@ def _leaders(
     slack, worst = 0.0, np.inf if least is None else null.neg2_log_evidence - least
     jointly, leading = partial(_jointly, problem, null), ranked[:first]
     for (own, *_), found in zip(leading, in_parallel(jointly, leading), strict=True):
-        joint = min((t.neg2_log_evidence for t in found[0]), default=np.inf)
+        joint = _best(found[0])
         slack, worst = max(slack, own.neg2_log_evidence - joint), min(worst, joint + BEHIND)
         yield found
-    may = [own[0].neg2_log_evidence - slack < worst for own in ranked[first:]]
-    for chance, (own, *others) in zip(may, ranked[first:], strict=True):
-        if not chance:
-            left.append(own.knowing([t.own for t in others]))
-    yield from in_parallel(jointly, compress(ranked[first:], may))
+    may = list[list[HypothesisFit]]()
+    for each in ranked[first:]:
+        if each[0].neg2_log_evidence - slack < worst:
+            may.append(each)
+        else:
+            left.append(each[0].knowing([t.own for t in each[1:]]))
+    yield from in_parallel(jointly, may)
 
 
 def _jointly(
@@ -258,13 +232,9 @@ def _from_own(
 
 
 def _tried(
-    problem: UpdatingProblem,
-    null: HypothesisFit,
-    effect: Effect,
-    start: np.ndarray,
-    base: np.ndarray,
-    model: Reduced | None = None,
-) -> list[HypothesisFit]:
+    problem: UpdatingProblem, null: HypothesisFit, effect: Effect, start: np.ndarray,
+    base: np.ndarray, model: Reduced | None = None,
+) -> list[HypothesisFit]:  # fmt: skip
     """Rough fits; a second one begins at the null if the first remains worse than the null.
 
     With the effect idle a hypothesis is the null. A fit that is worse by more than its price has
@@ -283,13 +253,9 @@ def by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
     """The best hypothesis of every family, best first."""
     best: dict[str, HypothesisFit] = {}
     for t in hypotheses:
-        lead = best.get(t.effect.name, t)
-        if lead is t:
-            best[t.effect.name] = t
-        elif t.fit.neg2_log_evidence < lead.fit.neg2_log_evidence:
-            best[t.effect.name] = t.among(lead)
-        else:
-            best[t.effect.name] = lead.among(t)
+        both = best.get(t.effect.name, t), t
+        ahead, behind = sorted(both, key=lambda f: f.fit.neg2_log_evidence)
+        best[t.effect.name] = t if ahead is behind else ahead.among(behind)
     return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
 
 
@@ -297,13 +263,10 @@ def _lighter(
     problem: UpdatingProblem, hypotheses: list[HypothesisFit], whole: int
 ) -> list[HypothesisFit]:
     """All families; those far down and at rest keep their fit, not the basis made for it."""
-    out = hypotheses[:whole]
-    for t in hypotheses[whole:]:
-        if t.fit.status is Status.OUT_OF_STEPS:
-            out.append(t)
-            continue
-        out.append(on_common_basis(problem, t))
-    return out
+    moving = Status.OUT_OF_STEPS
+    return hypotheses[:whole] + [
+        t if t.fit.status is moving else on_common_basis(problem, t) for t in hypotheses[whole:]
+    ]
 
 
 def on_common_basis(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisFit:
@@ -325,29 +288,28 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
         fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
     except FAILED:
         return hypothesis
-    if fit.neg2_log_evidence < hypothesis.fit.neg2_log_evidence:
-        return replace(hypothesis, fit=fit)
-    return hypothesis
+    return replace(hypothesis, fit=min(begun, fit, key=lambda f: f.neg2_log_evidence))
 
 
 def _closer(
     problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit
 ) -> list[HypothesisFit]:
     """The leader begun anew about the place it moved to, or at a better one, while it moves."""
-    out: list[HypothesisFit] = []
-    for _ in range(3):
+    out = [lead]
+    closer = next((f.closer for f in problem.families if f.name == lead.effect.name), None)
+    for _ in range(3 if closer else 0):
+        effect, x = out[-1].effect, out[-1].fit.of(out[-1].effect)
+        context = UpdatingContext(problem, null, taken(problem, out[-1], ("calibration",)))
         try:
-            again = _again(problem, null, lead)
+            again = closer and closer(context, effect, x)
             if again is None:
                 break
-            hypothesis = problem.fitted_with(again.effect, again.start, again.base)
+            out.append(problem.fitted_with(again.effect, again.start, again.base))
         except FAILED:
             break
-        out.append(hypothesis)
-        if hypothesis.fit.neg2_log_evidence > lead.fit.neg2_log_evidence - 1:
+        if out[-1].fit.neg2_log_evidence > out[-2].fit.neg2_log_evidence - 1:
             break
-        lead = hypothesis
-    return out
+    return out[1:]
 
 
 def _of_the_same_lump(
@@ -373,15 +335,6 @@ def _of_the_same_lump(
                 near = rough.neg2_log_evidence < lead.neg2_log_evidence + BEHIND
                 out.append(_finished(problem, rough, True) if near else rough)
     return out
-
-
-def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -> Candidate | None:
-    """The leader about the place it moved to, or at a better one next to its own; None: at rest."""
-    x, base = lead.fit.of(lead.effect), taken(problem, lead, ("calibration",))
-    known = next((f for f in problem.families if f.name == lead.effect.name), None)
-    if known is None or known.closer is None:
-        return None
-    return known.closer(UpdatingContext(problem, null, base), lead.effect, x)
 
 
 def taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:

@@ -12,7 +12,7 @@
 The members of a set are compared under one error of the model's form, from the set's own state.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -25,10 +25,10 @@ from ..errors import ModelError
 from ..inference.hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from ..inference.likelihood import Responses
 from ..inference.map_fit import unknowns
-from ..progress import within
+from ..progress import Progress, silent, within
 from ..reduced.reduced_model import Reduced, evaluate
 from .candidates import candidates, repeats
-from .decision_rules import GOOD_PART, TIED
+from .decision_rules import RULES
 from .search_round import search_round, taken
 
 MOST_EFFECTS = 3  # effects in one answer
@@ -37,8 +37,6 @@ WORTH = 0.25  # of the gain due, by rough fits: a round whose best is below it i
 PAIRED = 4  # leading families that are tried in pairs
 BETTER = 1.0  # gain in -2 ln evidence from which another effect replaces a member
 ATTEMPTS = 4  # rounds that may change the set
-
-Say = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -79,32 +77,28 @@ class Search:
 
 def several(
     problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float, unfit: bool,
-    progress: Say = lambda text, share: None,
+    progress: Progress = silent,
 ) -> Search:  # fmt: skip
     """Sets of effects grown from the best one, where every member gains a good part of its price.
 
-    Sets that :attr:`Several.pay` can be named. The members of the others may be present too.
-
-    Parameters
-    ----------
-    singles : the best hypothesis of every family alone, best first; a set must be ahead of them
-    due : gain in -2 ln evidence that one effect needs to be named
-    unfit : whether the best of them does not fit
+    Sets that :attr:`Several.pay` can be named. The members of the others may be present too. A set
+    must be ahead of the best effect alone, which is first of ``singles``; ``unfit``: it does not
+    fit. One effect needs the gain ``due`` in -2 ln evidence to be named.
     """
     lead, *others = singles
     search = _begun_with(problem, lead, due, within(progress, 0.0, 0.4))
     for other in others[:1]:
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
         if simpler or (unfit and not any(s.pay for s in search.sets)):
-            say = within(progress, 0.4, 0.8)
-            search = _better(search, _begun_with(problem, other, due, say, lead, search.sets))
+            part = within(progress, 0.4, 0.8)
+            search = _better(search, _begun_with(problem, other, due, part, lead, search.sets))
     if unfit and not any(s.pay for s in search.sets):
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
             pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
             search = replace(search, sets=(*search.sets, *pairs))
     sets = (replace(s, ahead=_gain(lead, s.hypothesis)) for s in search.sets)
-    return replace(search, sets=tuple(s for s in sets if s.ahead > GOOD_PART * s.due))
+    return replace(search, sets=tuple(s for s in sets if s.ahead > RULES.good_part * s.due))
 
 
 def _gain(without: HypothesisFit, hypothesis: HypothesisFit) -> float:
@@ -128,7 +122,7 @@ def _better(one: Search, other: Search) -> Search:
 
 
 def _begun_with(
-    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say,
+    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Progress,
     best: HypothesisFit | None = None, known: Sequence[Several] = (),
 ) -> Search:  # fmt: skip
     """Sets grown from one hypothesis, until no further effect gains enough or the best is ahead.
@@ -143,19 +137,16 @@ def _begun_with(
             break
         try:
             more, note = _grown(problem, current, price(due, size))
-            if more is None:
-                break
-            if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
+            if more is None or (best and _gain(best, _as_alone(problem, more.hypothesis)) < 0):
                 break
             found, paid = _revised(problem, more, current.effects, price(due, size))
         except ModelError as error:  # the fit reached an impossible structure
             note = f"the residual of {current.name} could not be searched: {error}"
             break
-        again = any(_same(problem, found.own, other.own) for other in known)
-        if again or {id(e) for e in found.own.effects} in seen:
+        current, members = found.own, {id(e) for e in found.own.effects}
+        if members in seen or any(_same(problem, current, other.own) for other in known):
             break
-        seen.append({id(e) for e in found.own.effects})
-        current = found.own
+        seen.append(members)
         out += [s for s in (paid, found) if s is not None and len(s.gains) > 1]
     return Search(tuple(out), note)
 
@@ -176,14 +167,18 @@ def _standing(
 ) -> tuple[UpdatingProblem, HypothesisFit]:
     """The problem with a hypothesis in its base and model errors from its state; its fit there."""
     held = problem.holding([(e, lead.fit.of(e)) for e in lead.effects])
-    model, x = held.reduced.model, np.concatenate([lead.fit.of(e) for e in held.base])
     if isinstance(lead.data, Responses) and lead.data.error is not None:
-        state = evaluate(model, held.base, x, False)
+        x = np.concatenate([lead.fit.of(e) for e in held.base])
+        state = evaluate(held.reduced.model, held.base, x, False)
         held = held.allowing_errors(state, lead.data.error.delta)
-    fit = fitted(model, held.base, held.data, held.mass_measurement, x)
-    found = tuple((e, fit.of(e)) for e, _ in held.found)
-    assert isinstance(fit.data, Responses)
-    return replace(held, found=found, data=fit.data), replace(lead, fit=fit, model=model)
+    null = _in_order(held, lead)
+    assert isinstance(null.data, Responses)
+    return replace(_moved(held, null), data=null.data), null
+
+
+def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
+    """The problem with its found effects at the values of a hypothesis."""
+    return replace(held, found=tuple((e, to.fit.of(e)) for e, _ in held.found))
 
 
 def _holding(
@@ -197,17 +192,13 @@ def _holding(
 
 @dataclass(frozen=True, eq=False)
 class _More:
-    """A set with one further effect.
-
-    ``alternatives`` are hypotheses that explain as much in the place of a member.
-    ``without`` are the best fits without a member.  Both are keyed by the id of the member, as
-    far as known.  Errors of form spread from a state of the model ``about``.
-    """
+    """A set with one further effect."""
 
     hypothesis: HypothesisFit
+    # by the id of a member, as far as known: hypotheses that explain as much in its place
     alternatives: dict[int, list[HypothesisFit]]
-    without: dict[int, HypothesisFit]
-    about: Reduced
+    without: dict[int, HypothesisFit]  # the same: the best fit without it
+    about: Reduced  # from a state of which errors of form spread
 
 
 def _grown(
@@ -223,7 +214,7 @@ def _grown(
         f"with {current.name} in place the best further effect, {found[0].effect.name}, gains "
         f"{gain:.1f} in -2 ln evidence; {due:.0f} are required"
     )
-    if gain <= GOOD_PART * due:
+    if gain <= RULES.good_part * due:
         return None, note
     newest = id(found[0].effect)
     others = [t for t in found[1:] if _other(t, found[0].effect)]
@@ -234,13 +225,8 @@ def _round(
     held: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], least: float
 ) -> list[HypothesisFit]:
     """A round of a search, less effects that moved onto a present effect of their own family."""
-    hypotheses = search_round(held, null, tried, lambda text, share: None, least)
+    hypotheses = search_round(held, null, tried, silent, least)
     return [t for t in hypotheses if not repeats(_moved(held, t), t.effect, t.fit.of(t.effect))]
-
-
-def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
-    """The problem with its found effects at the values of a hypothesis."""
-    return replace(held, found=tuple((e, to.fit.of(e)) for e, _ in held.found))
 
 
 def _revised(
@@ -252,7 +238,7 @@ def _revised(
     """
     for member in members:
         more = _sought_anew(problem, more, member)
-    found = _paying(problem, more, due, GOOD_PART)
+    found = _paying(problem, more, due, RULES.good_part)
     if found.pay or len(found.gains) < 2:
         return found, None
     known = {id(e): t for e, t in zip(found.own.effects, found.without, strict=True)}
@@ -261,43 +247,35 @@ def _revised(
 
 
 def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
-    """The set with one member replaced by the effect that explains most; it may be the same."""
+    """The set with one member replaced by an effect that is better, or simpler and tied."""
     lead = more.hypothesis
     rest = _without(problem, lead, member)
     held = _holding(problem, rest, rest.effects)
-    null = _in_order(held, rest)
+    null = _in_order(held, rest, ROUGH)
     itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("calibration", "nuisance")))
     found = _round(held, null, [itself, *candidates(held, null, FITTED)], 0.0)
     if not found:
         return more
-    best = found[0]
-    if not _preferred(best, lead, member):
-        known, others = {**more.without, id(member): rest}, [t for t in found if _other(t, member)]
-        return replace(more, alternatives={**more.alternatives, id(member): others}, without=known)
-    new = id(best.effect)
-    alternatives = {**more.alternatives, new: [t for t in found[1:] if _other(t, best.effect)]}
-    return replace(more, hypothesis=best, alternatives=alternatives, without={new: rest})
+    best, known = found[0], member.remarks(lead.fit.of(member))
+    simpler = known.becomes == best.effect.name or bool(known.implausible)
+    tied = simpler and best.effect.name != member.name and _gain(lead, best) > -RULES.tied
+    kept = not (tied or _gain(lead, best) > BETTER)
+    member = member if kept else best.effect
+    others = {**more.alternatives, id(member): [t for t in found if _other(t, member)]}
+    if kept:
+        return replace(more, alternatives=others, without={**more.without, id(member): rest})
+    return replace(more, hypothesis=best, alternatives=others, without={id(member): rest})
 
 
 def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
     """True for another family whose fitted effect is not the member under another name."""
-    effect = hypothesis.effect
-    return member.name not in (effect.name, effect.remarks(hypothesis.fit.of(effect)).becomes)
+    return member.name not in (hypothesis.effect.name, hypothesis.remarks.becomes)
 
 
-def _preferred(best: HypothesisFit, lead: HypothesisFit, member: Effect) -> bool:
-    """True where another effect replaces a member: it is better, or simpler and tied."""
-    ahead, x = _gain(lead, best), lead.fit.of(member)
-    known = member.remarks(x)
-    simpler = known.becomes == best.effect.name or bool(known.implausible)
-    return ahead > BETTER or (simpler and best.effect.name != member.name and ahead > -TIED)
-
-
-def _in_order(held: UpdatingProblem, fit: HypothesisFit) -> HypothesisFit:
+def _in_order(held: UpdatingProblem, fit: HypothesisFit, steps: int = 30) -> HypothesisFit:
     """A fit of the base of a problem, repeated with its parameters in the order of that base."""
-    x = np.concatenate([fit.fit.of(e) for e in held.base])
-    model, data = held.reduced.model, held.data
-    again = fitted(model, held.base, data, held.mass_measurement, x, ROUGH)
+    x, model = np.concatenate([fit.fit.of(e) for e in held.base]), held.reduced.model
+    again = fitted(model, held.base, held.data, held.mass_measurement, x, steps)
     return replace(fit, fit=again, model=model)
 
 
@@ -347,13 +325,10 @@ def _close(
     alternatives: Sequence[HypothesisFit], lead: HypothesisFit
 ) -> tuple[AlternativeRow, ...]:
     """Other families that explain as much as a member in its place."""
-    every = [
-        AlternativeRow(
-            t.effect.name, _gain(t, lead), t.effect.remarks(t.fit.of(t.effect)).implausible
-        )
-        for t in alternatives
-    ]
-    return tuple(alternative for alternative in every if alternative.behind < TIED)
+    close = (t for t in alternatives if _gain(t, lead) < RULES.tied)
+    return tuple(
+        AlternativeRow(t.effect.name, _gain(t, lead), t.remarks.implausible) for t in close
+    )
 
 
 def _in_pairs(
@@ -361,18 +336,14 @@ def _in_pairs(
 ) -> list[Several]:
     """The best pair of leading families, if it beats one alone and both members gain enough."""
     base, alone = _standing(problem, singles[0])
-    data = base.data
     tries = []
     for one, other in combinations(singles, 2):
         held = problem.holding([(one.effect, one.fit.of(one.effect))])
-        held = replace(held, data=data.rebased(held.reduced.model))
-        start = other.fit.of(other.effect)
-        if repeats(held, other.effect, start):
-            continue
-        with suppress(ModelError):
-            tries.append(
-                held.fitted_with(other.effect, start, taken(held, one, ("calibration",)), ROUGH)
-            )
+        held = replace(held, data=base.data.rebased(held.reduced.model))
+        start, x = other.fit.of(other.effect), taken(held, one, ("calibration",))
+        if not repeats(held, other.effect, start):
+            with suppress(ModelError):
+                tries.append(held.fitted_with(other.effect, start, x, ROUGH))
     best = min([alone, *tries], key=lambda t: t.neg2_log_evidence)
     if _gain(alone, best) < WORTH * due:
         return []

@@ -4,7 +4,7 @@ A support holds them, or the motion they measure is uncoupled: a force in the pl
 moves no sensor across it. The logarithm of such a response is that of a rounding error.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,20 +21,13 @@ AXES = tuple(zip(("+X", "+Y", "+Z"), np.eye(3), strict=True))
 
 
 def refuse_silent(model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs) -> None:
-    """Refuse drives and sensors at which the response of the model is numerically nothing.
-
-    Raises
-    ------
-    LabelError
-        If there are some; the sentence names their labels and a direction that would respond.
-    """
+    """Refuse drives and sensors at which the response of the model is numerically nothing."""
     if inputs.base.any() or not (len(inputs.labels) and len(outputs.labels)):
         return
     sides = {"drive": inputs, "sensor": outputs}
-    rows = {what: at.rows(model.structure) for what, at in sides.items()}
-    held = {what: np.flatnonzero(abs(each).sum(axis=1) == 0) for what, each in rows.items()}
-    if any(map(len, held.values())):
-        raise LabelError(" ".join(_held(model, sides, held)))
+    held = {what: at.only(_fixed(model, at)) for what, at in sides.items()}
+    if any(at.labels for at in held.values()):
+        raise LabelError(_held(model, {what: at for what, at in held.items() if at.labels}))
     silent = _silent(model, outputs, inputs)
     drives, sensors = silent.all(axis=0), silent.all(axis=1)
     if drives.any():
@@ -43,7 +36,7 @@ def refuse_silent(model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs) 
         what, own, other, said = "sensor", sensors, inputs, "with no drive"
     else:
         return
-    at = _only(sides[what], np.flatnonzero(own))
+    at = sides[what].only(np.asarray(own))
     said = f"move{'s' * (len(at.labels) == 1)} {said}"
     ways = [axis for axis, n in AXES if not _silent(model, _along(at, n), other).all()]
     theirs: list[str] = []
@@ -62,28 +55,29 @@ def silent_sensors(model: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs)
     """Labels of the sensors that move with no drive."""
     if inputs.base.any():
         return ()
-    silent = _silent(model, outputs, inputs).all(axis=1)
-    return tuple(np.array(outputs.labels)[silent].tolist())
+    return outputs.only(np.asarray(_silent(model, outputs, inputs).all(axis=1))).labels
 
 
 def _declared(at: MeasuredDofs) -> str:
     """The axes nearest to the directions of dofs."""
-    nearest = np.abs(at.directions).argmax(axis=1)
-    return " and ".join("XYZ"[k] for k in sorted(set(nearest.tolist())))
+    return " and ".join("XYZ"[k] for k in np.unique(np.abs(at.directions).argmax(axis=1)))
 
 
-def _held(
-    model: Modelled, sides: dict[str, MeasuredDofs], held: dict[str, np.ndarray]
-) -> Iterator[str]:
-    """Sentences on the places that supports hold."""
-    built = model.structure
-    several = " and ".join(
-        _listed(what, _only(sides[what], rows).labels) for what, rows in held.items() if len(rows)
+def _held(model: Modelled, held: dict[str, MeasuredDofs]) -> str:
+    """Sentence on the places that supports hold."""
+    several = " and ".join(_listed(what, at.labels) for what, at in held.items())
+    ways = [
+        a for a, n in AXES if not any(_fixed(model, _along(at, n)).all() for at in held.values())
+    ]
+    return (
+        f"the supports of the deck hold {several}, so the model does not respond there; "
+        f"{_would(ways)}compare the grid and direction of each with the supports"
     )
-    every = [_only(sides[what], rows) for what, rows in held.items() if len(rows)]
-    ways = [a for a, n in AXES if all(abs(_along(at, n).rows(built)).sum() > 0 for at in every)]
-    yield f"the supports of the deck hold {several}, so the model does not respond there;"
-    yield f"{_would(ways)}compare the grid and direction of each with the supports"
+
+
+def _fixed(model: Modelled, at: MeasuredDofs) -> np.ndarray:
+    """True for each dof that a support holds (n,)."""
+    return np.asarray(abs(at.rows(model.structure)).sum(axis=1) == 0)
 
 
 def _would(ways: Sequence[str], of_sensors: Sequence[str] = ()) -> str:
@@ -96,11 +90,6 @@ def _would(ways: Sequence[str], of_sensors: Sequence[str] = ()) -> str:
 
 def _listed(what: str, labels: Sequence[str]) -> str:
     return f"{what}{'s' * (len(labels) > 1)} {named(labels, 3)}"
-
-
-def _only(at: MeasuredDofs, rows: np.ndarray) -> MeasuredDofs:
-    labels = tuple(at.labels[k] for k in rows)
-    return replace(at, labels=labels, **{k: v[rows] for k, v in vars(at).items() if k != "labels"})
 
 
 def _along(at: MeasuredDofs, n: np.ndarray) -> MeasuredDofs:

@@ -8,10 +8,8 @@ question of further measurements (:mod:`.next_measurement`).
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..effects.effect import Effect
 from ..effects.family import Article
@@ -30,18 +28,12 @@ from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
 from ..reduced.reduced_model import evaluate
 from ..reduced.reduced_problem import ReducedProblem, reduced_problem
+from .base_effects import mesh_hidden, nuisances
 from .candidates import candidates
 from .diagnosis import without_effects
 from .measurement_forecasts import COSTS, WEIGHED, outlook
 from .next_measurement import FurtherTest, Outlook
-from .nuisances import measured_on, mesh_hidden, nuisances
-from .preparation import (
-    SOLVED,
-    ZETA,
-    equalised_lines,
-    ready_for_responses,
-    updating_problem,
-)
+from .preparation import SOLVED, ZETA, equalised_lines, ready_for_responses, updating_problem
 from .question import Question
 from .search_round import search_round
 
@@ -51,19 +43,13 @@ LEAST = 1e-9  # probability of a rival, so that its logarithm exists
 
 
 def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
-    """The updating problem of a planned test; its responses are the deck's own.
-
-    Parameters
-    ----------
-    question : without a recording; its band is the planned band
-    noise : of |H|, at every line that is compared
-    """
+    """The updating problem of a test in the planned band; its responses are the deck's own."""
     low, f_max = question.band
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows = question.outputs.rows(built), question.inputs.rows(built)
     test = question.outputs, question.inputs, built, question.accuracy
-    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    mesh = mesh_hidden(nominal, f_max, question.rows)
     reduced = ready_for_responses(question, nominal, f_max)
     f = equalised_lines((low, f_max), question.exclude, ZETA)
     s = 2 * np.pi * f * (ZETA + 1j)
@@ -75,38 +61,23 @@ def unmeasured(question: Question, noise: float = NOISE) -> UpdatingProblem:
         sensors=sensor_errors(*test),
     ).rebased(reduced.model)  # fmt: skip
     nuisance = [*nuisances(reduced, nominal, mesh), *gauge_errors(*test)]
-    problem = updating_problem(question, reduced, unit, nuisance, f_max)
+    problem = updating_problem(question, reduced, unit, nuisance)
     state = evaluate(reduced.model, problem.base, problem.mean())
     return replace(problem, data=replace(unit, values=unit.model(state)))
 
 
 @dataclass(frozen=True, eq=False)
 class FirstTest:
-    """The first test of an article with a concealed effect, and fits of the rival explanations.
+    """The first test of an article with a concealed effect, and fits of the rival explanations."""
 
-    Attributes
-    ----------
-    name : of the concealed effect
-    question, article : what was tested, and how
-    problem : with the recording
-    reduced : of the article itself
-    hypotheses, names : of the rivals
-    probability : of each after the recording
-    """
-
-    name: str
+    name: str  # of the concealed effect
     question: Question
     article: Article
-    problem: UpdatingProblem
-    reduced: ReducedProblem
-    hypotheses: tuple[HypothesisFit, ...]
+    problem: UpdatingProblem  # with the recording
+    reduced: ReducedProblem  # of the article itself
+    hypotheses: tuple[HypothesisFit, ...]  # the rivals
     names: tuple[str, ...]
-    probability: np.ndarray
-
-    @cached_property
-    def outlook(self) -> Outlook:
-        """Forecasts of further measurements."""
-        return self.forecasts()
+    probability: np.ndarray  # of each after the recording
 
     def forecasts(self, kinds: Collection[str] = tuple(COSTS)) -> Outlook:
         """Forecasts of further measurements of some kinds."""
@@ -143,67 +114,52 @@ class FirstTest:
 
 
 def first_tests(
-    question: Question, names: Sequence[str], each: int = 1, noise: float = NOISE, seed: int = 0,
-    scatter: float = 0.0, progress: Progress = silent,
+    question: Question, names: Sequence[str], each: int = 1, seed: int = 0, scatter: float = 0.0,
+    progress: Progress = silent,
 ) -> Iterator[FirstTest]:  # fmt: skip
     """Test articles with each of the effects concealed in turn, and fit all of the effects.
 
-    Parameters
-    ----------
-    question : without a recording; its band and sensors are the planned ones
-    names : of the effects, two and more
-    each : articles with each effect
-    noise : of |H|, at every line that is compared
-    scatter : of the articles' E, rho and t, in units of their prior standard deviation
-
-    Raises
-    ------
-    FileError
-        If an effect has nothing to act on in this deck.
+    The question has no recording: its band and sensors are the planned ones. E, rho and t of the
+    articles have a ``scatter`` in units of their prior standard deviation.
     """
     question = replace(question, effects=tuple(names))
     if question.mass_measurement is None:
         mass = mass_properties(question.assembly)[0]
         question = replace(question, mass_measurement=MassMeasurement(mass, WEIGHED_SD * mass))
     progress("the planned test", 0.0)
-    problem = unmeasured(question, noise)
+    problem = unmeasured(question)
     jobs = [name for _ in range(each) for name in names]
     for n, name in enumerate(jobs):
         stage = within(progress, 0.2 + 0.8 * n / len(jobs), 0.2 + 0.8 * (n + 1) / len(jobs))
         stage(f"an article with {name}", 0.0)
         rng = np.random.default_rng([seed, n])
-        yield _tested(question, problem, name, rng, noise, scatter)
+        yield _tested(question, problem, name, rng, scatter)
 
 
 def _tested(
     question: Question, problem: UpdatingProblem, name: str, rng: np.random.Generator,
-    noise: float, scatter: float,
+    scatter: float,
 ) -> FirstTest:  # fmt: skip
     """Conceal an effect, record the article, and fit all families of the problem."""
-    made = _scattered(problem, question.assembly, rng, scatter)
-    article = _article(question, made)
+    made = question.assembly
+    for effect in (e for e in problem.base if e.kind == "calibration"):
+        sd = np.array([p.sd for p in effect.parameters])
+        made = effect.apply(made, scatter * sd * rng.standard_normal(len(sd)))
     try:
-        article = family(name).conceal(article, rng)
+        article = family(name).conceal(_article(question, made), rng)
     except (ModelError, ValueError, IndexError) as error:
         raise FileError(f"{name}: this deck has nothing that it acts on ({error})") from error
-    measured, reduced = recorded(question, problem, article, rng, noise)
+    measured, reduced = recorded(question, problem, article, rng)
     return explained(name, question, article, measured, reduced)
 
 
-def with_further(
-    test: FirstTest, made: FurtherTest, rng: np.random.Generator, noise: float = NOISE
-) -> FirstTest:
-    """The test with a further measurement: its data stay, and all effects are fitted anew.
-
-    Parameters
-    ----------
-    made : a sensor of gain 1, a drive, a wider band or a weighing
-    """
+def with_further(test: FirstTest, made: FurtherTest, rng: np.random.Generator) -> FirstTest:
+    """The test with a sensor of gain 1, a drive, a wider band or a weighing; all is fitted anew."""
     question = _with_further(test.question, made)
     gains = np.ones(len(question.outputs.labels))
     gains[: len(test.article.gains)] = test.article.gains
     article = replace(test.article, gains=gains)
-    problem, reduced = recorded(question, unmeasured(question, noise), article, rng, noise)
+    problem, reduced = recorded(question, unmeasured(question), article, rng)
     first, data = test.problem.data, problem.data
     assert isinstance(first, Responses)
     assert isinstance(data, Responses)
@@ -231,19 +187,18 @@ def _with_further(question: Question, made: FurtherTest) -> Question:
 
 
 def recorded(
-    question: Question, problem: UpdatingProblem, article: Article, rng: np.random.Generator,
-    noise: float = NOISE,
-) -> tuple[UpdatingProblem, ReducedProblem]:  # fmt: skip
+    question: Question, problem: UpdatingProblem, article: Article, rng: np.random.Generator
+) -> tuple[UpdatingProblem, ReducedProblem]:
     """The problem with the recording of an article, which is weighed too, and the article."""
     f_max = problem.reduced.f_max
     solved = modelled(question.searched(article.assembly), SOLVED * f_max)
     rows = question.outputs.rows(solved.structure), question.inputs.rows(solved.structure)
-    reduced = reduced_problem(solved, f_max, sp.csr_array(sp.vstack(rows)))
+    reduced = reduced_problem(solved, f_max, question.rows(solved.structure))
     data = problem.data
     assert isinstance(data, Responses)
     own = replace(data, outputs=rows[0], inputs=rows[1], sensors=None).rebased(reduced.model)
     values = own.model(evaluate(reduced.model, (), np.zeros(0), False))
-    off = rng.standard_normal((2, *values.shape)) * noise
+    off = rng.standard_normal((2, *values.shape)) * NOISE
     values = values * article.gains[:, None] * np.exp(off[0] + 1j * off[1])
     weighed = problem.mass_measurement
     assert weighed is not None
@@ -281,14 +236,3 @@ def _article(question: Question, made: Assembly) -> Article:
         made, deck, grids, np.array(question.hangers, dtype=np.int64), np.ones(len(grids)),
         drive=(int(driven[0]), (x, y, z)),
     )  # fmt: skip
-
-
-def _scattered(
-    problem: UpdatingProblem, made: Assembly, rng: np.random.Generator, scatter: float
-) -> Assembly:
-    """The deck with E, rho and t drawn from their priors."""
-    for effect in problem.base:
-        if effect.kind == "calibration":
-            sd = np.array([p.sd for p in effect.parameters])
-            made = effect.apply(made, scatter * sd * rng.standard_normal(len(sd)))
-    return made

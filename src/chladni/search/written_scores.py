@@ -1,4 +1,4 @@
-"""Q of decks as written, without mesh error, scatter or gain errors.
+"""Q of states, and of decks as written: without mesh error, scatter or gain errors.
 
 The response of a structure at its sensors comes from Rayleigh-Ritz on its own modes and static
 responses.  The static loads are unit loads at sensors and shakers, as in the reduced model of a
@@ -26,33 +26,24 @@ from .question import Prepared, Question
 
 
 def written_Q(
-    question: Question,
-    prepared: Prepared,
-    model: Modelled,
-    sets: tuple[np.ndarray, ...],
-    real: np.ndarray | None = None,
-    fault: HypothesisFit | None = None,
-) -> tuple[float, ...]:
-    """Q of a structure on each of these sets of samples.
+    prepared: Prepared, model: Modelled, sets: tuple[np.ndarray, ...],
+    real: np.ndarray | None = None, fault: HypothesisFit | None = None,
+) -> tuple[float, ...]:  # fmt: skip
+    """Q of a structure on each of these sets of samples; ``real`` poles alone are modes.
 
-    Parameters
-    ----------
-    sets : of samples, in the shape of ``prepared.score.use``
-    real : (n,) bool       poles of the test that are modes
-    fault : the named effects; faults of channels among them are removed from the recording before
-        it is compared, and spinning parts are added to the structure
-
-    Where the gain is unknown, the mean level over the fitted samples is removed as well.
+    Faults of channels among the named effects, ``fault``, are removed from the recording before it
+    is compared, and spinning parts are added to the structure. Where the gain is unknown, the mean
+    level over the fitted samples is removed as well.
     """
     f_max, terms = prepared.problem.setup.f_max, list[Term]()
     if fault is not None:
         terms = [t for effect in fault.effects for t in effect.terms(fault.fit.of(effect))]
-    data, state = seen(question, prepared.score, model, f_max, of(SpinTerm, terms))
+    data, state = seen(prepared.question, prepared.score, model, f_max, of(SpinTerm, terms))
     if isinstance(data, Poles):
         return tuple(data.Q(state, use, real) for use in sets)
     n = len(data.a)
     offset = sum((change.value for change in of(ChannelChange, terms)), np.zeros(n, complex))
-    offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
+    offset = offset + gain_offset(prepared, data, replace(state, offset=offset))
     state = replace(state, offset=offset)
     return tuple(data.Q(state, use) for use in sets)
 
@@ -73,12 +64,10 @@ def equalised_deviation(
     return delta if question.gain_known else delta - delta.real.mean()
 
 
-def gain_offset(
-    question: Question, prepared: Prepared, data: Responses, state: State
-) -> np.ndarray:
+def gain_offset(prepared: Prepared, data: Responses, state: State) -> np.ndarray:
     """log10 of the unknown common gain of all channels (n_out,); zero where the gain is known."""
     none = np.zeros(len(data.a), complex)
-    if question.gain_known:
+    if prepared.question.gain_known:
         return none
     return none - data.deviation(state)[prepared.score.use].real.mean()
 
@@ -130,3 +119,35 @@ def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None)
         variance = prepared.noise[use]
     Q = float(variance.mean()) if variance.size else np.inf
     return Q if Q < LN10**-2 else None
+
+
+def scores_of(
+    prepared: Prepared, winner: HypothesisFit, fits: Sequence[HypothesisFit], held: np.ndarray
+) -> list[list[float]]:
+    """Q of some fits, one list for the fitted data and one for the held-out data ``held``."""
+    real = real_poles(prepared, winner)
+    return [
+        [prepared.score.rebased(one.model).Q(one.fit.state, use, real) for one in fits]
+        for use in (prepared.score.use, of_channels(prepared, winner, held))
+    ]
+
+
+def of_channels(prepared: Prepared, winner: HypothesisFit, held: np.ndarray) -> np.ndarray:
+    """Held-out samples; for a fault of one channel, those of that channel alone."""
+    if not winner.channels or held.ndim < 2:
+        return held
+    own = held & np.isin(prepared.problem.labels, winner.channels)
+    return own if own.any() else held
+
+
+def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
+    """Poles of the test that are modes (n,) bool: those listed, or with a partner in the winner."""
+    if not isinstance(prepared.score, Poles):
+        return None
+    data = prepared.score.rebased(winner.model)
+    if data.listed:
+        return np.ones(len(data.frequency), bool)
+    wide = replace(data, scale=max(3 * getattr(winner.fit.data, "scale", 0.01), 0.02))
+    real = np.zeros(len(data.frequency), bool)
+    real[wide.pairs(winner.fit.state, np.ones(len(real), bool))[0]] = True
+    return real

@@ -349,7 +349,7 @@ def _screened(state: Case, diagnosing: bool, progress: Progress) -> tuple[str, S
     """A mass that deck and scales do not allow, and the findings on the recording."""
     try:
         state = without_silent(with_sign_of_gain(state))
-        _, prepared, screening = ready(state, diagnosing, progress, fitted=False)
+        prepared, screening = ready(state, diagnosing, progress, fitted=False)
     except RecordingAtFault as fault:
         return "", fault.screening
     return off_the_scales(prepared.problem), screening

@@ -20,9 +20,13 @@ from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..search.decision_rules import RULES, odds_of_something_else
-from ..search.diagnosis import Diagnosis
-from ..search.frequency_table import frequency_error, frequency_rows
-from ..search.measured_modes import MeasuredModes, measured_modes
+from ..search.diagnosis import Diagnosis, assemblies
+from ..search.measured_modes import (
+    MeasuredModes,
+    frequency_error,
+    frequency_rows,
+    measured_modes,
+)
 from ..search.other_recordings import scored_others
 from ..search.question import Prepared, Question
 from ..search.result_parts import (
@@ -37,8 +41,7 @@ from ..search.result_parts import (
     remainder,
     values_kept,
 )
-from ..search.verdict_models import assemblies, of_channels, real_poles, scores_of
-from ..search.written_scores import noise_Q, written_Q
+from ..search.written_scores import noise_Q, of_channels, real_poles, scores_of, written_Q
 from .case_model import DAMPING, model_frf
 from .deck_comments import with_mended, with_remarks
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
@@ -46,14 +49,15 @@ from .loaded_model import exported_deck
 
 
 def updated_models(
-    case: Case, question: Question, prepared: Prepared, found: Diagnosis, mended: tuple[str, ...]
+    case: Case, prepared: Prepared, found: Diagnosis, mended: tuple[str, ...]
 ) -> tuple[UpdatedModels, list[str]]:
     """Return the structures before and after, each solved once, as their decks describe them.
 
     Comments of a changed deck say what of the recording was ``mended``.
     """
+    question = prepared.question
     nominal = as_it_is(question, prepared.nominal)
-    plain, named = assemblies(question, found)
+    plain, named = assemblies(question.assembly, found)
     calibrated, lost = _deck(case, question, nominal, plain)
     final = calibrated
     if named is not plain:
@@ -66,7 +70,7 @@ def updated_models(
 
 
 def on_preferred_mesh(
-    case: Case, question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
+    case: Case, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
     result: DiagnosisResult, mended: tuple[str, ...],
 ) -> tuple[UpdatedModels, DiagnosisResult]:  # fmt: skip
     """Return decks with every shell halved, if the data prefer that mesh and they predict better.
@@ -76,9 +80,9 @@ def on_preferred_mesh(
     worse = last_step_in_words(result.agreement, bool(result.effects))
     if not (found.halved and worse):
         return stages, result
-    plain, *named = found.halved
+    question, (plain, *named) = prepared.question, found.halved
     found = replace(found, plain=plain, written=named[0] if named else None)
-    before, after = assemblies(question, found)
+    before, after = assemblies(question.assembly, found)
 
     def deck(changed: Assembly) -> ChangedDeck:
         source = exported_deck(halved(changed), case.units)
@@ -95,7 +99,7 @@ def on_preferred_mesh(
     final = with_mended(final, mended)
     better = replace(stages, calibrated=calibrated, final=final)
     better = replace(better, curves=_curves(case, better, better.test))
-    again = result_of(question, prepared, found, better)
+    again = result_of(prepared, found, better)
     if last_step_in_words(again.agreement, bool(again.effects)):
         return stages, result
     return better, replace(again, halved=f"on the given mesh {worse}")
@@ -158,10 +162,9 @@ def _curves(case: Case, made: UpdatedModels, modes: MeasuredModes) -> dict[str, 
     return {"test": test, "before": before, "after": after}
 
 
-def result_of(
-    question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels
-) -> DiagnosisResult:
+def result_of(prepared: Prepared, found: Diagnosis, stages: UpdatedModels) -> DiagnosisResult:
     """Collect all numbers and words, from the decks as written."""
+    question = prepared.question
     last, deck = found.found or found.null, found.as_deck or found.plain
     real = real_poles(prepared, last)
     every = (
@@ -169,8 +172,8 @@ def result_of(
         ("calibrated", stages.calibrated.model),
         ("after", stages.final.model),
     )
-    rows = frequency_rows(question, prepared, stages.test, every, real)
-    fitted, held = _scores(question, prepared, found, stages, real)
+    rows = frequency_rows(prepared, stages.test, every, real)
+    fitted, held = _scores(prepared, found, stages, real)
     left = remainder(prepared, found)
     away = dict.fromkeys((*implausible_values(deck.fit), *strained(last.fit)))
     spot = residual_localisation(last, question.mass_measurement)
@@ -200,7 +203,7 @@ def result_of(
         one_of=(found.one_of,) if found.one_of else (),
         compared=prepared.score.compared,
         models=stages,
-        recordings=scored_others(question, prepared, [model for _, model in every]),
+        recordings=scored_others(prepared, [model for _, model in every]),
     )
 
 
@@ -230,20 +233,20 @@ def article_mass(question: Question, stages: UpdatedModels, deck: HypothesisFit)
 
 
 def _scores(
-    question: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
+    prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
     real: np.ndarray | None,
 ) -> tuple[Scores, Scores]:  # fmt: skip
     """Return Q of the three decks on fitted and held-out data, of noise, and with nuisances."""
     winner = found.found or found.null
     sets = prepared.score.use, of_channels(prepared, winner, prepared.held.reporting)
     named = found.found
-    nominal = written_Q(question, prepared, stages.nominal, sets, real)
+    nominal = written_Q(prepared, stages.nominal, sets, real)
     calibrated = final = nominal
     if stages.calibrated.model is not stages.nominal:
-        final = calibrated = written_Q(question, prepared, stages.calibrated.model, sets, real)
+        final = calibrated = written_Q(prepared, stages.calibrated.model, sets, real)
     if named is not None or stages.final is not stages.calibrated:
-        final = written_Q(question, prepared, stages.final.model, sets, real, named)
-    known = scores_of(prepared, winner, [(winner, winner.fit.state)], prepared.held.reporting)
+        final = written_Q(prepared, stages.final.model, sets, real, named)
+    known = scores_of(prepared, winner, [winner], prepared.held.reporting)
     first, second = (
         (*decks, noise_Q(prepared, use, real), *nuisances)
         for *decks, use, nuisances in zip(nominal, calibrated, final, sets, known, strict=True)

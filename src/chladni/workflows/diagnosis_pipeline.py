@@ -23,23 +23,18 @@ from ..search.articles import articles_together
 from ..search.basis_refinement import refined
 from ..search.calibration import FULL, CalibrationSettings, calibration
 from ..search.compensation import compensating
-from ..search.conclusion import concluded, open_explanations
-from ..search.damping_by_part import damping_by_part
-from ..search.decide import decide
+from ..search.decide import concluded, decide, open_explanations
 from ..search.decision_in_words import BEYOND
 from ..search.diagnosis import Diagnosis
 from ..search.diagnosis import diagnose as compared
 from ..search.earlier_answer import EarlierAnswer, digests, earlier_answer
 from ..search.hypotheses import ALONE, Hypotheses
-from ..search.left_frequencies import left_frequencies
+from ..search.left_frequencies import damping_by_part, left_frequencies, regions_to_free
 from ..search.measurement_forecasts import outlook
 from ..search.next_measurement import Outlook, advised
 from ..search.preparation import NOT_WEIGHED
-from ..search.question import Prepared, Question
-from ..search.regions_to_free import regions_to_free
-from ..search.result_parts import (
-    foretells_worse,
-)
+from ..search.question import Prepared
+from ..search.result_parts import foretells_worse
 from .decks_of_diagnosis import on_preferred_mesh, result_of, updated_models
 from .diagnosis_result import DiagnosisResult
 from .mended_case import mending, with_undone
@@ -54,7 +49,6 @@ class Explained:
     """A case whose hypotheses are fitted and, with ``distrust``, decided; nothing is written."""
 
     case: Case
-    question: Question
     prepared: Prepared
     found: Diagnosis
     screening: Screening | None = None
@@ -100,7 +94,7 @@ def _searched(
     """Fit the recording as it is; ``faults`` were undone already."""
     progress("identifying the recording", 0.0)
     stage = within(progress, 0.0, 0.1)
-    question, prepared, screening = ready(case, diagnosing, stage, undone=faults)
+    prepared, screening = ready(case, diagnosing, stage, undone=faults)
     if known:
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
@@ -111,12 +105,10 @@ def _searched(
     stage = within(progress, 0.1, 0.85)
     if diagnosing:
         found = compared(prepared.problem, stage)
-        return Explained(case, question, prepared, found, screening, earlier=earlier)
-    made = calibration(prepared.problem, stage, settings)
-    articles = articles_together(question, prepared, made.diagnosis.null)
-    study = replace(made.study, articles=articles)
-    prepared = replace(prepared, problem=made.problem)
-    return Explained(case, question, prepared, made.diagnosis, screening, study)
+        return Explained(case, prepared, found, screening, earlier=earlier)
+    problem, found, study = calibration(prepared.problem, stage, settings)
+    study = replace(study, articles=articles_together(prepared, found.null))
+    return Explained(case, replace(prepared, problem=problem), found, screening, study)
 
 
 def explained(
@@ -149,19 +141,18 @@ def data_of(case: Case) -> dict[str, str]:
 
 def build_result(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
     """Write an explanation into decks and compute every number of the result from them."""
-    case, question, prepared = known.case, known.question, known.prepared
-    found = known.found
+    case, prepared, found = known.case, known.prepared, known.found
     progress("the updated deck", 0.85)
     mended = () if known.screening is None else known.screening.mended
-    stages, lost = updated_models(case, question, prepared, found, mended)
+    stages, lost = updated_models(case, prepared, found, mended)
     progress("scores", 0.95)
-    result = result_of(question, prepared, found, stages)
-    stages, result = on_preferred_mesh(case, question, prepared, found, stages, result, mended)
+    result = result_of(prepared, found, stages)
+    stages, result = on_preferred_mesh(case, prepared, found, stages, result, mended)
     seen = known.screening
     if diagnosing and seen is not None:
         fit = (found.found or found.null).fit
         seen = settled(case, seen, prepared.above, stages.final.model, fit)
-    result = over_levels(question, prepared, stages, result, diagnosing)
+    result = over_levels(prepared, stages, result, diagnosing)
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
         coarse = error_of_mesh(found.null.fit) if found.halved else 0.0
@@ -170,7 +161,7 @@ def build_result(known: Explained, diagnosing: bool, progress: Progress) -> Diag
     study = known.study
     if not diagnosing:
         reasons = compensating(
-            found.plain.fit, result.agreement, result.mass, question.mass_measurement,
+            found.plain.fit, result.agreement, result.mass, prepared.question.mass_measurement,
             result.residual_localisation, result.compared == "responses",
         )  # fmt: skip
         distrust = (*distrust, *reasons)
@@ -245,15 +236,15 @@ def _apply_held_out(
     """Return the verdict by all data, reasons not to trust it, and what would settle a tie."""
     prepared = made.prepared
     prepared = prepared if diagnosing else replace(prepared, too_little="")  # nothing to name
-    case = Hypotheses(made.question, prepared, made.found)
+    case = Hypotheses(prepared, made.found)
     decision = decide(case)
     found, distrust = concluded(case, decision)
     ahead = None
     if diagnosing:
         rivals = open_explanations(case, decision, found)
-        ahead = outlook(prepared.problem, *rivals, allowed=made.question.further)
-    plain = refined(made.question, prepared, found.plain, written=True)
-    found = replace(found, plain=plain.hypothesis)
+        ahead = outlook(prepared.problem, *rivals, allowed=prepared.question.further)
+    plain, note, doubts = refined(prepared, found.plain, written=True)
+    found = replace(found, plain=plain)
     if found.found is not None:
         return found, distrust, ahead
-    return replace(found, notes=(*found.notes, plain.note)), (*plain.distrust, *distrust), ahead
+    return replace(found, notes=(*found.notes, note)), (*doubts, *distrust), ahead

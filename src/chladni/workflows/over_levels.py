@@ -5,14 +5,13 @@ from dataclasses import replace
 from ..ema.level_table import level_tables
 from ..inference.level_effects import LinearJoint, joint_comment, level_effects, linear_joints
 from ..io.nastran.edit.changes import Add
-from ..search.question import Prepared, Question
+from ..search.question import Prepared
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 
 
 def over_levels(
-    fitted_question: Question, prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult,
-    diagnosing: bool,
-) -> DiagnosisResult:  # fmt: skip
+    prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult, diagnosing: bool
+) -> DiagnosisResult:
     """Add the modes over levels; the verdict is nonlinear if they move and no effect is named.
 
     An effect of the catalogue is linear: it can explain one level, but not a difference between
@@ -34,7 +33,7 @@ def over_levels(
         "modes with level, so the verdict is 'nonlinear'"
     )
     model = stages.final.model
-    joints = linear_joints(study, model, fitted_question.level)
+    joints = linear_joints(study, model, prepared.question.level)
     return replace(
         result, verdict="nonlinear", effects=level_effects(study, model), joints=joints,
         models=_with_comment(stages, joints), calibrated=kept, notes=(*result.notes, note),

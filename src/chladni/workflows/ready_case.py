@@ -9,7 +9,7 @@ from ..ema.screening_lines import screening_lines
 from ..errors import FileError
 from ..progress import Progress, silent
 from ..search.preparation import prepare
-from ..search.question import Prepared, Question
+from ..search.question import Prepared
 from .axes_check import refuse_turned_axes
 from .mended_case import undone as mapped_away
 from .question_of_case import question_of
@@ -34,7 +34,7 @@ def refuse_without_effects(case: Case) -> None:
 def ready(
     case: Case, diagnosing: bool, progress: Progress = silent, fitted: bool = True,
     undone: tuple[Finding, ...] = (),
-) -> tuple[Question, Prepared, Screening | None]:  # fmt: skip
+) -> tuple[Prepared, Screening | None]:  # fmt: skip
     """Identify the recording, build the reduced problem, screen; nothing is fitted.
 
     Parameters
@@ -64,4 +64,4 @@ def ready(
     if screening is not None and (unmendable(screening) or of_shapes):
         if diagnosing or mapped_away(case, screening, undone) is not None:
             raise RecordingAtFault(screening)
-    return question, prepared, screening
+    return prepared, screening
