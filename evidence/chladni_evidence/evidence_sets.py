@@ -61,12 +61,13 @@ JOINED = {  # structures of the set joints, by the hidden effect
     "viscoelastic-joint": ("bonded plates",),
 }
 FREE = ("half cylinder", "stringer plate", "cut-out plate", "covered trough")
+OF_BARS = ("ladder of tubes",)
 IN_CLAMPS = ("held plate", "cantilever", "curved blade")
 HIDDEN_IN = {  # structures of the set kratos, by the hidden effect
-    "point-mass": FREE + IN_CLAMPS,
-    "extra-support": IN_CLAMPS + FREE,
+    "point-mass": FREE + IN_CLAMPS + OF_BARS,
+    "extra-support": IN_CLAMPS + OF_BARS + FREE,
     "sensor-mass": ("held plate", "half cylinder", "cantilever", "cut-out plate"),
-    "suspension": FREE,
+    "suspension": FREE + OF_BARS,
     "thickness-distribution": ("cut-out plate", "curved blade", "half cylinder", "held plate"),
     "doubler": ("cantilever", "half cylinder", "stringer plate", "curved blade"),
     "stiffness-patch": ("half cylinder", "cantilever", "cut-out plate", "covered trough"),
@@ -156,7 +157,7 @@ def chosen(
     """
     whole = orders(name, seeds)
     hidden = tuple(dict.fromkeys([*KINDS, *(o.kind for o in whole)]))
-    every = ("tailgate", *SPECIMENS, *CLAMPED, *FORMS, *FREE, *IN_CLAMPS)
+    every = ("tailgate", *SPECIMENS, *CLAMPED, *FORMS, *FREE, *IN_CLAMPS, *OF_BARS)
     for what, chosen_words, known in (("kind", kinds, hidden), ("structure", structures, every)):
         for word in chosen_words:
             if word not in known:
@@ -225,7 +226,7 @@ def _clamps(seed: int) -> Iterator[Order]:
 
 
 def _kratos(seed: int) -> Iterator[Order]:
-    every = FREE + IN_CLAMPS
+    every = FREE + IN_CLAMPS + OF_BARS
     for k in range(6):
         kind = "nothing" if k < 4 else "calibration"
         yield Order(every[(seed + k) % len(every)], kind, seed, "kratos")

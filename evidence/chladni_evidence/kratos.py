@@ -180,15 +180,16 @@ def _sheet(part: Part) -> tuple[float, float, float]:
 
 
 def _beams(a: Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """Ends (k, 2) and E, nu, rho, A, J, I1, I2 of round beams."""
+    """Ends (k, 2) and E, nu, rho, A, J, I1, I2 and areas in shear of beams alike both ways."""
     values = []
     for p in a.beams.part:
         s = a.parts[p].section
         if not isinstance(s, BeamSection) or not isinstance(s.material, Isotropic) or s.I1 != s.I2:
-            raise ModelError(f"part {a.parts[p].name} is not of round beams, as Kratos is given")
+            raise ModelError(f"part {a.parts[p].name} is not of beams alike both ways, as Kratos is given")
         m = s.material
-        values.append([m.E, m.nu, m.rho, s.area, s.J, s.I1, s.I2])
-    return a.beams.nodes, np.array(values).reshape(-1, 7)
+        sheared = [k * s.area for k in s.shear]
+        values.append([m.E, m.nu, m.rho, s.area, s.J, s.I1, s.I2, *sheared])
+    return a.beams.nodes, np.array(values).reshape(-1, 9)
 
 
 def _springs(a: Assembly) -> sp.csr_matrix:

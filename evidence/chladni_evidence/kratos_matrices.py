@@ -6,7 +6,7 @@ points, moved (n, 3)    places and imposed displacements [m]
 shells (m, 4)           rows of points; a triangle repeats its third
 shell_values (m, 4)     E, nu, rho, t
 beams (k, 2)            rows of points
-beam_values (k, 7)      E, nu, rho, A, J, I1, I2 of round sections
+beam_values (k, 9)      E, nu, rho, A, J, I1 = I2, and areas in shear (0: rigid)
 
 and writes both matrices in compressed rows, and the equation (n, 6) of every degree of freedom.
 """
@@ -26,7 +26,8 @@ KINDS = {  # elements by their number of nodes
 }
 MATERIAL = ("YOUNG_MODULUS", "POISSON_RATIO", "DENSITY")
 SHELL = (*MATERIAL, "THICKNESS")
-BEAM = (*MATERIAL, "CROSS_AREA", "TORSIONAL_INERTIA", "I22", "I33")
+SECTION = ("CROSS_AREA", "TORSIONAL_INERTIA", "I22", "I33")
+BEAM = (*MATERIAL, *SECTION, "AREA_EFFECTIVE_Y", "AREA_EFFECTIVE_Z")
 MOTIONS = {"DISPLACEMENT": "REACTION", "ROTATION": "REACTION_MOMENT"}
 
 

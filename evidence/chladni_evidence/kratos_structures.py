@@ -1,7 +1,7 @@
 """Structures unlike our specimens, for articles by Kratos: each deck, and each finer article.
 
 Dimensions are drawn at random. A deck is what an engineer writes: few elements a wave, stringers as
-bars on the skin. In the article the stringers are sheets.
+bars on the skin. In the article the stringers are sheets, and tubes have more shear.
 """
 
 from collections.abc import Mapping
@@ -17,6 +17,10 @@ from chladni_specimens import DrawnForm, Piece, of_pieces, rectangle, stops
 STEEL = Isotropic(210e9, 0.3, 7850.0, id=1)
 ALUMINIUM = Isotropic(70e9, 0.33, 2700.0, id=2)
 SPOT = 0.006  # diameter of a spot weld [m]
+UP = np.array([0.0, 0.0, 1.0])
+# shear factors of a thin square tube: by the area of its webs, as a deck has it, and by Cowper
+# (1966), J. Applied Mechanics 33, 335-340
+WEBS, COWPER = 0.54, 0.44
 
 Numbers = Mapping[str, float]
 
@@ -49,8 +53,7 @@ def stringer_plate(d: Numbers, h: float, bars: bool) -> Assembly:
     chains = [np.flatnonzero(np.isclose(a.points[:, 1], at)) for at in lines]
     ends = np.concatenate([_chain(a.points, rows) for rows in chains])
     blade = BeamSection(ALUMINIUM, b * H, b * H**3 / 12, H * b**3 / 12, 0.0, H * b**3 / 3)
-    up = np.array([0.0, 0.0, 1.0])
-    return _with_beams(a, ends, Part(2, "stringers", blade), up, up * (H + t) / 2)
+    return _with_beams(a, ends, Part(2, "stringers", blade), UP, UP * (H + t) / 2)
 
 
 def _chain(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -63,7 +66,7 @@ def _with_beams(
     a: Assembly, ends: np.ndarray, part: Part, up: np.ndarray, offset: np.ndarray
 ) -> Assembly:
     """Beams between rows of points (k, 2), of a new part."""
-    n, first = len(ends), int(a.shells.ids.max()) + 1
+    n, first = len(ends), int(a.shells.ids.max(initial=0)) + 1
     beams = appended(
         Beams(), ids=first + np.arange(n), nodes=ends, part=np.full(n, len(a.parts)),
         up=np.tile(up, (n, 1)), offset=np.tile(offset, (n, 2, 1)),
@@ -127,6 +130,24 @@ def _at(a: Assembly, place: tuple[float, float, float]) -> int:
     return int(np.linalg.norm(a.points - place, axis=1).argmin())
 
 
+def ladder(d: Numbers, h: float, k: float) -> Assembly:
+    """Two rails and three rungs of square tube as bars, with shear factor k; flat."""
+    L, W, side, t = (d[name] for name in ("length", "width", "side", "t"))
+    at = (0.0, d["bay"] * L, L)
+    corners = np.array([(x, y, 0.0) for x in at for y in (0.0, W)])
+    points, ends = list(corners), []
+    for a, b in ((0, 2), (2, 4), (1, 3), (3, 5), (0, 1), (2, 3), (4, 5)):
+        n = max(2, round(float(np.linalg.norm(corners[b] - corners[a])) / h))
+        inner = len(points) + np.arange(n - 1)
+        points += list(corners[a] + np.arange(1, n)[:, None] / n * (corners[b] - corners[a]))
+        chain = np.r_[a, inner, b]
+        ends.append(np.column_stack([chain[:-1], chain[1:]]))
+    area, I = side**2 - (side - 2 * t) ** 2, (side**4 - (side - 2 * t) ** 4) / 12
+    tube = BeamSection(STEEL, area, I, I, 0.0, (side - t) ** 3 * t, shear=(k, k))
+    bare = Assembly(np.arange(1, len(points) + 1), np.array(points), ())
+    return _with_beams(bare, np.concatenate(ends), Part(1, "tubes", tube), UP, np.zeros(3))
+
+
 def cut_out_plate(d: Numbers, h: float) -> Assembly:
     """A plate with an elliptic cut-out, on rings from its edge to the outline."""
     L, W = d["length"], d["width"]
@@ -166,6 +187,10 @@ _TROUGH = {
     **{"length": (0.42, 0.55), "width": (0.14, 0.2), "height": (0.05, 0.08)},
     **{"rim": (0.02, 0.026), "t": (1.0e-3, 1.4e-3), "t cover": (1.0e-3, 1.4e-3)},
 }
+_LADDER = {
+    **{"length": (0.55, 0.75), "width": (0.35, 0.45), "bay": (0.35, 0.65)},
+    **{"side": (0.018, 0.025), "t": (1.3e-3, 1.8e-3)},
+}
 _CUT = {
     **{"length": (0.42, 0.55), "width": (0.34, 0.42), "x": (0.4, 0.6), "y": (0.4, 0.6)},
     **{"a": (0.07, 0.1), "b": (0.04, 0.07), "t": (1.6e-3, 2.2e-3)},
@@ -180,11 +205,13 @@ DECKS = {
         DrawnForm("curved blade", _BLADE, curved_blade, 0.015),
         DrawnForm("covered trough", _TROUGH, covered_trough, 0.022),
         DrawnForm("cut-out plate", _CUT, cut_out_plate, 0.022),
+        DrawnForm("ladder of tubes", _LADDER, partial(ladder, k=WEBS), 0.045),
     )
 }
 ARTICLES = {  # a spot at one point acts as one of radius h/5, so h is 15 mm for spots of 6 mm
     **DECKS,
     "stringer plate": replace(DECKS["stringer plate"], build=partial(stringer_plate, bars=False)),
     "covered trough": replace(DECKS["covered trough"], size=0.066),
+    "ladder of tubes": replace(DECKS["ladder of tubes"], build=partial(ladder, k=COWPER)),
 }
 FINER = 4.4  # refinement of an article over its deck: its own errors of h² are a 20th
