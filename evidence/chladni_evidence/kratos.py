@@ -185,7 +185,9 @@ def _beams(a: Assembly) -> tuple[np.ndarray, np.ndarray]:
     for p in a.beams.part:
         s = a.parts[p].section
         if not isinstance(s, BeamSection) or not isinstance(s.material, Isotropic) or s.I1 != s.I2:
-            raise ModelError(f"part {a.parts[p].name} is not of beams alike both ways, as Kratos is given")
+            raise ModelError(
+                f"part {a.parts[p].name} is not of beams alike both ways, as Kratos is given"
+            )
         m = s.material
         sheared = [k * s.area for k in s.shear]
         values.append([m.E, m.nu, m.rho, s.area, s.J, s.I1, s.I2, *sheared])

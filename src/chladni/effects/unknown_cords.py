@@ -1,9 +1,10 @@
 """Cords whose places the test does not state: springs to ground spread as the mass is.
 
-A rigid motion on cords at f_s responds 1 / (1 - (f_s / f)²) times as much as a free one: at four
-times f_s still 7 % more. Cords change bounce and tilt differently, and their places are unknown.
-Springs in proportion to the mass, and to the mass times the square of the distance from the centre
-along either other axis, give every rigid motion of a direction its own frequency.
+A rigid motion on cords at f_s responds 1 / (1 - (f_s / f)²) times as much as a free one. At four
+times f_s this is still 7 % more. Cords change bounce and tilt differently, and their places are
+unknown. Here springs are spread in proportion to the mass. Others are spread as the mass times the
+square of the distance from the centre along either other axis. Every rigid motion of a direction
+has its own frequency then.
 """
 
 from dataclasses import dataclass, field

@@ -108,9 +108,9 @@ class Explanation:
     def Q(self) -> tuple[tuple[float, float], ...]:
         """Q of the calibrated deck and of its own, on the fitted and on the choosing data.
 
-        Both have the mesh on which they are written: that of the deck, unless its own is worse
-        there and the data prefer the mesh that is twice as fine. An effect may be smaller than the
-        error of a mesh.
+        Both have the mesh on which they are written. That is the mesh of the deck, unless its own
+        is worse there and the data prefer the mesh that is twice as fine. An effect may be smaller
+        than the error of a mesh.
         """
         given = self._scores((self.case.found.plain, self.written))
         return self._scores(self.halved) if self._is_worse(given) and self.halved else given

@@ -46,8 +46,8 @@ def without_silent(case: Case) -> Case:
     one = len(gone) == 1
     note = (
         f"sensor{'s' * (not one)} {named(gone, 6)} {'is' if one else 'are'} left out: no drive of "
-        f"the model moves {'it' if one else 'them'}, and the recording has less than a tenth of "
-        "the strongest output there, as much as tilt and cross-axis sensitivity give"
+        f"the model moves {'it' if one else 'them'}; the recording has less than a tenth of the "
+        "strongest output there, which tilt and cross-axis sensitivity explain"
     )
     return replace(
         case, recordings=recordings, outputs=case.outputs.only(~silent), held_sensors=held,
