@@ -17,6 +17,7 @@ from chladni.effects.effect import Effect, Parameter
 from chladni.effects.element_groups import element_groups
 from chladni.effects.joint_stiffness import model_families
 from chladni.effects.model_errors import (
+    BeamTheory,
     FoldBending,
     HalvedMesh,
     JointFootprint,
@@ -25,6 +26,7 @@ from chladni.effects.model_errors import (
 )
 from chladni.effects.orthotropy import material_axes
 from chladni.effects.sheets import MassPatch, StiffnessPatch, ThicknessDistribution
+from chladni.effects.unknown_cords import unknown_cords
 from chladni.effects.user_parameters import user_parameter
 from chladni.effects.weld_patch import RigidPatch, WeldPatch
 from chladni.errors import AccuracyError, LabelError
@@ -142,6 +144,7 @@ def others(on_plate):
     at = np.eye(len(seen.a) + len(seen.b))[:, [-1]]
     rows = tuple(seen.outputs[[k]] for k in range(2))
     gauge = channels.GaugeErrors(tilts, "gauge", rows=rows, shapes=at)
+    (cords,) = unknown_cords(reduced.structure, np.array([10.0]), np.eye(3)[2:])
     by_mesh = dict(rows=over.rows, omega=over.omega, log=over.log)
     found = {
         **{
@@ -154,6 +157,8 @@ def others(on_plate):
         "gauge-errors": (gauge, [0.3, -0.2], [0, 0]),
         "mesh-error": (over, [1.0], [0]),
         "joint-footprint": (JointFootprint(over.parameters, over.text, **by_mesh), [1.0], [0]),
+        "beam-theory": (BeamTheory(over.parameters, over.text, **by_mesh), [1.0], [0]),
+        "unknown-cords": (cords, [0.1, -0.2, 0.3], [-40, -40, -40]),
         "jitter": (jitter, 0.01 * np.sin(np.arange(r) + 1), np.zeros(r)),
         "fold-bending": (
             FoldBending(ones, "folds", quantity="bending", functions=half), [0.3], [0],
@@ -176,9 +181,9 @@ def others(on_plate):
 
 
 OTHERS = (
-    "E", "rho", "t", "user parameter", "scatter", "gain", "mesh-error", "joint-footprint", "jitter",
-    "fold-bending", "family", "orthotropic-material", "thickness-distribution", "stiffness-patch",
-    "mass-patch",
+    "E", "rho", "t", "user parameter", "scatter", "gain", "mesh-error", "joint-footprint",
+    "beam-theory", "unknown-cords", "jitter", "fold-bending", "family", "orthotropic-material",
+    "thickness-distribution", "stiffness-patch", "mass-patch",
 )  # fmt: skip
 EFFECT_RULES = {
     "idle": idle_at_nominal, "acts": partial(acts, least=1e-3), "symmetric": symmetric_operators,

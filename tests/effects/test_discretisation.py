@@ -10,7 +10,7 @@ from tests.fem.test_curved_shell import sheet
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import iterated
 from chladni.effects import model_errors
-from chladni.effects.model_errors import LIMIT, limit_of, mesh_errors
+from chladni.effects.model_errors import LIMIT, BeamTheory, limit_of, mesh_errors
 from chladni.fem.assemble import Structure, structure
 from chladni.fem.modelled import modelled
 from chladni.geometry.refine import refined
@@ -82,7 +82,8 @@ def test_the_softest_mode_of_a_row_of_bars_goes_to_its_limit(tmp_path):
     cards += [f"CBAR,{k + 1},1,{k + 1},{k + 2},0.,1.,0." for k in range(n)]
     (tmp_path / "bar.bdf").write_text("\n".join([*cards, "ENDDATA"]) + "\n")
     bar = modelled(assembly(read_deck(tmp_path / "bar.bdf"), UNITS["SI"]), 3200.0)
-    (error,) = mesh_errors(bar, 800.0)
+    error, theory = mesh_errors(bar, 800.0)
+    assert type(theory) is BeamTheory
     w, V = np.linalg.eigh(error.log)
     root = error.omega[:, None] * V
     due = (1.8751 / L) ** 2 * np.sqrt(210e9 * h**2 / 12 / 7850) / (2 * np.pi)

@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 
 from chladni.geometry import nearest
 from chladni.geometry.nearest import ShellSurface
-from chladni_specimens.plates import plate
+from chladni_specimens import FORMS
+from chladni_specimens.plates import plate, solid_plate
 
 ROTATION = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 PLATE = plate(0.4, 0.3, 8, 6, 1.5e-3)
@@ -100,3 +101,17 @@ def test_it_is_the_nearest_of_all_whatever_was_tried_first(seed, near):
         least = np.minimum(least, np.linalg.norm(closest - places, axis=1))
     assert_allclose(found.distance, least, atol=1e-9)
     assert_allclose(np.linalg.norm(found.place - places, axis=1), found.distance, atol=1e-12)
+
+
+def test_the_surface_of_solids_is_their_outer_faces():
+    """A place above a block lies on its top, with the normal outwards; inner faces do not count."""
+    block = solid_plate(0.4, 0.3, 0.02, 8, 6)
+    surface = ShellSurface.whole(block)
+    assert len(surface.nodes) == 2 * (8 * 6 + 8 + 6)
+    found = surface.closest_points(np.array([[0.21, 0.14, 0.03], [0.21, 0.14, 0.019]]))
+    assert_allclose(found.place, [[0.21, 0.14, 0.02]] * 2, atol=1e-12)
+    assert_allclose(found.normal[:, 2], 1.0)
+
+
+def test_beams_alone_have_no_surface():
+    assert len(ShellSurface.whole(FORMS["tube frame"].made(1)).nodes) == 0

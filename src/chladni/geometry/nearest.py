@@ -206,7 +206,7 @@ def _spread(x: np.ndarray) -> tuple["cKDTree", np.ndarray, np.ndarray]:
     length = np.stack([np.linalg.norm(b - a, axis=1) for a, b in ends])
     longer = length.argmax(axis=0)[:, None]
     a, b = (np.where(longer == 0, p, q) for p, q in zip(*ends, strict=True))
-    usual = max(float(np.median(length)), 1e-9)
+    usual = max(float(np.median(length)) if length.size else 0.0, 1e-9)
     count = np.maximum(1, np.ceil(length.max(axis=0) / (1.5 * usual))).astype(int)
     owner = np.repeat(np.arange(len(x)), count)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
