@@ -1,5 +1,7 @@
 """The nearest point of a set of shells: theory on a plate, VTK's and trimesh's on a real one."""
 
+import gc
+
 import numpy as np
 import pytest
 import trimesh
@@ -115,3 +117,12 @@ def test_the_surface_of_solids_is_their_outer_faces():
 
 def test_beams_alone_have_no_surface():
     assert len(ShellSurface.whole(FORMS["tube frame"].made(1)).nodes) == 0
+
+
+def test_the_surface_of_a_structure_is_made_once_and_goes_with_it():
+    made = plate(0.4, 0.3, 4, 3, 1.5e-3)
+    assert ShellSurface.whole(made) is ShellSurface.whole(made)
+    known = len(nearest._WHOLE)
+    del made
+    gc.collect()
+    assert len(nearest._WHOLE) == known - 1

@@ -8,7 +8,8 @@ are tried next.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -62,10 +63,12 @@ class ShellSurface:
 
     @classmethod
     def whole(cls, assembly: Assembly) -> Self:
-        """All shells of an assembly, and the outer faces of its solids."""
-        faces = [skin(s.nodes, s.part)[0] for s in assembly.solids]
-        nodes = np.concatenate([assembly.shells.nodes, *faces])
-        return cls.over("the structure", assembly.points, nodes)
+        """All shells of an assembly, and the outer faces of its solids; made once for each."""
+        if assembly not in _WHOLE:
+            faces = [skin(s.nodes, s.part)[0] for s in assembly.solids]
+            nodes = np.concatenate([assembly.shells.nodes, *faces])
+            _WHOLE[assembly] = cls.over("the structure", assembly.points, nodes)
+        return cast(Self, _WHOLE[assembly])
 
     @classmethod
     def of(cls, assembly: Assembly, sheet: ShellChoice) -> Self:
@@ -192,6 +195,9 @@ class ShellSurface:
             nodes = self._with_ring(nodes)
             return nodes, np.full(len(nodes), 1 / len(nodes))
         return nodes[keep], weight[keep]
+
+
+_WHOLE = WeakKeyDictionary[Assembly, ShellSurface]()  # a tree of 100 000 cells takes a second
 
 
 def _spread(x: np.ndarray) -> tuple["cKDTree", np.ndarray, np.ndarray]:
