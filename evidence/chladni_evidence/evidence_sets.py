@@ -65,9 +65,9 @@ OF_BARS = ("ladder of tubes",)
 IN_CLAMPS = ("held plate", "cantilever", "curved blade")
 HIDDEN_IN = {  # structures of the set kratos, by the hidden effect
     "point-mass": FREE + IN_CLAMPS + OF_BARS,
-    "extra-support": IN_CLAMPS + OF_BARS + FREE,
+    "extra-support": IN_CLAMPS + FREE,
     "sensor-mass": ("held plate", "half cylinder", "cantilever", "cut-out plate"),
-    "suspension": FREE + OF_BARS,
+    "suspension": FREE,
     "thickness-distribution": ("cut-out plate", "curved blade", "half cylinder", "held plate"),
     "doubler": ("cantilever", "half cylinder", "stringer plate", "curved blade"),
     "stiffness-patch": ("half cylinder", "cantilever", "cut-out plate", "covered trough"),
@@ -77,7 +77,7 @@ HIDDEN_IN = {  # structures of the set kratos, by the hidden effect
     "soft-clamp": IN_CLAMPS,
     "weld-missing": ("covered trough",),
     "stretched-sheet": ("held plate",),
-    "shaker-restraint": ("cut-out plate", "half cylinder", "cantilever"),
+    "shaker-restraint": ("cut-out plate", "half cylinder", "cantilever", *OF_BARS),
 }
 IN_CLAMP = ("nothing", "compliant-support", "shaker-restraint", "extra-support", "point-mass")
 

@@ -70,13 +70,16 @@ class CalibratedArticle:
 
 
 def of_prior(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
-    """An article with E and t of every sheet and rho of its material from the priors; factors."""
+    """An article with E and t of every sheet or tube and rho of its material from the priors.
+
+    The factors by part come with it.
+    """
     scales: Scales = {}
     rho: dict[int, float] = {}
     for k, part in enumerate(assembly.parts):
-        if thickness_of(part) != "t":
+        if not (t := thickness_of(part)):
             continue
-        sd = {q: prior_sd(assembly.parts, q, [k]) for q in ("E", "rho", "t")}
+        sd = {q: prior_sd(assembly.parts, q, [k]) for q in ("E", "rho", t)}
         drawn = {q: float(np.exp(s * rng.normal())) for q, s in sd.items()}
         drawn["rho"] = rho.setdefault(getattr(material_of(part), "id", 0), drawn["rho"])
         scales[part.name] = drawn

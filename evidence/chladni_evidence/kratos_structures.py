@@ -131,10 +131,10 @@ def _at(a: Assembly, place: tuple[float, float, float]) -> int:
 
 
 def ladder(d: Numbers, h: float, k: float) -> Assembly:
-    """Two rails and three rungs of square tube as bars, with shear factor k; flat."""
+    """Two rails and three rungs of square tube as bars, with shear factor k, across the x-axis."""
     L, W, side, t = (d[name] for name in ("length", "width", "side", "t"))
     at = (0.0, d["bay"] * L, L)
-    corners = np.array([(x, y, 0.0) for x in at for y in (0.0, W)])
+    corners = np.array([(0.0, y, z) for y in at for z in (0.0, W)])
     points, ends = list(corners), []
     for a, b in ((0, 2), (2, 4), (1, 3), (3, 5), (0, 1), (2, 3), (4, 5)):
         n = max(2, round(float(np.linalg.norm(corners[b] - corners[a])) / h))
@@ -145,7 +145,9 @@ def ladder(d: Numbers, h: float, k: float) -> Assembly:
     area, I = side**2 - (side - 2 * t) ** 2, (side**4 - (side - 2 * t) ** 4) / 12
     tube = BeamSection(STEEL, area, I, I, 0.0, (side - t) ** 3 * t, shear=(k, k))
     bare = Assembly(np.arange(1, len(points) + 1), np.array(points), ())
-    return _with_beams(bare, np.concatenate(ends), Part(1, "tubes", tube), UP, np.zeros(3))
+    return _with_beams(
+        bare, np.concatenate(ends), Part(1, "tubes", tube), np.eye(3)[0], np.zeros(3)
+    )
 
 
 def cut_out_plate(d: Numbers, h: float) -> Assembly:
