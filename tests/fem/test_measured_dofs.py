@@ -1,13 +1,17 @@
 """Sensors on a structure: grids, places between them, the base, places known to millimetres."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.builders.elements import row_of_bars
 
 from chladni.fem.assemble import structure
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.geometry.facets import tangents
-from chladni_specimens.plates import plate, solid_plate
+from chladni.model.properties import BeamSection
+from chladni_specimens.plates import STEEL, plate, solid_plate
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -89,3 +93,16 @@ def test_places_move_in_a_rigid_rotation_alike_on_sheets_and_solids(made, on_gri
     q = built.T.T @ motion.ravel()
     for rows, along in zip(sensors.moved(built, by), tangents(normal), strict=True):
         assert_allclose(rows @ q, by * (np.cross(omega, along)[:, 2]), atol=1e-12)
+
+
+def test_places_without_rotations_do_not_move_where_no_solid_is():
+    """A row of bars that supports keep in a plane, and rods: neither has a face to move on."""
+    for kind, held in (("bar", (3, 4, 5)), ("rod", (3,))):
+        section = BeamSection(STEEL, 1e-4, 1e-9, 1e-9, 0.0, 2e-9, kind=kind)
+        supports = np.array([(row, c) for row in range(6) for c in held])
+        built = structure(row_of_bars(5, 0.5, section, supports=supports))
+        sensors = dofs(built, built.assembly.points[1:3], built.assembly.ids[1:3])
+        along_y = replace(sensors, directions=np.tile([0.0, 1.0, 0.0], (2, 1)))
+        seen = sorted(rows.nnz for rows in along_y.moved(built, np.full(2, 1e-3)))
+        assert seen[0] == 0, "no bar turns about one of both axes"
+        assert seen[1] > 0

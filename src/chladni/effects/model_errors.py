@@ -23,7 +23,7 @@ from ..geometry.folds import share_at_folds
 from ..geometry.footprints import on_smaller_shells, on_whole_shells, regions_of_joints
 from ..geometry.refine import refined
 from ..model.assembly import Assembly
-from .beam_theory import as_deep_beams, theory_prior
+from .beam_theory import as_deep_beams, bending_members, theory_prior
 from .calibration_parameters import LogField
 from .effect import Effect, ModalFactor, Parameter, ShapeChange, Term, Traits
 from .element_groups import ElementGroups
@@ -196,7 +196,7 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
         file = of_file.error(MeshError, prior, order)
         errors = [replace(errors[0], file=file)]
         errors.append((of_file - of_shells).error(JointFootprint, FOOTPRINT))
-    if len(member_beams(built.assembly)):
+    if len(bending_members(built.assembly)):
         deep, _ = change(as_deep_beams(whole), begun)
         errors.append((deep - of_shells).error(BeamTheory, theory_prior(built.assembly)))
     smaller = on_smaller_shells(built.assembly, fine)

@@ -92,16 +92,26 @@ class MeasuredDofs(ShownBriefly):
         have none: there it is the slope of the motion over the faces about the place.
         """
         u, v = self.across()
+        solid = np.flatnonzero(self._on_solids(built.assembly) & (by > 0))
         out = []
         for along, about, sign in ((u, v, -1.0), (v, u, 1.0)):
-            rows = about.rows(built, turning=True)
-            rows = (sp.diags_array(sign * by) @ rows).tolil()
-            stiff = np.flatnonzero((np.diff(rows.tocsr().indptr) == 0) & ~self.base & (by > 0))
-            if len(stiff):
-                step = by[stiff, None] * along.directions[stiff]
-                rows[stiff] = change_of(built, self.points[stiff], step, self.directions[stiff])
+            rows = (sp.diags_array(sign * by) @ about.rows(built, turning=True)).tolil()
+            if len(solid):
+                step = by[solid, None] * along.directions[solid]
+                rows[solid] = change_of(built, self.points[solid], step, self.directions[solid])
             out.append(sp.csr_array(rows))
         return out[0], out[1]
+
+    def _on_solids(self, assembly: Assembly) -> np.ndarray:
+        """True (k,) where a place is on grids of solids alone, which do not rotate."""
+        out, solid = np.zeros(len(self.labels), bool), np.zeros(len(assembly.points), bool)
+        for some in assembly.solids:
+            solid[some.nodes] = True
+        solid[assembly.shells.nodes] = solid[assembly.beams.nodes] = False
+        if solid.any():
+            shares = self.shares(assembly)
+            out[~self.base] = [solid[assembly.rows([g for g, _ in s])].all() for s in shares]
+        return out
 
     def across(self) -> tuple["MeasuredDofs", "MeasuredDofs"]:
         """Copies with the two directions u, v normal to n, u x v = n."""

@@ -26,8 +26,8 @@ def without_silent(case: Case) -> Case:
     if not case.frfs:
         return case
     frf = case.frfs[0]
-    level = np.sqrt((np.abs(frf.values[case.lines(frf.frequency)]) ** 2).mean(axis=(0, 2)))
-    weak = level < WEAK * level.max(initial=0.0)
+    power = (np.abs(frf.values[case.lines(frf.frequency)]) ** 2).sum(axis=(0, 2))
+    weak = power < WEAK**2 * power.max(initial=0.0)
     if not weak.any():
         return case
     high = case.band[1] if case.band else float(frf.frequency[-1])
