@@ -102,7 +102,8 @@ def _too_sparse(made: Assembly, formed: FormedMesh, covered: float) -> str:
         return ""
     reach = default_reach(made)
     spacing = float(np.median(cKDTree(formed.points).query(formed.points, k=2)[0][:, 1]))
-    off = ShellSurface.whole(made).closest_points(formed.points).distance
+    shells = ShellSurface.over("the shells", made.points, made.shells.nodes)
+    off = shells.closest_points(formed.points).distance
     if spacing <= reach or float(np.median(off)) > reach:
         return ""
     return (

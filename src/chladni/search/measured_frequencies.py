@@ -142,7 +142,6 @@ def suspension_note(above: float) -> list[str]:
     """Sentence on the range that is left out, where there is one."""
     said = (
         "the deck is free and names no hangers, and the test has modes far below the first elastic "
-        f"one: they are those of a suspension, so that the range below {above:.3g} Hz is not "
-        "compared"
+        f"one; these are of a suspension, and the range below {above:.3g} Hz is not compared"
     )
     return [said] if above else []

@@ -169,6 +169,7 @@ def _mesh(elastic: np.ndarray, converged: np.ndarray, shells: bool) -> list[Case
     return [CaseFinding(said, f"refine the mesh, or trust modes below {elastic[wrong[0]]:.4g} Hz")]
 
 
+ACROSS = "correct the direction of any that measured across the sheet"
 NO_RECORDING = "all commands need one except modes, frf, plan, bench, render and study"
 BLOCKS = "nothing can be fitted until this is corrected"
 
@@ -335,7 +336,9 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
         every = each_state(with_natural_frequencies(case))
         for k, state in enumerate(every):
             stage = within(progress, k / len(every), (k + 1) / len(every))
-            off, screening = _screened(state, diagnosing, stage)
+            kept = without_silent(state)
+            out += [CaseFinding(note, ACROSS) for note in kept.notes[len(state.notes) :]]
+            off, screening = _screened(kept, diagnosing, stage)
             out += [CaseFinding(off, ANOTHER_MASS)] if off else []
             for f in () if screening is None else screening.findings:
                 text, remedy = f.text.rstrip("."), f.repair + _ITSELF * bool(f.mend)
@@ -348,8 +351,7 @@ def _asked(case: Case, progress: Progress) -> list[CaseFinding]:
 def _screened(state: Case, diagnosing: bool, progress: Progress) -> tuple[str, Screening | None]:
     """A mass that deck and scales do not allow, and the findings on the recording."""
     try:
-        state = without_silent(with_sign_of_gain(state))
-        prepared, screening = ready(state, diagnosing, progress, fitted=False)
+        prepared, screening = ready(with_sign_of_gain(state), diagnosing, progress, fitted=False)
     except RecordingAtFault as fault:
         return "", fault.screening
     return off_the_scales(prepared.problem), screening

@@ -209,11 +209,11 @@ def instead_of_effects(verdict: str, screening: Screening | None) -> tuple[str, 
 
 
 def at_fault(case: Case, screening: Screening, diagnosing: bool) -> DiagnosisResult:
-    """Return the result for a recording that must be corrected first, without any fit."""
+    """Return the result for a recording that must be corrected first; no effect is named."""
     tried = any(f.left is not None for f in screening.faults)
+    begin = "Effects were tried, but none is named" if tried else "Nothing was fitted"
     note = (
-        ("No effect that was tried explains as much" if tried else "Nothing was fitted")
-        + ": an effect found in a faulty recording may be the fault itself. "
+        f"{begin}: an effect found in a faulty recording may be the fault itself. "
         "Correct the recording or measure again, and repeat the diagnosis."
     )
     command = "diagnose" if diagnosing else "calibrate"
